@@ -1,0 +1,70 @@
+/* quern/contact.h - what contact laws share: restitution, first touch, the Coulomb cone. docs/theory/contacts.md */
+#pragma once
+#include <quern/math.h>
+#include <quern/vec.h>
+
+/* Damping ratio zeta of a linear contact m x'' + 2 zeta w m x' + w^2 m x = 0 whose force is never attractive and which
+ * rebounds with restitution e in (0, 1]: -ln e = 2 zeta F(zeta), F(zeta) = R_C(zeta^2, 1) (Schwager & Poeschel 2007,
+ * in Carlson's form). The same zeta holds exactly for Hertz's force with a dashpot ~ overlap^(1/4). [setup] */
+QUERN_INLINE quern_real quern_damping_ratio(quern_real e) {
+	const quern_real wanted = -quern_log(e);
+	quern_real low = 0, high = 64;
+	for (int k = 0; k < 200 && wanted > 0; k++) { /* monotone: bisection down to neighbouring numbers */
+		const quern_real z = 0.5 * (low + high);
+		if (2 * z * quern_carlson_rc(z * z, 1) < wanted) low = z;
+		else high = z;
+	}
+	return wanted > 0 ? 0.5 * (low + high) : 0;
+}
+
+/* A dashpot jumps at first touch, which would make any scheme first order. In the first evaluation of a contact, when
+ * the pair was still apart one step ago, it acts for the time since touching alone. */
+typedef struct quern_onset {
+	quern_real time; /* s, that the pair has touched within this step: dt, or less in the first evaluation */
+	quern_real weight; /* of the dashpot */
+} quern_onset;
+
+/* `approach` is the rate at which the overlap grows; `power` p of a dashpot ~ overlap^p: 0 linear, 1/4 Hertz. */
+QUERN_INLINE quern_onset quern_first_touch(
+	quern_real overlap, quern_real approach, quern_real dt, quern_real power) {
+	const bool first = overlap < approach * dt;
+	const quern_real time = first ? overlap / (approach > 0 ? approach : 1) : dt;
+	return (quern_onset) { time, first ? 0.5 + time / ((1 + power) * dt) : 1 };
+}
+
+/* What the Coulomb cone leaves of an elastic force a and a dashpot's b: spring a + damper b, of size cap at most. */
+typedef struct quern_cone {
+	quern_real spring, damper; /* shares in [0, 1] */
+} quern_cone;
+
+/* Inside the cone both stay. Outside, the spring shrinks until |s a + b| = cap; where |b| alone is beyond the cone, the
+ * spring goes and the damper is clipped. The root is written without cancellation. */
+QUERN_INLINE quern_cone quern_cone_shares(quern_vec a, quern_vec b, quern_real cap) {
+	const quern_vec sum = quern_vec_add(a, b);
+	const quern_real total = quern_vec_dot(sum, sum, 3), bb = quern_vec_dot(b, b, 3), q = cap * cap - bb;
+	const quern_real ab = quern_vec_dot(a, b, 3), aa = quern_vec_dot(a, a, 3);
+	const quern_real inner = ab * ab + aa * q, root = __builtin_sqrt(inner > 0 ? inner : 0), up = ab + root;
+	const quern_real share = ab > 0 ? q / (up > 0 ? up : 1) : (root - ab) / (aa > 0 ? aa : 1);
+	const quern_real clipped = share < 1 ? (share > 0 ? share : 0) : 1;
+	const bool slides = total > cap * cap, beyond = slides & (q <= 0);
+	const quern_real clip = cap / __builtin_sqrt(bb > 0 ? bb : 1);
+	return (quern_cone) { slides ? (beyond ? 0 : clipped) : 1, beyond ? clip : 1 };
+}
+
+/* The same along one line, a and b of either sign; returns what is left of a + b, and of a alone in *spring. */
+QUERN_INLINE quern_real quern_cone_planar(quern_real a, quern_real b, quern_real cap, quern_real *spring) {
+	const quern_real sum = a + b, up = sum > cap ? cap : sum, inside = up < -cap ? -cap : up;
+	const bool slides = sum != inside, beyond = slides & (b * b >= cap * cap);
+	const quern_real total = beyond ? (b > 0 ? cap : -cap) : inside;
+	*spring = slides ? (beyond ? 0 : total - b) : a;
+	return total;
+}
+
+/* A tangential vector of the last step laid into the present tangent plane at its old length, after turning with the
+ * pair by `angle` about n. */
+QUERN_INLINE quern_vec quern_into_plane(quern_vec t, quern_vec n, quern_real angle) {
+	const quern_vec turned = quern_vec_axpy(angle, quern_vec_cross(n, t), t);
+	const quern_vec flat = quern_vec_axpy(-quern_vec_dot(turned, n, 3), n, turned);
+	const quern_real was = quern_vec_dot(t, t, 3), is = quern_vec_dot(flat, flat, 3);
+	return quern_vec_scale(is > 0 ? __builtin_sqrt(was / (is > 0 ? is : 1)) : 0, flat);
+}

@@ -1,0 +1,40 @@
+/* quern/grid.h - the sparse grid as a solver sees it: rows of eight numbers per node, one dense tile per block */
+#pragma once
+#include <quern/abi.h>
+
+/* One node of a row set. */
+typedef quern_real quern_row __attribute__((vector_size(64)));
+
+enum { QUERN_BLOCK_CELLS = 64, QUERN_TILE_MOST = 512 };
+
+/* Cell of a position along one axis, counted from the domain's lower corner. */
+QUERN_INLINE int32_t quern_grid_cell(const quern_grid_view *g, uint32_t axis, quern_real x) {
+	const quern_real t = (x - g->lower[axis]) * (1 / g->cell);
+	const int32_t down = (int32_t)t;
+	return down - (t < (quern_real)down);
+}
+
+/* Copies the nodes that block b's tile covers; nodes that do not exist are zero. */
+QUERN_INLINE void quern_tile_load(
+	const quern_grid_view *g, const quern_row *rows, uint32_t b, quern_row *tile) {
+	const int32_t *entry = g->tile + (size_t)b * g->tile_size;
+	for (uint32_t i = 0; i < g->tile_size; i++) tile[i] = entry[i] < 0 ? (quern_row) { 0 } : rows[entry[i]];
+}
+
+/* Adds a tile to its nodes; call it colour by colour, so that no two blocks add to one node at once. */
+QUERN_INLINE void quern_tile_add(
+	const quern_grid_view *g, quern_row *rows, uint32_t b, const quern_row *tile) {
+	const int32_t *entry = g->tile + (size_t)b * g->tile_size;
+	for (uint32_t i = 0; i < g->tile_size; i++)
+		if (entry[i] >= 0) rows[entry[i]] += tile[i];
+}
+
+/* Position of node or cell corner k of block b, in metres. */
+QUERN_INLINE void quern_grid_corner(const quern_grid_view *g, uint32_t b, uint32_t k, quern_real x[3]) {
+	const uint32_t place[3] = { k % g->edge, k / g->edge % g->edge,
+		g->dim == 3 ? k / (g->edge * g->edge) : 0 };
+	for (uint32_t a = 0; a < 3; a++)
+		x[a] = a < g->dim
+				   ? g->lower[a] + g->cell * (quern_real)(g->at[b][a] * (int32_t)g->edge + (int32_t)place[a])
+				   : 0;
+}
