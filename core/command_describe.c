@@ -1,0 +1,214 @@
+/* quern list, quern describe - what is installed, from the plugins' own tables */
+#include "command.h"
+#include "loader.h"
+#include "param.h"
+#include "text.h"
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const type_names[] = { "", "number", "whole number", "true or false", "text", "vector",
+	"list" };
+
+static const quern_plugin_file *load(quern_loader *loader, const char *id, quern_report *report) {
+	const char *dot = strchr(id, '.');
+	char *kind = quern_copy(id);
+	if (dot) kind[dot - id] = 0;
+	const uint32_t k = dot ? quern_kind_of(kind) : 0;
+	const quern_plugin_file *f = NULL;
+	if (k) f = quern_loader_find(loader, (quern_kind)k, dot + 1, report, (quern_mark) { 0 });
+	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id such as contact.linear", id);
+	free(kind);
+	return f;
+}
+
+/* ---- list ---- */
+
+int quern_command_list(int argc, char **argv) {
+	const bool json = argc == 2 && !strcmp(argv[1], "--json");
+	if (argc > 1 && !json) return quern_usage("list", "unknown argument '%s'", argv[1]);
+	quern_loader *loader = quern_loader_create();
+	quern_report *report = quern_report_create();
+	char **ids = quern_loader_ids(loader);
+	json_t *list = json_array();
+	for (size_t i = 0; ids[i]; i++) {
+		const quern_plugin_file *f = load(loader, ids[i], report);
+		if (!f) continue;
+		if (json)
+			json_array_append_new(list,
+				json_pack("{s:s, s:s, s:s, s:s}", "id", f->plugin.id, "brief",
+					f->plugin.brief ? f->plugin.brief : "", "version", f->library->version, "file", f->path));
+		else printf("%-32s %s\n", f->plugin.id, f->plugin.brief ? f->plugin.brief : "");
+	}
+	if (json) json_dumpf(list, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
+	json_decref(list);
+	quern_report_print(report, stderr);
+	const int status = quern_report_errors(report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
+	quern_loader_free_ids(ids);
+	quern_report_destroy(report);
+	quern_loader_destroy(loader);
+	return status;
+}
+
+/* ---- describe ---- */
+
+static json_t *param_json(const quern_param *row) {
+	json_t *one = json_pack(
+		"{s:s, s:s, s:s}", "name", row->name, "type", type_names[row->type], "doc", row->doc ? row->doc : "");
+	if (row->unit) json_object_set_new(one, "unit", json_string(row->unit));
+	json_object_set_new(one, "required", json_boolean(row->flags & QUERN_REQUIRED));
+	if (row->from) json_object_set_new(one, "from", json_string(row->from));
+	if (row->type == QUERN_T_REAL || row->type == QUERN_T_INT) {
+		if (!(row->flags & (QUERN_REQUIRED | QUERN_MAYBE)) && !row->from && !row->choices)
+			json_object_set_new(one, "default", json_real(row->def));
+		if (row->flags & QUERN_PLANAR) json_object_set_new(one, "default_2d", json_real(row->planar));
+		if (row->min != row->max) {
+			json_object_set_new(one, "min", json_real(row->min));
+			json_object_set_new(one, "max", json_real(row->max));
+		}
+	}
+	if (row->choices) {
+		json_t *choices = json_array();
+		for (const char *const *c = row->choices; *c; c++) json_array_append_new(choices, json_string(*c));
+		json_object_set_new(one, "choices", choices);
+	}
+	if (row->rows) {
+		json_t *rows = json_array();
+		for (const quern_param *r = row->rows; r->name; r++) json_array_append_new(rows, param_json(r));
+		json_object_set_new(one, "rows", rows);
+	}
+	return one;
+}
+
+static void print_param(const quern_param *row, int indent) {
+	char range[96], number[32];
+	quern_param_range(row, range);
+	printf("%*s%-*s %s", indent, "", 26 - indent, row->name,
+		row->unit && strcmp(row->unit, "1") != 0 ? row->unit : "");
+	if (row->choices) {
+		printf(" {");
+		for (const char *const *c = row->choices; *c; c++) printf("%s%s", c == row->choices ? "" : ", ", *c);
+		printf("}");
+	} else printf(" %s", type_names[row->type]);
+	if (*range) printf(", %s", range);
+	if (row->from) printf("; default: %s", row->from);
+	else if (row->flags & QUERN_REQUIRED) printf("; required");
+	else if (row->choices) printf("; default: %s", row->choices[(int)row->def]);
+	else if (row->type == QUERN_T_BOOL) printf("; default: %s", row->def != 0 ? "true" : "false");
+	else if (row->type == QUERN_T_REAL || row->type == QUERN_T_INT) {
+		if (row->flags & QUERN_MAYBE) printf("; may be left out");
+		else {
+			quern_number(row->def, number);
+			printf("; default: %s", number);
+			if (row->flags & QUERN_PLANAR) quern_number(row->planar, number), printf(" (2-D: %s)", number);
+		}
+	}
+	printf("\n%*s    %s\n", indent, "", row->doc ? row->doc : "");
+	for (const quern_param *r = row->rows; r && r->name; r++) print_param(r, indent + 4);
+}
+
+static const char *const access_names[] = { "", "reads", "writes", "updates", "adds to" };
+
+static void print_uses(const quern_use *row) {
+	for (; row && row->field; row++) {
+		printf("  %-8s %s", access_names[row->access], row->field);
+		if (row->when) printf(" if %s", row->when);
+		if (row->with) printf(" with %s", row->with);
+		if (row->flags & QUERN_OPTIONAL) printf(" (if it exists)");
+		puts("");
+	}
+}
+
+static void print_plugin(const quern_plugin_file *f) {
+	const quern_plugin *p = &f->plugin;
+	printf("%s %s - %s\n", p->id, f->library->version, p->brief ? p->brief : "");
+	if (p->doc) printf("\n%s\n", p->doc);
+	printf("\ndimensions %s%s%s\n", p->dims & QUERN_2D ? "2" : "",
+		p->dims == (QUERN_2D | QUERN_3D) ? " and " : "", p->dims & QUERN_3D ? "3" : "");
+	if (p->cite) printf("source     %s\n", p->cite);
+	printf("file       %s\nlicence    %s\n", f->path, f->library->license);
+	if (p->params->name) puts("\nparameters");
+	for (const quern_param *row = p->params; row->name; row++)
+		if (!(row->flags & QUERN_ADVANCED)) print_param(row, 2);
+	bool advanced = false;
+	for (const quern_param *row = p->params; row->name; row++)
+		if (row->flags & QUERN_ADVANCED) {
+			if (!advanced) puts("\nadvanced");
+			advanced = true;
+			print_param(row, 2);
+		}
+	if (p->uses->field) puts("\nfields");
+	print_uses(p->uses);
+	if (p->kind != QUERN_SOLVER) return;
+	const quern_solver_ops *ops = p->ops;
+	puts("\nslots");
+	for (const quern_slot *s = ops->slots; s && s->name; s++)
+		if (!s->same_as)
+			printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", quern_kind_name(s->kind),
+				s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "");
+	puts("\nstages");
+	for (const quern_stage *s = ops->stages; s && s->name; s++)
+		printf("  %-20s %s\n", s->name, s->doc ? s->doc : "");
+}
+
+static json_t *plugin_json(const quern_plugin_file *f) {
+	const quern_plugin *p = &f->plugin;
+	json_t *params = json_array(), *uses = json_array();
+	for (const quern_param *row = p->params; row->name; row++) json_array_append_new(params, param_json(row));
+	for (const quern_use *row = p->uses; row->field; row++)
+		json_array_append_new(uses, json_pack("{s:s, s:s, s:s}", "field", row->field, "access",
+										access_names[row->access], "unit", row->unit ? row->unit : "1"));
+	return json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:i, s:o, s:o}", "id", p->id, "brief",
+		p->brief ? p->brief : "", "doc", p->doc ? p->doc : "", "cite", p->cite ? p->cite : "", "version",
+		f->library->version, "license", f->library->license, "file", f->path, "dims", (int)p->dims, "params",
+		params, "uses", uses);
+}
+
+/* A bare name is enough where only one kind has it. */
+static const quern_plugin_file *find(quern_loader *loader, const char *name, quern_report *report) {
+	if (strchr(name, '/')) return quern_loader_open(loader, name, report, (quern_mark) { 0 });
+	if (strchr(name, '.')) return load(loader, name, report);
+	char **ids = quern_loader_ids(loader);
+	const quern_plugin_file *found = NULL;
+	size_t n = 0;
+	quern_text all = { 0 };
+	for (size_t i = 0; ids[i]; i++)
+		if (!strcmp(strchr(ids[i], '.') + 1, name)) quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
+	if (n == 1) found = load(loader, quern_text_string(&all), report);
+	else if (n)
+		quern_report_add(
+			report, (quern_mark) { 0 }, "'%s' is several plugins: %s", name, quern_text_string(&all));
+	else {
+		const char *near = quern_nearest(name, (const char *const *)ids);
+		quern_report_add(report, (quern_mark) { 0 }, "no plugin '%s'; see quern list%s%s", name,
+			near ? ", or did you mean " : "", near ? near : "");
+	}
+	quern_text_finish(&all);
+	quern_loader_free_ids(ids);
+	return found;
+}
+
+int quern_command_describe(int argc, char **argv) {
+	const char *name = NULL;
+	bool json = false;
+	for (int i = 1; i < argc; i++) {
+		if (!strcmp(argv[i], "--json")) json = true;
+		else if (argv[i][0] == '-' || name) return quern_usage("describe", "unknown argument '%s'", argv[i]);
+		else name = argv[i];
+	}
+	if (!name) return quern_usage("describe", "a plugin is missing");
+	quern_loader *loader = quern_loader_create();
+	quern_report *report = quern_report_create();
+	const quern_plugin_file *f = find(loader, name, report);
+	if (f && json) {
+		json_t *root = plugin_json(f);
+		json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
+		json_decref(root);
+	} else if (f) print_plugin(f);
+	quern_report_print(report, stderr);
+	quern_report_destroy(report);
+	quern_loader_destroy(loader);
+	return f ? QUERN_EXIT_DONE : QUERN_EXIT_SCENE;
+}

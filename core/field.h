@@ -1,0 +1,58 @@
+/* field - sets of entities and their columns: allocated, carried, reordered, and nothing else; what a column means is
+ * for the plugins to know */
+#pragma once
+#include "pool.h"
+#include <quern/abi.h>
+
+typedef struct quern_field {
+	char name[56]; /* "grain.velocity" */
+	const char *unit, *doc;
+	int set, target; /* indices of sets; target -1 unless INDEX into one */
+	uint8_t shape, n_components;
+	bool twice;    /* read from one copy, written to the other, then swapped */
+	bool state;    /* checkpointed */
+	bool local;    /* born and used up within one stage: a worker's scratch, no memory here */
+	bool shown;    /* in every frame */
+	uint32_t lane; /* of a row set */
+	double initial;
+	void *data[2][9];
+	uint8_t now; /* which copy is current */
+} quern_field;
+
+typedef struct quern_set_store {
+	char name[24];
+	uint32_t n, cap, rows, lanes;
+	uint32_t n_blocks, block_cap;
+	uint32_t *block;
+	double *row; /* of a row set: n rows of 8 */
+	int64_t next_id;
+	void *spare[2]; /* [0] 8-byte, [1] 4-byte: the other half of a reordering */
+	bool grid;      /* entries belong to grid blocks: cells and nodes */
+} quern_set_store;
+
+typedef struct quern_store {
+	quern_set_store *sets;
+	quern_field *fields;
+	size_t n_sets, n_fields, sets_capacity, fields_capacity;
+	quern_pool *pool;
+	uint64_t version; /* grows whenever a column may have moved */
+} quern_store;
+
+uint8_t quern_components(uint8_t shape, uint32_t dim);
+size_t quern_field_bytes(const quern_field *); /* of one component of one entry */
+
+void quern_store_init(quern_store *, quern_pool *);
+void quern_store_finish(quern_store *);
+int quern_store_set(const quern_store *, const char *name);   /* -1: none */
+int quern_store_field(const quern_store *, const char *name); /* -1: none */
+quern_column quern_field_column(const quern_store *, const quern_field *, uint8_t copy);
+
+/* A set of n entries at their initial values; ids are numbered on. Old contents are lost. */
+quern_status quern_store_fill(quern_store *, int set, uint32_t n);
+/* New entry i is old entry from[i], or fresh if from[i] < 0; block may be NULL. See quern_host.remap. */
+quern_status quern_store_remap(
+	quern_store *, int set, uint32_t n, const int32_t *from, uint32_t n_blocks, const uint32_t *block);
+/* Rows are transient: they are made to fit and hold zeros. */
+quern_status quern_store_rows(quern_store *, int set, uint32_t n);
+quern_status quern_store_partition(quern_store *, int set, uint32_t n_blocks, const uint32_t *block);
+size_t quern_store_bytes(const quern_store *);

@@ -1,0 +1,142 @@
+#include "frame.h"
+#include "config.h"
+#include "h5.h"
+#include "sidecar.h"
+#include "text.h"
+#include <stdlib.h>
+#include <string.h>
+
+/* Sets as people call them; others are written under their own name. */
+static const char *group_name(const char *set) {
+	static const char *const names[][2] = { { "grain", "grains" }, { "point", "points" }, { "cell", "cells" },
+		{ "contact", "contacts" }, { "touch", "touches" }, { "body", "bodies" } };
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (!strcmp(names[i][0], set)) return names[i][1];
+	return set;
+}
+
+/* Vectors have three columns and tensors six or nine in both dimensions, so that every tool reads them. Returns how
+ * many columns, and in `from` which component fills each; -1 is zero. */
+static int columns_of(uint8_t shape, uint32_t dim, int from[9]) {
+	static const int vector[2][3] = { { 0, 1, -1 }, { 0, 1, 2 } },
+					 axial[2][3] = { { -1, -1, 0 }, { 0, 1, 2 } };
+	static const int symmetric[2][6] = { { 0, 1, -1, 2, -1, -1 }, { 0, 1, 2, 3, 4, 5 } };
+	static const int tensor[2][9] = { { 0, 1, -1, 2, 3, -1, -1, -1, -1 }, { 0, 1, 2, 3, 4, 5, 6, 7, 8 } };
+	const uint32_t d = dim == 3;
+	switch (shape) {
+	case QUERN_VECTOR: memcpy(from, vector[d], sizeof vector[d]); return 3;
+	case QUERN_AXIAL: memcpy(from, axial[d], sizeof axial[d]); return 3;
+	case QUERN_SYMMETRIC: memcpy(from, symmetric[d], sizeof symmetric[d]); return 6;
+	case QUERN_TENSOR: memcpy(from, tensor[d], sizeof tensor[d]); return 9;
+	default: from[0] = 0; return 1;
+	}
+}
+
+static const char *maker(const quern_plan *p, int field) {
+	for (size_t i = 0; i < p->n_uses; i++)
+		if (p->uses[i].target == field && p->uses[i].row->access != QUERN_READ) return p->uses[i].owner;
+	return "quern";
+}
+
+static void describe(quern_h5 *h, hid_t set, const char *unit, const char *doc, const char *source) {
+	if (set < 0) return;
+	quern_h5_text(h, set, "unit", unit ? unit : "1");
+	quern_h5_text(h, set, "description", doc ? doc : "");
+	quern_h5_text(h, set, "source", source);
+	H5Dclose(set);
+}
+
+static void write_field(quern_h5 *h, hid_t group, const quern_run *run, int k, size_t n) {
+	const quern_field *field = &run->plan->store.fields[k];
+	const char *name = strchr(field->name, '.') + 1;
+	hid_t set;
+	if (field->shape == QUERN_INDEX)
+		set = quern_h5_write(h, group, name, H5T_NATIVE_INT32, n, 1, field->data[field->now][0]);
+	else if (field->shape == QUERN_ID)
+		set = quern_h5_write(h, group, name, H5T_NATIVE_INT64, n, 1, field->data[field->now][0]);
+	else {
+		int from[9];
+		const int columns = columns_of(field->shape, (uint32_t)run->scene->general.dimension, from);
+		double *table = quern_take(n * (size_t)columns, sizeof(double));
+		for (int c = 0; c < columns; c++) {
+			const double *column = from[c] < 0 ? NULL : field->data[field->now][from[c]];
+			for (size_t i = 0; i < n; i++) table[i * (size_t)columns + (size_t)c] = column ? column[i] : 0;
+		}
+		set = quern_h5_write(h, group, name, H5T_NATIVE_DOUBLE, n, (size_t)columns, table);
+		free(table);
+	}
+	describe(h, set, field->unit, field->doc, maker(run->plan, k));
+}
+
+static void write_centres(quern_h5 *h, hid_t group, const quern_run *run, size_t n) {
+	const quern_grid_view *v = &run->grid.view;
+	double *table = quern_take(n * 3, sizeof(double));
+	for (size_t i = 0; i < n; i++) {
+		const uint32_t place = (uint32_t)(i % 64);
+		const uint32_t at[3] = { place % v->edge, place / v->edge % v->edge,
+			v->dim == 3 ? place / (v->edge * v->edge) : 0 };
+		for (uint32_t k = 0; k < v->dim; k++)
+			table[3 * i + k] =
+				v->lower[k] + v->cell * (v->at[i / 64][k] * (int32_t)v->edge + (int32_t)at[k] + 0.5);
+	}
+	describe(h, quern_h5_write(h, group, "position", H5T_NATIVE_DOUBLE, n, 3, table), "m",
+		"Centre of the cell.", "quern");
+	free(table);
+}
+
+static bool is_shown(const quern_store *store, const quern_field *field) {
+	bool any = field->shown;
+	for (size_t i = 0; i < store->n_fields && !any && field->target >= 0;
+		 i++) /* a contact's grains go with its force */
+		any = store->fields[i].set == field->set && store->fields[i].shown;
+	return any && !field->local && !store->sets[field->set].rows;
+}
+
+static void write_set(quern_h5 *h, const quern_run *run, int s) {
+	const quern_store *store = &run->plan->store;
+	const quern_set_store *set = &store->sets[s];
+	bool any = false;
+	for (size_t k = 0; k < store->n_fields; k++)
+		any = any || (store->fields[k].set == s && is_shown(store, &store->fields[k]));
+	if (!any) return;
+	const hid_t group = quern_h5_group(h, h->file, group_name(set->name));
+	char position[40];
+	snprintf(position, sizeof position, "%s.position", set->name);
+	const int first = quern_store_field(store, position);
+	if (set->grid) write_centres(h, group, run, set->n);
+	if (first >= 0) write_field(h, group, run, first, set->n);
+	for (int k = 0; k < (int)store->n_fields; k++)
+		if (store->fields[k].set == s && k != first && is_shown(store, &store->fields[k]))
+			write_field(h, group, run, k, set->n);
+	if (group >= 0) H5Gclose(group);
+}
+
+static void provenance(quern_h5 *h, const quern_run *run, int64_t frame) {
+	char *resolved = quern_scene_resolved(run->scene);
+	quern_h5_text(h, h->file, "format", "quern-frame 1");
+	quern_h5_number(h, h->file, "time", quern_run_frame_time(run, frame));
+	quern_h5_integer(h, h->file, "step", run->clock.step);
+	quern_h5_integer(h, h->file, "dimension", run->scene->general.dimension);
+	quern_h5_text(h, h->file, "name", run->scene->general.name);
+	quern_h5_text(h, h->file, "program", "quern " QUERN_VERSION);
+	quern_h5_text(h, h->file, "compiler", QUERN_COMPILER);
+	quern_h5_text(h, h->file, "flags", QUERN_FLAGS);
+	quern_h5_integer(h, h->file, "seed", run->scene->general.seed);
+	quern_h5_integer(h, h->file, "scene_hash", (int64_t)quern_hash(resolved, strlen(resolved)));
+	free(resolved);
+}
+
+quern_status quern_frame_write(quern_run *run, int64_t frame) {
+	quern_h5 h;
+	char why[256];
+	if (!run->folder) return QUERN_OK;
+	char *path = quern_format("%s/frames/%06lld.h5", run->folder, (long long)frame);
+	bool good = quern_h5_create(&h, run->scene->general.compress, 0);
+	if (good) {
+		provenance(&h, run, frame);
+		for (int s = 0; s < (int)run->plan->store.n_sets; s++) write_set(&h, run, s);
+	}
+	good = quern_h5_save(&h, path, why) && quern_sidecars_add(run->sidecars, frame, why);
+	free(path);
+	return good ? QUERN_OK : quern_run_stop(run, QUERN_E_IO, "%s", why);
+}

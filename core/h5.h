@@ -1,0 +1,44 @@
+/* h5 - HDF5 files that are whole or absent: built in memory, written aside, flushed, renamed */
+#pragma once
+#include <hdf5.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct quern_h5 {
+	hid_t file;
+	bool compress, failed;
+	size_t user_block; /* bytes before the HDF5 data, 0 or 512 */
+} quern_h5;
+
+/* Nothing is printed by the library from here on; our own messages name file and cause. */
+void quern_h5_quiet(void);
+
+/* A file in memory. `user_block`: 0, or 512 bytes in front that hold a checksum of the rest. */
+bool quern_h5_create(quern_h5 *, bool compress, size_t user_block);
+/* Puts it on the disk under `path`, or leaves there what was there before; on a fault `why` says what went wrong.
+ * Ends the file in memory in any case. */
+bool quern_h5_save(quern_h5 *, const char *path, char why[256]);
+void quern_h5_discard(quern_h5 *);
+
+/* rows x columns numbers; columns 1 makes a list. The faults of all writes are collected in `failed`. */
+hid_t quern_h5_write(
+	quern_h5 *, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data);
+hid_t quern_h5_group(quern_h5 *, hid_t parent, const char *name);
+void quern_h5_text(quern_h5 *, hid_t object, const char *name, const char *text);
+void quern_h5_number(quern_h5 *, hid_t object, const char *name, double value);
+void quern_h5_integer(quern_h5 *, hid_t object, const char *name, int64_t value);
+
+/* Reading: each returns false if the thing is missing or of another type or size. */
+bool quern_h5_open(quern_h5 *, const char *path, char why[256]);
+void quern_h5_close(quern_h5 *);
+bool quern_h5_read_size(hid_t group, const char *name, size_t *rows, size_t *columns);
+bool quern_h5_read(hid_t group, const char *name, hid_t type, size_t rows, size_t columns, void *data);
+bool quern_h5_read_number(hid_t object, const char *name, double *value);
+bool quern_h5_read_integer(hid_t object, const char *name, int64_t *value);
+bool quern_h5_read_text(hid_t object, const char *name, char *text, size_t size);
+/* Opens a group, or returns a negative number. */
+hid_t quern_h5_find(hid_t parent, const char *name);
+
+/* The same for any bytes: written aside, flushed, renamed. */
+bool quern_save_bytes(const char *path, const void *data, size_t size, char why[256]);

@@ -1,0 +1,17 @@
+/* log - log.txt, warnings, and the progress line of the terminal */
+#pragma once
+#include <stdarg.h>
+#include <stdbool.h>
+
+typedef struct quern_log quern_log;
+
+/* `path` NULL: no file. `quiet`: warnings alone reach the terminal. `append`: go on with an old file. */
+quern_log *quern_log_create(const char *path, bool quiet, bool append);
+void quern_log_destroy(quern_log *);
+/* level 0: file alone, 1: terminal too, 2: a warning */
+void quern_log_add(quern_log *, int level, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+void quern_log_addv(quern_log *, int level, const char *fmt, va_list) __attribute__((format(printf, 3, 0)));
+/* Rewrites the line at the bottom of the terminal, at most twice a second; nothing where there is no terminal. */
+void quern_log_progress(quern_log *, bool now, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+bool quern_log_due(const quern_log *);
+double quern_wall(void); /* s, monotonic */

@@ -1,0 +1,396 @@
+#include "param.h"
+#include "text.h"
+#include <errno.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+const quern_param *quern_param_find(const quern_param *rows, const char *name) {
+	for (; rows && rows->name; rows++)
+		if (!strcmp(rows->name, name)) return rows;
+	return NULL;
+}
+
+static bool is_prefix(const char *prefix, const char *name) {
+	const size_t n = strlen(prefix);
+	return !strncmp(prefix, name, n) && name[n] == '.';
+}
+
+static const quern_entry *walk(const quern_node *map, const char *name) {
+	char part[64];
+	for (;;) {
+		const size_t n = strcspn(name, ".");
+		snprintf(part, sizeof part, "%.*s", (int)n, name);
+		const quern_entry *entry = quern_node_entry(map, part);
+		if (!entry || quern_node_is_null(entry->value)) return NULL;
+		if (!name[n]) return entry;
+		map = entry->value;
+		name += n + 1;
+	}
+}
+
+quern_mark quern_param_mark(const quern_node *map, const char *name, quern_mark fallback) {
+	const quern_entry *entry = name ? walk(map, name) : NULL;
+	return entry ? entry->value->mark : fallback;
+}
+
+double quern_param_default(const quern_param *row, uint32_t dim) {
+	return dim == 2 && row->flags & QUERN_PLANAR ? row->planar : row->def;
+}
+
+void quern_param_range(const quern_param *row, char out[96]) {
+	char low[32], high[32];
+	*out = 0;
+	if (row->min == row->max) return;
+	quern_number(row->min, low);
+	quern_number(row->max, high);
+	const bool below = row->flags & QUERN_MAX_OPEN, above = row->flags & QUERN_MIN_OPEN;
+	if (isinf(row->max)) snprintf(out, 96, above ? "above %s" : "at least %s", low);
+	else if (above) snprintf(out, 96, "above %s and %s %s", low, below ? "below" : "at most", high);
+	else if (below) snprintf(out, 96, "at least %s and below %s", low, high);
+	else snprintf(out, 96, "between %s and %s", low, high);
+}
+
+static bool in_range(const quern_param *row, double x) {
+	if (row->min == row->max) return true;
+	if (row->flags & QUERN_MIN_OPEN ? x <= row->min : x < row->min) return false;
+	return row->flags & QUERN_MAX_OPEN ? x < row->max : x <= row->max;
+}
+
+double quern_param_number(const quern_param *row, const void *instance) {
+	const char *at = (const char *)instance + row->offset;
+	switch (row->type) {
+	case QUERN_T_REAL: return *(const quern_real *)(const void *)at;
+	case QUERN_T_INT: return *(const int32_t *)(const void *)at;
+	case QUERN_T_BOOL: return *(const bool *)(const void *)at;
+	case QUERN_T_LIST: return ((const quern_list *)(const void *)at)->n;
+	default: return NAN;
+	}
+}
+
+/* ---- reading ---- */
+
+static void unknown_key(const quern_reading *r, const char *owner, const quern_param *rows,
+	const char *prefix, const quern_entry *e, const char *const *also) {
+	const char **known = NULL;
+	size_t n = 0, capacity = 0;
+	const size_t skip = *prefix ? strlen(prefix) + 1 : 0;
+	char **parts = NULL;
+	size_t n_parts = 0, parts_capacity = 0;
+	for (const quern_param *row = rows; row && row->name; row++)
+		if (!*prefix || is_prefix(prefix, row->name)) {
+			char *part = quern_copy(row->name + skip);
+			part[strcspn(part, ".")] = 0;
+			parts = quern_grow(parts, n_parts, &parts_capacity, sizeof(char *));
+			parts[n_parts++] = part;
+			known = quern_grow(known, n + 1, &capacity, sizeof(char *));
+			known[n++] = part;
+		}
+	for (const char *const *a = also; a && *a; a++) {
+		if (*prefix ? !is_prefix(prefix, *a) : strchr(*a, '.') != NULL) continue;
+		known = quern_grow(known, n + 1, &capacity, sizeof(char *));
+		known[n++] = *a + skip;
+	}
+	quern_text list = { 0 };
+	for (size_t i = 0; i < n; i++) {
+		bool twice = false;
+		for (size_t k = 0; k < i && !twice; k++) twice = !strcmp(known[k], known[i]);
+		if (!twice) quern_text_add(&list, "%s%s", list.length ? ", " : "", known[i]);
+	}
+	known = quern_grow(known, n, &capacity, sizeof(char *));
+	known[n] = NULL;
+	const char *near = quern_nearest(e->key, known);
+	if (near)
+		quern_report_add(r->report, e->mark, "%s: unknown key '%s'; did you mean '%s'?", owner, e->key, near);
+	else if (n)
+		quern_report_add(r->report, e->mark, "%s: unknown key '%s'; it takes: %s", owner, e->key,
+			quern_text_string(&list));
+	else quern_report_add(r->report, e->mark, "%s: unknown key '%s'; it takes no keys", owner, e->key);
+	quern_text_finish(&list);
+	for (size_t i = 0; i < n_parts; i++) free(parts[i]);
+	free(parts);
+	free(known);
+}
+
+static bool in_list(const char *const *list, const char *name) {
+	for (; list && *list; list++)
+		if (!strcmp(*list, name)) return true;
+	return false;
+}
+
+/* Refuses keys that no row knows; descends into maps that dotted rows open. */
+static void check_keys(const quern_reading *r, const char *owner, const quern_param *rows,
+	const quern_node *map, const char *prefix, const char *const *also) {
+	for (size_t i = 0; i < map->n; i++) {
+		const quern_entry *e = &map->entries[i];
+		char *full = *prefix ? quern_format("%s.%s", prefix, e->key) : quern_copy(e->key);
+		bool opens = false;
+		for (const quern_param *row = rows; row && row->name; row++)
+			opens = opens || is_prefix(full, row->name);
+		if (!in_list(also, full)) {
+			const bool row = quern_param_find(rows, full) != NULL;
+			char say[64];
+			if (opens && (e->value->kind == QUERN_NODE_MAP || !row)) {
+				if (e->value->kind == QUERN_NODE_MAP) check_keys(r, owner, rows, e->value, full, also);
+				else if (!quern_node_is_null(e->value))
+					quern_report_add(r->report, e->value->mark, "%s: '%s' must be a map, not %s", owner, full,
+						quern_node_say(e->value, say));
+			} else if (!row) unknown_key(r, owner, rows, prefix, e, also);
+		}
+		free(full);
+	}
+}
+
+void quern_params_check(const quern_reading *r, const char *owner, const quern_param *rows,
+	const quern_node *map, const char *const *also) {
+	check_keys(r, owner, rows, map, "", also);
+}
+
+static bool read_number(const quern_reading *r, const char *owner, const quern_param *row,
+	const quern_node *node, double *value) {
+	char why[160], range[96], say[64];
+	if (node->kind != QUERN_NODE_SCALAR) {
+		quern_report_add(r->report, node->mark, "%s: %s must be one number, not %s", owner, row->name,
+			quern_node_say(node, say));
+		return false;
+	}
+	if (!quern_quantity_read(r->units, node->text, row->unit ? row->unit : "1", value, why)) {
+		quern_report_add(r->report, node->mark, "%s: %s: %s", owner, row->name, why);
+		return false;
+	}
+	if (in_range(row, *value)) return true;
+	quern_param_range(row, range);
+	const bool scaled = row->unit && strcmp(row->unit, "1") != 0;
+	quern_report_add(r->report, node->mark, "%s: %s is %s, must be %s%s%s", owner, row->name, node->text,
+		range, scaled ? " " : "", scaled ? row->unit : "");
+	return false;
+}
+
+static void read_int(const quern_reading *r, const char *owner, const quern_param *row,
+	const quern_node *node, int32_t *member) {
+	double value;
+	if (row->choices) {
+		int32_t k = 0;
+		char say[64];
+		if (node->kind == QUERN_NODE_SCALAR)
+			for (const char *const *c = row->choices; *c; c++, k++)
+				if (!strcmp(*c, node->text)) {
+					*member = k;
+					return;
+				}
+		quern_text list = { 0 };
+		for (const char *const *c = row->choices; *c; c++)
+			quern_text_add(&list, "%s%s", list.length ? ", " : "", *c);
+		const char *near = node->kind == QUERN_NODE_SCALAR ? quern_nearest(node->text, row->choices) : NULL;
+		quern_report_add(r->report, node->mark, "%s: %s is %s, must be one of: %s%s%s%s", owner, row->name,
+			quern_node_say(node, say), quern_text_string(&list), near ? "; did you mean '" : "",
+			near ? near : "", near ? "'?" : "");
+		quern_text_finish(&list);
+		return;
+	}
+	if (!read_number(r, owner, row, node, &value)) return;
+	if (value != trunc(value) || fabs(value) > INT32_MAX)
+		quern_report_add(
+			r->report, node->mark, "%s: %s is %s, must be a whole number", owner, row->name, node->text);
+	else *member = (int32_t)value;
+}
+
+static void read_bool(
+	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node, bool *member) {
+	char say[64];
+	const char *t = node->kind == QUERN_NODE_SCALAR && !node->quoted ? node->text : "";
+	if (!strcmp(t, "true") || !strcmp(t, "yes") || !strcmp(t, "on")) *member = true;
+	else if (!strcmp(t, "false") || !strcmp(t, "no") || !strcmp(t, "off")) *member = false;
+	else
+		quern_report_add(r->report, node->mark, "%s: %s is %s, must be true or false", owner, row->name,
+			quern_node_say(node, say));
+}
+
+static void read_vector(const quern_reading *r, const char *owner, const quern_param *row,
+	const quern_node *node, quern_real *member) {
+	char say[64];
+	if (node->kind != QUERN_NODE_LIST || node->n != r->dim) {
+		quern_report_add(r->report, node->mark,
+			"%s: %s must be a list of %u numbers, one per dimension, not %s%s", owner, row->name, r->dim,
+			quern_node_say(node, say),
+			node->kind == QUERN_NODE_LIST ? (node->n > r->dim ? " of more" : " of fewer") : "");
+		return;
+	}
+	for (uint32_t k = 0; k < r->dim; k++) read_number(r, owner, row, node->entries[k].value, &member[k]);
+	for (uint32_t k = r->dim; k < 3; k++) member[k] = 0;
+}
+
+/* A file is named from the scene's folder, so that a scene works from wherever it is run. */
+static const char *read_text(
+	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node) {
+	if (!(row->flags & QUERN_FILE) || !r->tree) return node->text;
+	const char *scene = node->mark.file, *slash = scene ? strrchr(scene, '/') : NULL;
+	const bool relative = node->text[0] != '/' && slash && node->mark.line;
+	char *path =
+		relative ? quern_format("%.*s/%s", (int)(slash - scene), scene, node->text) : quern_copy(node->text);
+	if (access(path, R_OK))
+		quern_report_add(
+			r->report, node->mark, "%s: %s: cannot read '%s': %s", owner, row->name, path, strerror(errno));
+	const char *kept = quern_tree_keep(r->tree, path);
+	free(path);
+	return kept;
+}
+
+static void read_list(const quern_reading *r, const char *owner, const quern_param *row,
+	const quern_node *node, const char *const *also, quern_list *list) {
+	const bool many = node && node->kind == QUERN_NODE_LIST;
+	const char *inner[17] = { NULL };
+	size_t k = 0;
+	for (const char *const *a = also; a && *a && k < 16; a++)
+		if (is_prefix(row->name, *a)) inner[k++] = *a + strlen(row->name) + 1;
+	char *name = quern_format("%s.%s", owner, row->name);
+	list->n = !node ? 0 : many ? (uint32_t)node->n : 1;
+	list->item_size = row->item_size;
+	list->items = quern_take(list->n, row->item_size);
+	for (uint32_t i = 0; i < list->n; i++) {
+		const quern_node *item = many ? node->entries[i].value : node;
+		quern_params_read(
+			r, name, row->rows, item, item->mark, inner, (char *)list->items + (size_t)i * row->item_size);
+	}
+	free(name);
+}
+
+static void set_default(const quern_reading *r, const quern_param *row, void *member) {
+	const double def = quern_param_default(row, r->dim);
+	const bool maybe = row->flags & QUERN_MAYBE;
+	switch (row->type) {
+	case QUERN_T_REAL: *(quern_real *)member = maybe ? NAN : def; break;
+	case QUERN_T_INT: *(int32_t *)member = maybe ? INT32_MIN : (int32_t)def; break;
+	case QUERN_T_BOOL: *(bool *)member = def != 0; break;
+	case QUERN_T_TEXT: *(const char **)member = row->text; break;
+	case QUERN_T_VECTOR:
+		for (uint32_t k = 0; k < 3; k++) ((quern_real *)member)[k] = maybe ? NAN : k < r->dim ? def : 0;
+		break;
+	default: break;
+	}
+}
+
+/* The value of a row that the scene leaves out. */
+static void left_out(
+	const quern_reading *r, const char *owner, const quern_param *row, quern_mark mark, void *member) {
+	set_default(r, row, member);
+	if (row->from && row->type == QUERN_T_REAL) {
+		for (size_t i = 0; i < r->n_published; i++)
+			if (!strcmp(r->published[i].name, row->from)) {
+				*(quern_real *)member = r->published[i].value;
+				return;
+			}
+		if (row->flags & QUERN_REQUIRED)
+			quern_report_add(r->report, mark,
+				"%s: '%s' is missing (%s, in %s), and nothing in the scene gives %s", owner, row->name,
+				row->doc, row->unit, row->from);
+	} else if (row->flags & QUERN_REQUIRED)
+		quern_report_add(r->report, mark, "%s: '%s' is missing: %s%s%s%s", owner, row->name, row->doc,
+			row->unit ? " [" : "", row->unit ? row->unit : "", row->unit ? "]" : "");
+}
+
+void quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,
+	const quern_node *map, quern_mark mark, const char *const *also, void *instance) {
+	char say[64];
+	if (map && !quern_node_is_null(map)) {
+		if (map->kind == QUERN_NODE_MAP) check_keys(r, owner, rows, map, "", also);
+		else {
+			quern_report_add(r->report, map->mark, "%s takes a map of parameters, not %s", owner,
+				quern_node_say(map, say));
+			map = NULL;
+		}
+	}
+	for (const quern_param *row = rows; row && row->name; row++) {
+		void *member = (char *)instance + row->offset;
+		const quern_entry *entry = walk(map, row->name);
+		const quern_node *node = entry ? entry->value : NULL;
+		bool opens = false; /* "boundary" beside "boundary.frictional": a map is for the others */
+		for (const quern_param *other = rows; other->name; other++)
+			opens = opens || is_prefix(row->name, other->name);
+		if (node && opens && node->kind == QUERN_NODE_MAP) node = NULL;
+		if (row->type == QUERN_T_LIST) {
+			if (!node && row->flags & QUERN_REQUIRED) left_out(r, owner, row, mark, member);
+			read_list(r, owner, row, node, also, member);
+			continue;
+		}
+		if (!node) {
+			left_out(r, owner, row, mark, member);
+			continue;
+		}
+		set_default(r, row, member); /* so that a faulty value leaves something sane behind */
+		switch (row->type) {
+		case QUERN_T_REAL: read_number(r, owner, row, node, member); break;
+		case QUERN_T_INT: read_int(r, owner, row, node, member); break;
+		case QUERN_T_BOOL: read_bool(r, owner, row, node, member); break;
+		case QUERN_T_VECTOR: read_vector(r, owner, row, node, member); break;
+		case QUERN_T_TEXT:
+			if (node->kind == QUERN_NODE_SCALAR) *(const char **)member = read_text(r, owner, row, node);
+			else
+				quern_report_add(r->report, node->mark, "%s: %s must be a text, not %s", owner, row->name,
+					quern_node_say(node, say));
+			break;
+		default: break;
+		}
+	}
+}
+
+void quern_params_finish(const quern_param *rows, void *instance) {
+	for (; rows && rows->name; rows++)
+		if (rows->type == QUERN_T_LIST) {
+			quern_list *list = (quern_list *)(void *)((char *)instance + rows->offset);
+			for (uint32_t i = 0; i < list->n; i++)
+				quern_params_finish(rows->rows, (char *)list->items + (size_t)i * list->item_size);
+			free(list->items);
+			*list = (quern_list) { 0 };
+		}
+}
+
+/* ---- writing ---- */
+
+void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim, quern_node *map) {
+	for (; rows && rows->name; rows++) {
+		const void *member = (const char *)instance + rows->offset;
+		char number[32];
+		switch (rows->type) {
+		case QUERN_T_REAL:
+			if (isnan(*(const quern_real *)member)) break;
+			quern_number(*(const quern_real *)member, number);
+			quern_node_put(map, rows->name, number);
+			break;
+		case QUERN_T_INT: {
+			const int32_t value = *(const int32_t *)member;
+			if (value == INT32_MIN) break;
+			snprintf(number, sizeof number, "%d", value);
+			quern_node_put(map, rows->name, rows->choices ? rows->choices[value] : number);
+			break;
+		}
+		case QUERN_T_BOOL: quern_node_put(map, rows->name, *(const bool *)member ? "true" : "false"); break;
+		case QUERN_T_TEXT:
+			if (*(const char *const *)member)
+				quern_node_put_quoted(map, rows->name, *(const char *const *)member);
+			break;
+		case QUERN_T_VECTOR: {
+			const quern_real *v = member;
+			if (isnan(v[0])) break;
+			quern_node *list = quern_node_put_list(map, rows->name);
+			for (uint32_t k = 0; k < dim; k++) {
+				quern_number(v[k], number);
+				quern_node_append(list, number);
+			}
+			break;
+		}
+		case QUERN_T_LIST: {
+			const quern_list *values = member;
+			quern_node *list = quern_node_put_list(map, rows->name);
+			for (uint32_t i = 0; i < values->n; i++)
+				quern_params_write(rows->rows, (const char *)values->items + (size_t)i * values->item_size,
+					dim, quern_node_append_map(list));
+			break;
+		}
+		default: break;
+		}
+	}
+}

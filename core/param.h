@@ -1,0 +1,44 @@
+/* param - from the rows of a plugin's table to its instance and back */
+#pragma once
+#include "quantity.h"
+#include "report.h"
+#include "tree.h"
+#include <quern/abi.h>
+
+/* A published number that rows with `from` take as their default. */
+typedef struct quern_published {
+	const char *name, *unit;
+	double value;
+} quern_published;
+
+typedef struct quern_reading {
+	quern_report *report;
+	quern_units *units;
+	uint32_t dim;
+	const quern_published *published;
+	size_t n_published;
+	quern_tree *tree; /* keeps the paths of files; NULL: files are taken as they are written */
+} quern_reading;
+
+/* Fills `instance` from `map` (NULL or null: defaults alone). `owner` names the plugin in messages, `mark` is
+ * where it stands. Keys that `rows` do not know are faults unless they are in `also` (full dotted names,
+ * NULL-terminated, may be NULL). Lists are allocated; quern_params_finish frees them. */
+void quern_params_read(const quern_reading *, const char *owner, const quern_param *rows,
+	const quern_node *map, quern_mark mark, const char *const *also, void *instance);
+/* The check for unknown keys alone. */
+void quern_params_check(const quern_reading *, const char *owner, const quern_param *rows,
+	const quern_node *map, const char *const *also);
+void quern_params_finish(const quern_param *rows, void *instance);
+
+/* Writes every value of the instance into a map, in SI. */
+void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim, quern_node *map);
+
+const quern_param *quern_param_find(const quern_param *rows, const char *name);
+/* the value of a number, bool or choice; NaN for other types */
+double quern_param_number(const quern_param *, const void *instance);
+double quern_param_default(const quern_param *, uint32_t dim);
+/* "between 0 and 1", "above 0", "" */
+void quern_param_range(const quern_param *, char out[96]);
+
+/* Where the value of a dotted name stands below `map`, or `fallback`. */
+quern_mark quern_param_mark(const quern_node *map, const char *name, quern_mark fallback);

@@ -1,0 +1,532 @@
+#include "plan.h"
+#include "text.h"
+#include <stdlib.h>
+#include <string.h>
+
+const char *const quern_phase_names[] = { "setup", "convert", "grains", "to grid", "couple", "from grid",
+	"observe" };
+
+static bool mandatory(const quern_plan_use *u) {
+	return u->counts && !(u->row->flags & (QUERN_OPTIONAL | QUERN_WANTED));
+}
+static bool changes(const quern_use *row) { return row->access != QUERN_READ; }
+
+/* Inside a phase: readers of the old value, writers, adders, updaters, readers. */
+static int rank(const quern_use *row) {
+	switch (row->access) {
+	case QUERN_WRITE: return 1;
+	case QUERN_ADD: return 2;
+	case QUERN_UPDATE: return 3;
+	default: return row->flags & QUERN_BEFORE ? 0 : 4;
+	}
+}
+
+/* ---- sets ---- */
+
+static bool slot_filled(const quern_section *section, const char *slot) {
+	for (size_t k = 0; k < section->n_slots; k++)
+		if (!strcmp(section->slots[k].slot->name, slot)) return section->slots[k].n > 0;
+	return false;
+}
+
+static void add_set(quern_plan *p, const char *name, uint32_t rows, bool grid) {
+	quern_store *store = &p->store;
+	store->sets = quern_grow(store->sets, store->n_sets, &store->sets_capacity, sizeof(quern_set_store));
+	quern_set_store *set = &store->sets[store->n_sets++];
+	*set = (quern_set_store) { .rows = rows, .grid = grid };
+	snprintf(set->name, sizeof set->name, "%s", name);
+}
+
+static void gather_sets(quern_plan *p) {
+	add_set(p, "total", 0, false);
+	add_set(p, "cell", 0, true);
+	for (size_t i = 0; i < p->scene->n_sections; i++) {
+		const quern_section *section = &p->scene->sections[i];
+		for (const quern_set *set = section->ops->sets; set && set->name; set++)
+			if (!set->slot || slot_filled(section, set->slot))
+				add_set(p, set->name, set->rows, set->rows != 0);
+	}
+}
+
+/* Declared here, but by a solver whose slot for it is empty: whoever names it does without. */
+static bool set_left_out(const quern_plan *p, const char *field) {
+	const size_t n = strcspn(field, ".");
+	for (size_t i = 0; i < p->scene->n_sections; i++)
+		for (const quern_set *set = p->scene->sections[i].ops->sets; set && set->name; set++)
+			if (!strncmp(set->name, field, n) && !set->name[n]) return true;
+	return false;
+}
+
+static int set_of(const quern_plan *p, const char *field) {
+	char name[24];
+	const size_t n = strcspn(field, ".");
+	if (n >= sizeof name) return -1;
+	memcpy(name, field, n);
+	name[n] = 0;
+	return quern_store_set(&p->store, name);
+}
+
+/* ---- uses ---- */
+
+static bool holds(const quern_instance *it, const char *when) {
+	const quern_param *row = when ? quern_param_find(it->file->params, when) : NULL;
+	return !when || (row && quern_param_number(row, it->self) != 0);
+}
+
+/* Where some entries override parameters, a repeated row counts if it does for any of them. */
+static bool holds_anywhere(const quern_filling *f, const char *when) {
+	bool any = !f->n_variant && holds(f->instance, when);
+	for (size_t v = 0; v < f->n_variant; v++)
+		any = any || holds(f->variant[v] ? f->variant[v] : f->instance, when);
+	return any;
+}
+
+static quern_plan_use *add_use(
+	quern_plan *p, const quern_use *row, int stage, const char *owner, quern_mark mark) {
+	p->uses = quern_grow(p->uses, p->n_uses, &p->uses_capacity, sizeof(quern_plan_use));
+	quern_plan_use *u = &p->uses[p->n_uses++];
+	*u = (quern_plan_use) { .row = row, .owner = owner, .mark = mark, .stage = stage, .target = -1 };
+	snprintf(u->field, sizeof u->field, "%s", row->field);
+	return u;
+}
+
+static int stage_named(const quern_plan *p, const char *name) {
+	for (size_t i = 0; name && i < p->n_stages; i++)
+		if (!strcmp(p->stages[i].name, name)) return (int)i;
+	return -1;
+}
+
+static void add_stage(quern_plan *p, quern_plan_stage stage) {
+	p->stages = quern_grow(p->stages, p->n_stages, &p->stages_capacity, sizeof(quern_plan_stage));
+	stage.sequence = (int)p->n_stages;
+	stage.order = -1;
+	stage.first_use = p->n_uses;
+	p->stages[p->n_stages++] = stage;
+}
+
+static void gather_stages(quern_plan *p) {
+	for (size_t i = 0; i < p->scene->n_sections; i++) {
+		const quern_section *section = &p->scene->sections[i];
+		for (const quern_stage *s = section->ops->stages; s && s->name; s++) {
+			add_stage(p, (quern_plan_stage) { .name = s->name,
+							 .doc = s->doc,
+							 .stage = s,
+							 .section = section,
+							 .phase = (quern_phase)s->phase,
+							 .solver = (int)i,
+							 .sometimes = s->sometimes != 0 });
+			quern_plan_stage *stage = &p->stages[p->n_stages - 1];
+			for (const quern_use *row = s->uses; row && row->field; row++, stage->n_uses++)
+				add_use(p, row, (int)p->n_stages - 1, s->name, section->mark)->counts =
+					holds(section->solver, row->when);
+		}
+	}
+}
+
+static quern_plan_bound *add_bound(quern_plan *p, quern_bound *place, const quern_slot *slot,
+	const quern_filling *f, const char *path, int stage) {
+	quern_plan_bound *b = quern_take(1, sizeof *b);
+	const quern_instance *it = f->instance;
+	b->bound = place;
+	*place = (quern_bound) { .self = it->self,
+		.ops = it->file->plugin.ops,
+		.item = f->item,
+		.uses = it->file->uses,
+		.n_uses = (uint32_t)it->file->n_uses,
+		.n_variant = (uint32_t)f->n_variant,
+		.id = it->file->plugin.id,
+		.path = path };
+	b->variant = quern_take(f->n_variant, sizeof(void *));
+	for (size_t v = 0; v < f->n_variant; v++) b->variant[v] = f->variant[v] ? f->variant[v]->self : it->self;
+	b->bound->variant = f->n_variant ? b->variant : NULL;
+	b->column = quern_take(it->file->n_uses, sizeof(quern_column));
+	b->bound->column = b->column;
+	b->first_use = p->n_uses;
+	b->first_again = SIZE_MAX;
+	for (size_t k = 0; k < it->file->n_uses; k++) {
+		const quern_use *row = &it->file->uses[k];
+		const char *called = slot && row->hook < 3 ? slot->stage[row->hook] : NULL;
+		quern_plan_use *u =
+			add_use(p, row, slot ? stage_named(p, called) : stage, it->file->plugin.id, it->mark);
+		u->counts = u->stage >= 0 && holds(it, row->when);
+		if (slot && slot->particle && !strncmp(row->field, "particle.", 9))
+			snprintf(u->field, sizeof u->field, "%s.%.32s", slot->particle, row->field + 9);
+	}
+	if (slot && slot->repeat) {
+		b->again = quern_take(it->file->n_uses, sizeof(quern_column));
+		b->bound->again = b->again;
+		b->first_again = p->n_uses;
+		for (size_t k = 0; k < it->file->n_uses; k++) {
+			const quern_use *row = &it->file->uses[k];
+			const char *called = row->hook < 3 ? slot->stage[row->hook] : NULL;
+			quern_plan_use *u = add_use(p, row, stage_named(p, called), it->file->plugin.id, it->mark);
+			u->counts = u->stage >= 0 && holds_anywhere(f, row->when);
+			if (!strncmp(row->field, "contact.", 8))
+				snprintf(u->field, sizeof u->field, "%s.%.32s", slot->repeat, row->field + 8);
+		}
+	}
+	p->bounds = quern_grow(p->bounds, p->n_bounds, &p->bounds_capacity, sizeof(b));
+	return p->bounds[p->n_bounds++] = b;
+}
+
+static void gather_slots(quern_plan *p) {
+	for (size_t i = 0; i < p->scene->n_sections; i++) {
+		const quern_section *section = &p->scene->sections[i];
+		p->slots[i] = quern_take(section->n_slots, sizeof(*p->slots[i]));
+		p->n_slot[i] = quern_take(section->n_slots, sizeof(uint32_t));
+		for (size_t k = 0; k < section->n_slots; k++) {
+			const quern_slot_use *use = &section->slots[k];
+			p->slots[i][k] = quern_take(use->n, sizeof(quern_bound));
+			p->n_slot[i][k] = (uint32_t)use->n;
+			for (size_t e = 0; e < use->n; e++)
+				add_bound(p, &p->slots[i][k][e], use->slot, &use->filling[e], use->path, -1);
+		}
+	}
+	const quern_slot_use *observe = &p->scene->observe;
+	p->observers = quern_take(observe->n, sizeof(*p->observers));
+	for (size_t e = 0; e < observe->n; e++) {
+		add_stage(p, (quern_plan_stage) { .name = observe->filling[e].instance->file->plugin.id,
+						 .observer = &observe->filling[e],
+						 .phase = QUERN_OBSERVE,
+						 .solver = 100 + (int)e });
+		p->observers[e] = add_bound(p, quern_take(1, sizeof(quern_bound)), NULL, &observe->filling[e],
+			"observe", (int)p->n_stages - 1);
+	}
+}
+
+/* ---- fields ---- */
+
+static quern_field *add_field(quern_plan *p, const quern_plan_use *u) {
+	quern_store *store = &p->store;
+	store->fields = quern_grow(store->fields, store->n_fields, &store->fields_capacity, sizeof(quern_field));
+	quern_field *field = &store->fields[store->n_fields++];
+	*field = (quern_field) { .unit = u->row->unit,
+		.doc = u->row->doc,
+		.set = set_of(p, u->field),
+		.target = -1,
+		.shape = u->row->shape,
+		.n_components = quern_components(u->row->shape, (uint32_t)p->scene->general.dimension),
+		.initial = u->row->initial };
+	snprintf(field->name, sizeof field->name, "%s", u->field);
+	return field;
+}
+
+static void make_fields(quern_plan *p) {
+	const quern_scene *s = p->scene;
+	for (size_t i = 0; i < p->n_uses; i++) {
+		quern_plan_use *u = &p->uses[i];
+		const bool here = set_of(p, u->field) >= 0;
+		if (!here && mandatory(u) && !set_left_out(p, u->field))
+			quern_report_add(s->report, u->mark,
+				"%s needs %s, and nothing in the scene has a set of that name", u->owner, u->field);
+		u->counts = u->counts && here;
+		if (mandatory(u) && !u->row->with && quern_store_field(&p->store, u->field) < 0) add_field(p, u);
+	}
+	for (size_t i = 0; i < p->n_uses; i++) /* a row that goes with another field counts only now */
+		if (p->uses[i].row->with) {
+			quern_plan_use *u = &p->uses[i];
+			u->counts = u->counts && quern_store_field(&p->store, u->row->with) >= 0;
+			if (mandatory(u) && quern_store_field(&p->store, u->field) < 0) add_field(p, u);
+		}
+	for (size_t i = 0; i < p->n_uses; i++) { /* or somebody would like it and somebody else can make it */
+		const quern_plan_use *u = &p->uses[i];
+		if (!u->counts || !(u->row->flags & QUERN_WANTED) || quern_store_field(&p->store, u->field) >= 0)
+			continue;
+		for (size_t k = 0; k < p->n_uses; k++) {
+			const quern_plan_use *maker = &p->uses[k];
+			if (k == i || !maker->counts || !changes(maker->row) || strcmp(maker->field, u->field) != 0)
+				continue;
+			add_field(p, u);
+			break;
+		}
+	}
+	for (size_t k = 0; k < s->n_fields; k++) { /* or the scene writes it out */
+		bool made = quern_store_field(&p->store, s->fields[k]) >= 0;
+		const char **known = quern_take(p->n_uses + 1, sizeof(char *));
+		for (size_t i = 0; i < p->n_uses; i++) {
+			const quern_plan_use *u = &p->uses[i];
+			known[i] = u->field;
+			if (!made && u->counts && changes(u->row) && !strcmp(u->field, s->fields[k]))
+				made = add_field(p, u);
+		}
+		if (!made) {
+			const char *near = quern_nearest(s->fields[k], known);
+			quern_report_add(s->report, s->field_marks[k],
+				"scene: output.fields: nothing in this scene makes '%s'%s%s%s", s->fields[k],
+				near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+		}
+		free(known);
+	}
+}
+
+/* Every use finds its field; doc, target and initial value come from whoever states them. */
+static void bind_uses(quern_plan *p) {
+	const quern_scene *s = p->scene;
+	for (size_t i = 0; i < p->n_uses; i++) {
+		quern_plan_use *u = &p->uses[i];
+		const int k = quern_store_field(&p->store, u->field);
+		if (!u->counts || k < 0) continue;
+		quern_field *field = &p->store.fields[k];
+		u->target = k;
+		if (!quern_units_equal(s->units, field->unit ? field->unit : "1", u->row->unit ? u->row->unit : "1"))
+			quern_report_add(s->report, u->mark, "%s: %s takes it in %s, others in %s", u->field, u->owner,
+				u->row->unit, field->unit);
+		if (field->shape != u->row->shape)
+			quern_report_add(
+				s->report, u->mark, "%s: %s takes it in another shape than others do", u->field, u->owner);
+		if (!field->doc) field->doc = u->row->doc;
+		if (!(u->row->initial == 0)) field->initial = u->row->initial;
+		field->shown = field->shown || u->row->flags & QUERN_SHOWN;
+		if (!u->row->target) continue;
+		field->target = quern_store_set(&p->store, u->row->target);
+		if (field->target < 0)
+			quern_report_add(s->report, u->mark, "%s points into a set '%s' that does not exist", u->field,
+				u->row->target);
+	}
+	for (size_t k = 0; k < s->n_fields; k++) {
+		const int i = quern_store_field(&p->store, s->fields[k]);
+		if (i >= 0) p->store.fields[i].shown = true;
+	}
+}
+
+/* Lanes of a row in the order in which fields were first named. */
+static void lay_rows(quern_plan *p) {
+	for (size_t i = 0; i < p->store.n_fields; i++) {
+		quern_field *field = &p->store.fields[i];
+		quern_set_store *set = &p->store.sets[field->set];
+		if (!set->rows) continue;
+		field->lane = set->lanes;
+		set->lanes += field->n_components;
+		if (set->lanes > 8)
+			quern_report_add(
+				p->scene->report, (quern_mark) { 0 }, "%s: a node row holds at most 8 numbers", set->name);
+	}
+}
+
+/* ---- order ---- */
+
+static bool before(const quern_plan *p, int a, int b) {
+	const quern_plan_stage *sa = &p->stages[a], *sb = &p->stages[b];
+	if (sa->solver == sb->solver) return sa->sequence < sb->sequence;
+	for (size_t i = 0; i < p->n_uses; i++) {
+		const quern_plan_use *u = &p->uses[i];
+		if (u->stage != a || u->target < 0) continue;
+		for (size_t k = 0; k < p->n_uses; k++) {
+			const quern_plan_use *v = &p->uses[k];
+			if (v->stage == b && v->target == u->target && rank(u->row) < rank(v->row)) return true;
+		}
+	}
+	return false;
+}
+
+static void order_stages(quern_plan *p) {
+	p->order = quern_take(p->n_stages, sizeof(int));
+	int n = 0;
+	for (int phase = 0; phase < QUERN_PHASES; phase++)
+		for (;;) {
+			int next = -1, left[2] = { -1, -1 };
+			for (int a = 0; a < (int)p->n_stages; a++) {
+				if ((int)p->stages[a].phase != phase || p->stages[a].order >= 0) continue;
+				bool ready = true;
+				left[left[0] >= 0] = a;
+				for (int b = 0; b < (int)p->n_stages && ready; b++)
+					ready = b == a || (int)p->stages[b].phase != phase || p->stages[b].order >= 0 ||
+							!before(p, b, a);
+				if (ready && next < 0) next = a;
+			}
+			if (left[0] < 0) break;
+			if (next < 0) {
+				quern_report_add(p->scene->report,
+					p->stages[left[0]].section ? p->stages[left[0]].section->mark : (quern_mark) { 0 },
+					"%s and %s each need the other to come first among the stages '%s'",
+					p->stages[left[0]].name, left[1] >= 0 ? p->stages[left[1]].name : "itself",
+					quern_phase_names[phase]);
+				next = left[0];
+			}
+			p->stages[next].order = n;
+			p->order[n++] = next;
+		}
+}
+
+/* ---- what the order implies for each field ---- */
+
+typedef struct {
+	const quern_plan_use *last;
+	bool read, first_seen, begins, fresh, written;
+	int stages, previous;
+} history;
+
+static void conflicts(quern_plan *p, const quern_field *field, const quern_plan_use *u, history *h) {
+	const quern_plan_use *last = h->last;
+	if (last && last->stage != u->stage) {
+		const quern_plan_stage *was = &p->stages[last->stage], *now = &p->stages[u->stage];
+		if (u->row->access == QUERN_WRITE && last->row->access == QUERN_WRITE && was->phase != QUERN_SETUP)
+			quern_report_add(p->scene->report, u->mark, "%s: %s overwrites what %s wrote and nobody read",
+				field->name, u->owner, last->owner);
+		if (u->row->access == QUERN_UPDATE && last->row->access == QUERN_UPDATE && was->phase == now->phase &&
+			was->solver != now->solver)
+			quern_report_add(p->scene->report, u->mark,
+				"%s: %s and %s both change it and nothing says which comes first", field->name, last->owner,
+				u->owner);
+	}
+	if (u->row->access == QUERN_ADD && h->fresh)
+		quern_report_add(p->scene->report, u->mark, "%s: %s adds to it after %s has read it", field->name,
+			u->owner, last->owner);
+}
+
+static void follow_field(quern_plan *p, int k) {
+	quern_field *field = &p->store.fields[k];
+	history h = { .read = field->shown, .previous = -1 };
+	for (size_t o = 0; o < p->n_stages; o++) {
+		const int s = p->order[o];
+		const bool setup = p->stages[s].phase == QUERN_SETUP;
+		bool others = false, changed = false;
+		for (int r = 0; r < 5; r++)
+			for (size_t i = 0; i < p->n_uses; i++) {
+				const quern_plan_use *u = &p->uses[i];
+				if (u->target != k || u->stage != s || rank(u->row) != r) continue;
+				const bool fills = u->row->access == QUERN_WRITE || u->row->access == QUERN_ADD;
+				h.read = h.read || u->row->access == QUERN_READ || u->row->access == QUERN_UPDATE;
+				h.written = h.written || changes(u->row);
+				others = others || u->row->flags & QUERN_OTHERS;
+				changed = changed || u->row->access == QUERN_UPDATE || u->row->access == QUERN_WRITE;
+				if (s != h.previous) h.stages++, h.previous = s;
+				if (setup) continue;
+				if (!h.first_seen) h.begins = fills, field->state = !fills || p->stages[s].sometimes;
+				h.first_seen = true;
+				conflicts(p, field, u, &h);
+				h.fresh = u->row->access == QUERN_READ;
+				h.last = u;
+			}
+		field->twice = field->twice || (others && changed);
+	}
+	if (!h.written)
+		for (size_t i = 0; i < p->n_uses; i++)
+			if (p->uses[i].target == k && mandatory(&p->uses[i])) {
+				quern_report_add(p->scene->report, p->uses[i].mark,
+					"%s needs %s, and nothing in this scene makes it", p->uses[i].owner, field->name);
+				break;
+			}
+	field->local = !field->shown && ((h.stages <= 1 && h.begins) || !h.read);
+	field->state = field->state && !field->local;
+}
+
+static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(const quern_use *)) {
+	for (size_t i = 0; i < p->n_uses; i++)
+		if (p->uses[i].stage == stage && p->uses[i].target == field && test(p->uses[i].row)) return true;
+	return false;
+}
+static bool reads_others(const quern_use *row) { return row->flags & QUERN_OTHERS; }
+static bool renews(const quern_use *row) { return row->access == QUERN_UPDATE || row->access == QUERN_WRITE; }
+static bool adds(const quern_use *row) { return row->access == QUERN_ADD; }
+
+static void mark_swaps_and_zeros(quern_plan *p) {
+	bool *zeroed = quern_take(p->store.n_fields, sizeof(bool));
+	for (size_t o = 0; o < p->n_stages; o++) {
+		quern_plan_stage *stage = &p->stages[p->order[o]];
+		stage->swaps = quern_take(p->store.n_fields + 1, sizeof(int));
+		stage->zeros = quern_take(p->store.n_fields + 1, sizeof(int));
+		size_t swaps = 0, zeros = 0;
+		for (size_t k = 0; k < p->store.n_fields; k++) {
+			const quern_field *field = &p->store.fields[k];
+			const int s = p->order[o], f = (int)k;
+			if (field->twice && stage_has(p, s, f, reads_others) && stage_has(p, s, f, renews))
+				stage->swaps[swaps++] = f;
+			if (!field->local && !zeroed[k] && stage_has(p, s, f, adds))
+				stage->zeros[zeros++] = f, zeroed[k] = true;
+		}
+		stage->swaps[swaps] = stage->zeros[zeros] = -1;
+	}
+	free(zeroed);
+}
+
+/* ---- columns ---- */
+
+static bool swapped_in(const quern_plan_stage *stage, int field) {
+	for (const int *k = stage->swaps; k && *k >= 0; k++)
+		if (*k == field) return true;
+	return false;
+}
+
+static quern_column column_of(const quern_plan *p, const quern_plan_use *u, const quern_plan_stage *stage) {
+	if (u->target < 0) return (quern_column) { .real = { NULL } };
+	const quern_field *field = &p->store.fields[u->target];
+	const bool other = stage && field->twice && renews(u->row) && swapped_in(stage, u->target);
+	return quern_field_column(&p->store, field, other ? !field->now : field->now);
+}
+
+void quern_plan_refresh(quern_plan *p) {
+	if (p->fresh == p->store.version) return;
+	p->fresh = p->store.version;
+	for (size_t i = 0; i < p->n_stages; i++) {
+		quern_plan_stage *stage = &p->stages[i];
+		for (size_t k = 0; k < stage->n_uses; k++)
+			stage->column[k] = column_of(p, &p->uses[stage->first_use + k], stage);
+	}
+	for (size_t i = 0; i < p->n_bounds; i++) {
+		quern_plan_bound *b = p->bounds[i];
+		for (size_t k = 0; k < b->bound->n_uses; k++) {
+			b->column[k] = column_of(p, &p->uses[b->first_use + k], NULL);
+			if (b->again) b->again[k] = column_of(p, &p->uses[b->first_again + k], NULL);
+		}
+	}
+}
+
+/* ---- the whole ---- */
+
+quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
+	quern_plan *p = quern_take(1, sizeof *p);
+	p->scene = scene;
+	p->fresh = UINT64_MAX;
+	quern_store_init(&p->store, pool);
+	gather_sets(p);
+	gather_stages(p);
+	gather_slots(p);
+	make_fields(p);
+	bind_uses(p);
+	lay_rows(p);
+	order_stages(p);
+	for (size_t k = 0; k < p->store.n_fields; k++) follow_field(p, (int)k);
+	mark_swaps_and_zeros(p);
+	for (size_t i = 0; i < p->n_stages; i++)
+		p->stages[i].column = quern_take(p->stages[i].n_uses, sizeof(quern_column));
+	return p;
+}
+
+void quern_plan_destroy(quern_plan *p) {
+	if (!p) return;
+	for (size_t e = 0; e < p->scene->observe.n; e++) free(p->observers[e]->bound);
+	for (size_t i = 0; i < p->n_bounds; i++) {
+		free(p->bounds[i]->column);
+		free(p->bounds[i]->again);
+		free(p->bounds[i]->variant);
+		free(p->bounds[i]);
+	}
+	for (size_t i = 0; i < p->scene->n_sections; i++) {
+		for (size_t k = 0; p->slots[i] && k < p->scene->sections[i].n_slots; k++) free(p->slots[i][k]);
+		free(p->slots[i]);
+		free(p->n_slot[i]);
+	}
+	for (size_t i = 0; i < p->n_stages; i++) {
+		free(p->stages[i].column);
+		free(p->stages[i].swaps);
+		free(p->stages[i].zeros);
+	}
+	free(p->bounds);
+	free(p->observers);
+	free(p->stages);
+	free(p->uses);
+	free(p->order);
+	quern_store_finish(&p->store);
+	free(p);
+}
+
+size_t quern_plan_entry_bytes(const quern_plan *p, int set) {
+	size_t bytes = 0;
+	for (size_t i = 0; i < p->store.n_fields; i++) {
+		const quern_field *field = &p->store.fields[i];
+		if (field->set == set && !field->local)
+			bytes += field->n_components * quern_field_bytes(field) * (field->twice ? 2 : 1);
+	}
+	return bytes;
+}

@@ -1,0 +1,63 @@
+/* plan - from declared uses to stages in order, fields that exist, and conflicts refused by name */
+#pragma once
+#include "field.h"
+#include "scene.h"
+
+typedef struct quern_plan_use {
+	const quern_use *row;
+	char field[56];    /* "particle." and repeated sets resolved */
+	const char *owner; /* "dem.forces", "contact.linear" */
+	quern_mark mark;
+	int stage;  /* -1: called by nobody here */
+	int target; /* index of its field in the store; -1: the row does not count */
+	bool counts;
+} quern_plan_use;
+
+typedef struct quern_plan_stage {
+	const char *name, *doc;
+	const quern_stage *stage; /* NULL: an observer's */
+	const quern_section *section;
+	const quern_filling *observer;
+	quern_phase phase;
+	int solver, sequence, order; /* order: place in the step, from 0 */
+	bool sometimes;
+	size_t first_use, n_uses; /* its own rows in plan->uses */
+	quern_column *column;
+	int *swaps, *zeros; /* fields to swap after, to zero before; -1 ends */
+	double seconds;
+} quern_plan_stage;
+
+/* A plugin in a slot with its columns; what bound->column and bound->again point to is kept fresh. */
+typedef struct quern_plan_bound {
+	quern_bound *bound;            /* in its slot's array; an observer's own */
+	size_t first_use, first_again; /* into plan->uses; first_again == SIZE_MAX: no repeat */
+	quern_column *column, *again;
+	const void **variant;
+} quern_plan_bound;
+
+typedef struct quern_plan {
+	const quern_scene *scene;
+	quern_store store;
+	quern_plan_use *uses;
+	size_t n_uses, uses_capacity;
+	quern_plan_stage *stages;
+	size_t n_stages, stages_capacity;
+	int *order;                /* stages in the order of a step */
+	quern_plan_bound **bounds; /* all */
+	size_t n_bounds, bounds_capacity;
+	quern_bound **slots[8]; /* by section: by slot: array */
+	uint32_t *n_slot[8];
+	quern_plan_bound **observers; /* by entry of scene->observe */
+	uint64_t fresh;               /* store version of the columns */
+} quern_plan;
+
+/* Faults go to the scene's report. Never NULL. */
+quern_plan *quern_plan_create(const quern_scene *, quern_pool *);
+void quern_plan_destroy(quern_plan *);
+
+/* Renews every column pointer if the store has changed. */
+void quern_plan_refresh(quern_plan *);
+
+extern const char *const quern_phase_names[];
+/* bytes of one entry of a set; with `scratch` false only what is stored */
+size_t quern_plan_entry_bytes(const quern_plan *, int set);

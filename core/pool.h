@@ -1,0 +1,22 @@
+/* pool - the only place that knows about threads (OpenMP) */
+#pragma once
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct quern_pool quern_pool;
+
+/* workers: 0 takes as many as the process may run on. */
+quern_pool *quern_pool_create(uint32_t workers);
+void quern_pool_destroy(quern_pool *);
+uint32_t quern_pool_workers(const quern_pool *);
+
+/* Calls body(arg, i, worker) once for every i < n. Which worker gets which i is not determined, so a body writes
+ * nothing that another i reads or writes. */
+void quern_pool_each(
+	quern_pool *, uint32_t n, void (*body)(void *arg, uint32_t i, uint32_t worker), void *arg);
+
+/* Memory of one worker, at least `bytes`, 64-byte aligned, kept between calls; NULL if there is none. */
+void *quern_pool_scratch(quern_pool *, uint32_t worker, size_t bytes);
+
+/* The sum over a fixed binary tree of leaves of 256, whatever the number of workers. */
+double quern_tree_sum(size_t n, const double *values);

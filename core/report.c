@@ -1,0 +1,103 @@
+#include "report.h"
+#include "text.h"
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+	quern_mark mark;
+	char *text;
+	bool warning;
+	size_t order;
+} entry;
+
+struct quern_report {
+	entry *entries;
+	size_t n, capacity, errors;
+};
+
+quern_report *quern_report_create(void) { return quern_take(1, sizeof(quern_report)); }
+
+void quern_report_destroy(quern_report *report) {
+	if (!report) return;
+	for (size_t i = 0; i < report->n; i++) free(report->entries[i].text);
+	free(report->entries);
+	free(report);
+}
+
+static void add(quern_report *report, quern_mark mark, bool warning, const char *fmt, va_list list) {
+	quern_text text = { 0 };
+	quern_text_addv(&text, fmt, list);
+	report->entries = quern_grow(report->entries, report->n, &report->capacity, sizeof(entry));
+	report->entries[report->n] = (entry) { mark, text.data ? text.data : quern_copy(""), warning, report->n };
+	report->n++;
+	report->errors += !warning;
+}
+
+void quern_report_addv(quern_report *report, quern_mark mark, const char *fmt, va_list list) {
+	add(report, mark, false, fmt, list);
+}
+
+void quern_report_add(quern_report *report, quern_mark mark, const char *fmt, ...) {
+	va_list list;
+	va_start(list, fmt);
+	add(report, mark, false, fmt, list);
+	va_end(list);
+}
+
+void quern_report_warn(quern_report *report, quern_mark mark, const char *fmt, ...) {
+	va_list list;
+	va_start(list, fmt);
+	add(report, mark, true, fmt, list);
+	va_end(list);
+}
+
+size_t quern_report_errors(const quern_report *report) { return report->errors; }
+
+static int by_place(const void *pa, const void *pb) {
+	const entry *a = pa, *b = pb;
+	const int file = strcmp(a->mark.file ? a->mark.file : "", b->mark.file ? b->mark.file : "");
+	if (file) return file;
+	if (a->mark.line != b->mark.line) return a->mark.line < b->mark.line ? -1 : 1;
+	if (a->mark.column != b->mark.column) return a->mark.column < b->mark.column ? -1 : 1;
+	return a->order < b->order ? -1 : 1;
+}
+
+/* Tabs are kept above the caret, so that it stands under the right letter. */
+static void show_line(quern_mark mark, FILE *out) {
+	FILE *file = mark.line ? fopen(mark.file, "r") : NULL;
+	char line[400];
+	size_t number = 1;
+	if (!file) return;
+	while (fgets(line, sizeof line, file)) {
+		const size_t n = strcspn(line, "\n");
+		const bool whole = line[n] == '\n' || feof(file);
+		if (number == mark.line) {
+			if (strlen(line) != n + (line[n] == '\n')) break;
+			line[n] = 0;
+			fprintf(out, "  %s\n  ", line);
+			for (size_t i = 0; i + 1 < mark.column && i < n; i++) fputc(line[i] == '\t' ? '\t' : ' ', out);
+			fputs("^\n", out);
+			break;
+		}
+		number += whole;
+	}
+	fclose(file);
+}
+
+void quern_report_print(const quern_report *report, FILE *out) {
+	entry *sorted = quern_take(report->n, sizeof(entry));
+	if (report->n) memcpy(sorted, report->entries, report->n * sizeof(entry));
+	qsort(sorted, report->n, sizeof(entry), by_place);
+	for (size_t i = 0; i < report->n; i++) {
+		const entry *e = &sorted[i];
+		if (i && e->mark.line == e[-1].mark.line && e->mark.column == e[-1].mark.column &&
+			!strcmp(e->text, e[-1].text))
+			continue; /* an alias repeats its anchor's faults */
+		if (e->mark.file) fprintf(out, "%s:", e->mark.file);
+		if (e->mark.line) fprintf(out, "%zu:%zu:", e->mark.line, e->mark.column);
+		fprintf(out, "%s%s: %s\n", e->mark.file ? " " : "", e->warning ? "warning" : "error", e->text);
+		show_line(e->mark, out);
+	}
+	free(sorted);
+}

@@ -1,0 +1,316 @@
+#include "run.h"
+#include "text.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+quern_status quern_run_stop(quern_run *run, quern_status status, const char *fmt, ...) {
+	if (run->status != QUERN_OK) return status;
+	quern_text text = { 0 };
+	va_list list;
+	va_start(list, fmt);
+	if (run->stage)
+		quern_text_add(&text, "%s, at t = %.6g s (step %lld): ", run->stage, quern_run_time(run),
+			(long long)run->clock.step);
+	quern_text_addv(&text, fmt, list);
+	va_end(list);
+	run->status = status;
+	free(run->message);
+	run->message = text.data;
+	return status;
+}
+
+static void arena_reset(quern_arena *a) {
+	for (size_t i = 0; i < a->n_extra; i++) free(a->extra[i]);
+	if (a->n_extra) {
+		const size_t wanted = (a->used + a->extra_bytes) * 5 / 4;
+		free(a->data);
+		a->data = aligned_alloc(64, (wanted + 63) & ~(size_t)63);
+		a->capacity = a->data ? (wanted + 63) & ~(size_t)63 : 0;
+	}
+	a->used = a->n_extra = a->extra_bytes = 0;
+}
+
+static double published(const quern_scene *scene, const char *name) {
+	for (size_t i = 0; i < scene->n_published; i++)
+		if (!strcmp(scene->published[i].name, name)) return scene->published[i].value;
+	return NAN;
+}
+
+static bool needs_grid(const quern_store *store) {
+	for (size_t i = 0; i < store->n_fields; i++)
+		if (store->sets[store->fields[i].set].grid) return true;
+	return false;
+}
+
+quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
+	quern_run *run = quern_take(1, sizeof *run);
+	run->scene = scene;
+	run->clock.frame = -1;
+	run->mass_initial = NAN;
+	run->pool = quern_pool_create(workers);
+	run->plan = quern_plan_create(scene, run->pool);
+	run->has_grid = needs_grid(&run->plan->store);
+	if (run->has_grid && !quern_report_errors(scene->report)) {
+		const quern_general *g = &scene->general;
+		const double cell = published(scene, "grid.cell");
+		if (!(cell > 0)) quern_report_add(scene->report, (quern_mark) { 0 }, "the grid has no cell size");
+		else if (quern_grid_init(&run->grid, (uint32_t)g->dimension, cell, g->lower, g->upper, g->periodic) !=
+				 QUERN_OK)
+			quern_report_add(scene->report,
+				quern_param_mark(scene->tree->root, "domain.upper", (quern_mark) { 0 }),
+				"the domain has more than 2^30 cells along an axis: make it smaller or the cells larger");
+	}
+	const int total = quern_store_set(&run->plan->store, "total");
+	if (quern_store_fill(&run->plan->store, total, 1) != QUERN_OK) {
+		quern_run_destroy(run);
+		return NULL;
+	}
+	quern_plan_refresh(run->plan);
+	return run;
+}
+
+void quern_run_destroy(quern_run *run) {
+	if (!run) return;
+	quern_plan_destroy(run->plan);
+	if (run->has_grid) quern_grid_finish(&run->grid);
+	quern_pool_destroy(run->pool);
+	quern_scene_destroy(run->scene);
+	quern_log_destroy(run->log);
+	arena_reset(&run->arena);
+	free(run->arena.data);
+	free(run->arena.extra);
+	free(run->folder);
+	free(run->message);
+	free(run);
+}
+
+/* ---- time ---- */
+
+int64_t quern_run_frames(const quern_run *run) {
+	const quern_general *g = &run->scene->general;
+	const double frames = g->end / g->every;
+	return (int64_t)ceil(frames - 1e-9 * (frames > 1 ? frames : 1));
+}
+
+double quern_run_frame_time(const quern_run *run, int64_t frame) {
+	const quern_general *g = &run->scene->general;
+	return frame >= quern_run_frames(run) ? g->end : (double)frame * g->every;
+}
+
+double quern_run_time(const quern_run *run) {
+	const quern_clock *c = &run->clock;
+	if (!c->settled || c->frame < 0) return 0;
+	return quern_run_frame_time(run, c->frame) + (double)c->at * c->dt;
+}
+
+uint32_t quern_run_substeps(const quern_run *run) {
+	uint32_t n = 1;
+	for (size_t i = 0; i < run->scene->n_sections; i++) {
+		const quern_section *s = &run->scene->sections[i];
+		if (s->ops->substeps) n = s->ops->substeps(s->solver->self);
+	}
+	return n;
+}
+
+static size_t section_index(const quern_run *run, const quern_section *section) {
+	return section ? (size_t)(section - run->scene->sections) : 0;
+}
+
+quern_step quern_run_record(quern_run *run, const quern_section *section) {
+	const quern_general *g = &run->scene->general;
+	const size_t i = section_index(run, section);
+	quern_step step = { .step = run->clock.step,
+		.substep = run->clock.settled ? run->clock.substep : run->clock.settle_step,
+		.dim = (uint32_t)g->dimension,
+		.n_substeps = quern_run_substeps(run),
+		.settling = !run->clock.settled,
+		.batch = (uint32_t)g->batch,
+		.time = quern_run_time(run),
+		.dt = run->clock.settled ? run->clock.dt : run->clock.settle_dt,
+		.slot = section ? (const quern_bound *const *)run->plan->slots[i] : NULL,
+		.n_slot = section ? run->plan->n_slot[i] : NULL,
+		.host = &quern_host_table,
+		.run = run };
+	memcpy(step.gravity, g->gravity, sizeof step.gravity);
+	memcpy(step.lower, g->lower, sizeof step.lower);
+	memcpy(step.upper, g->upper, sizeof step.upper);
+	memcpy(step.periodic, g->periodic, sizeof step.periodic);
+	for (size_t k = 0; k < run->plan->n_stages && section; k++)
+		if (run->plan->stages[k].section == section) {
+			step.use = run->plan->stages[k].column;
+			break;
+		}
+	return step;
+}
+
+static bool steps_grains(const quern_run *run, const quern_section *section) {
+	for (size_t k = 0; k < run->plan->n_stages; k++)
+		if (run->plan->stages[k].section == section && run->plan->stages[k].phase == QUERN_GRAINS)
+			return true;
+	return false;
+}
+
+double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard_reason[200]) {
+	double least = INFINITY, least_hard = INFINITY;
+	const uint32_t n = quern_run_substeps(run);
+	snprintf(reason, 200, "nothing");
+	snprintf(hard_reason, 200, "nothing");
+	for (size_t i = 0; i < run->scene->n_sections; i++) {
+		const quern_section *s = &run->scene->sections[i];
+		if (!s->ops->limit) continue;
+		const quern_step step = quern_run_record(run, s);
+		const uint32_t times = steps_grains(run, s) ? n : 1;
+		char why[160] = "";
+		double beyond = INFINITY;
+		const double limit = times * s->ops->limit(s->solver->self, &step, &beyond, why);
+		char factor[32] = "";
+		if (times > 1) snprintf(factor, sizeof factor, "%u times ", times);
+		if (limit < least) least = limit, snprintf(reason, 200, "%s%s", factor, why);
+		if (times * beyond < least_hard)
+			least_hard = times * beyond, snprintf(hard_reason, 200, "%s%s", factor, why);
+	}
+	*hard = least_hard;
+	return least;
+}
+
+quern_status quern_run_interval(quern_run *run) {
+	quern_clock *c = &run->clock;
+	const quern_general *g = &run->scene->general;
+	const double length = quern_run_frame_time(run, c->frame + 1) - quern_run_frame_time(run, c->frame);
+	double hard;
+	char hard_reason[200];
+	double limit = quern_run_limit(run, &hard, run->limit_reason, hard_reason);
+	if (g->step > 0) {
+		if (g->step > hard && !g->force)
+			return quern_run_stop(run, QUERN_E_PARAM,
+				"time.step of %.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s "
+				"(time.force: true takes it "
+				"all the same)",
+				g->step, hard, hard_reason, limit);
+		limit = g->step;
+		snprintf(run->limit_reason, sizeof run->limit_reason, "the scene's time.step");
+	}
+	if (!(limit > 0))
+		return quern_run_stop(run, QUERN_E_NUMERIC, "no step is small enough: %s", run->limit_reason);
+	const double steps = isfinite(limit) ? ceil(length / limit - 1e-9) : 1;
+	if (!(steps < 1e15))
+		return quern_run_stop(
+			run, QUERN_E_NUMERIC, "a step of %.3g s is too small for an interval of %.3g s", limit, length);
+	c->steps_in = steps < 1 ? 1 : (int64_t)steps;
+	c->dt = length / (double)c->steps_in;
+	c->at = 0;
+	return QUERN_OK;
+}
+
+/* ---- stages ---- */
+
+static void zero_column(quern_run *run, int k) {
+	quern_field *field = &run->plan->store.fields[k];
+	quern_set_store *set = &run->plan->store.sets[field->set];
+	if (set->rows) {
+		if (field->lane == 0 && set->row) memset(set->row, 0, (size_t)set->n * 64);
+		return;
+	}
+	for (uint8_t c = 0; c < field->n_components; c++)
+		memset(field->data[field->now][c], 0, (size_t)set->n * quern_field_bytes(field));
+}
+
+static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt) {
+	if (!stage->stage) return QUERN_OK;
+	const double begin = quern_wall();
+	for (const int *k = stage->zeros; *k >= 0; k++) zero_column(run, *k);
+	quern_plan_refresh(run->plan);
+	quern_step step = quern_run_record(run, stage->section);
+	step.dt = dt;
+	step.use = stage->column;
+	run->stage = stage->name;
+	quern_status status = stage->stage->run(stage->section->solver->self, &step);
+	arena_reset(&run->arena);
+	if (status == QUERN_OK) status = run->status;
+	else quern_run_stop(run, status, status == QUERN_E_MEMORY ? "out of memory" : "failed");
+	if (*stage->swaps >= 0) {
+		for (const int *k = stage->swaps; *k >= 0; k++)
+			run->plan->store.fields[*k].now = !run->plan->store.fields[*k].now;
+		run->plan->store.version++;
+	}
+	run->stage = NULL;
+	stage->seconds += quern_wall() - begin;
+	return status;
+}
+
+static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
+	for (size_t o = 0; o < run->plan->n_stages; o++) {
+		quern_plan_stage *stage = &run->plan->stages[run->plan->order[o]];
+		if (stage->phase != phase) continue;
+		const quern_status status = run_stage(run, stage, dt);
+		if (status != QUERN_OK) return status;
+	}
+	return QUERN_OK;
+}
+
+quern_status quern_run_setup(quern_run *run) { return run_phase(run, QUERN_SETUP, 0); }
+
+bool quern_run_settle(quern_run *run) {
+	quern_clock *c = &run->clock;
+	bool rest = true;
+	if (c->settle_step == 0) {
+		double hard;
+		char reason[200];
+		c->settle_dt = quern_run_limit(run, &hard, run->limit_reason, reason);
+		for (size_t i = 0; i < run->scene->n_sections; i++) { /* the grains' own limit, not the continuum's */
+			const quern_section *s = &run->scene->sections[i];
+			const quern_step step = quern_run_record(run, s);
+			char why[160];
+			if (steps_grains(run, s) && s->ops->limit)
+				c->settle_dt = s->ops->limit(s->solver->self, &step, &hard, why);
+		}
+		if (!isfinite(c->settle_dt)) c->settle_dt = 0;
+	}
+	for (size_t i = 0; i < run->scene->n_sections; i++) {
+		const quern_section *s = &run->scene->sections[i];
+		if (!s->ops->settled) continue;
+		const quern_step step = quern_run_record(run, s);
+		rest = s->ops->settled(s->solver->self, &step) && rest;
+	}
+	if (rest || run->status != QUERN_OK) {
+		c->settled = 1;
+		return true;
+	}
+	run_phase(run, QUERN_GRAINS, c->settle_dt);
+	c->settle_step++;
+	return run->status != QUERN_OK;
+}
+
+static uint32_t count(const quern_run *run, const char *set) {
+	const int i = quern_store_set(&run->plan->store, set);
+	return i < 0 ? 0 : run->plan->store.sets[i].n;
+}
+
+quern_status quern_run_step(quern_run *run) {
+	quern_clock *c = &run->clock;
+	const uint32_t substeps = quern_run_substeps(run);
+	quern_status status = run_phase(run, QUERN_CONVERT, c->dt);
+	for (uint32_t k = 0; k < substeps && status == QUERN_OK; k++) {
+		status = run_phase(run, QUERN_GRAINS, c->dt / substeps);
+		c->substep++;
+	}
+	c->grain_steps += (int64_t)count(run, "grain") * substeps;
+	for (int phase = QUERN_TO_GRID; phase <= QUERN_OBSERVE && status == QUERN_OK; phase++)
+		status = run_phase(run, (quern_phase)phase, c->dt);
+	c->point_steps += count(run, "point");
+	c->step++;
+	c->at++;
+	return status;
+}
+
+quern_account quern_run_account(quern_run *run) {
+	quern_account account = { 0 };
+	quern_plan_refresh(run->plan);
+	for (size_t i = 0; i < run->scene->n_sections; i++) {
+		const quern_section *s = &run->scene->sections[i];
+		const quern_step step = quern_run_record(run, s);
+		if (s->ops->account) s->ops->account(s->solver->self, &step, &account);
+	}
+	return account;
+}

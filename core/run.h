@@ -1,0 +1,73 @@
+/* run - a scene in motion: its plan, its grid, its counters; and the loop over steps */
+#pragma once
+#include "grid.h"
+#include "log.h"
+#include "plan.h"
+#include <signal.h>
+
+/* Time is counted in whole numbers: interval i runs from frame i to frame i + 1 in `steps_in` equal steps. */
+typedef struct quern_clock {
+	int64_t step, substep, settle_step; /* since the start; substep counts grain steps after release */
+	int64_t frame;                      /* last frame written; -1: none */
+	int64_t at, steps_in;               /* steps done and to do in this interval */
+	double dt, settle_dt;
+	int64_t settled; /* 1: the grains' own phase is over */
+	int64_t grain_steps, point_steps;
+} quern_clock;
+
+typedef struct quern_arena {
+	char *data;
+	size_t used, capacity;
+	void **extra; /* what did not fit this time */
+	size_t n_extra, extra_capacity, extra_bytes;
+} quern_arena;
+
+struct quern_run {
+	quern_scene *scene;
+	quern_plan *plan;
+	quern_pool *pool;
+	quern_grid grid;
+	bool has_grid;
+	quern_clock clock;
+	quern_arena arena;
+	quern_log *log;
+	char *folder; /* NULL: nothing is written */
+	struct quern_sidecars *sidecars;
+	const char *stage; /* the one that runs, for messages */
+	quern_status status;
+	char *message;                   /* why the run stopped */
+	double wall_before, settle_wall; /* s on the clock spent before a resume; in settling */
+	double mass_initial;
+	volatile sig_atomic_t *interrupted;
+	char limit_reason[200]; /* what sets the step */
+};
+
+/* Everything short of running: allocates, but no stage has run. Faults go to the scene's report; NULL if memory is
+ * gone. Takes the scene over. `workers` 0: all. */
+quern_run *quern_run_create(quern_scene *, uint32_t workers);
+void quern_run_destroy(quern_run *);
+
+/* Runs the stages of the set-up phase. */
+quern_status quern_run_setup(quern_run *);
+/* One grain step of the settling phase; true when at rest. */
+bool quern_run_settle(quern_run *);
+/* Chooses the steps of the interval that begins now, from the state as it is; QUERN_E_PARAM if the scene's own step
+ * is beyond a limit, with the reason in run->message. */
+quern_status quern_run_interval(quern_run *);
+/* One long step. */
+quern_status quern_run_step(quern_run *);
+
+double quern_run_time(const quern_run *); /* s */
+double quern_run_frame_time(const quern_run *, int64_t frame);
+int64_t quern_run_frames(const quern_run *); /* index of the last frame */
+/* The step record for code that is called between stages. */
+quern_step quern_run_record(quern_run *, const quern_section *);
+quern_account quern_run_account(quern_run *);
+/* The smallest recommended long step, the smallest hard limit and what sets the first. */
+double quern_run_limit(quern_run *, double *hard, char reason[200], char hard_reason[200]);
+uint32_t quern_run_substeps(const quern_run *);
+/* Ends the run: keeps the first message. */
+quern_status quern_run_stop(quern_run *, quern_status, const char *fmt, ...)
+	__attribute__((format(printf, 3, 4)));
+
+extern const quern_host quern_host_table;

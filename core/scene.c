@@ -1,0 +1,307 @@
+#include "scene.h"
+#include "section.h"
+#include "text.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+const quern_section_name quern_section_names[] = { { "bodies", "bodies" }, { "grains", "dem" },
+	{ "continuum", "mpm" }, { "hybrid", "hybrid" }, { NULL, NULL } };
+
+enum { MODEL_ALL, MODEL_GRAINS, MODEL_CONTINUUM };
+static const char *const models[] = { "all", "grains", "continuum", NULL };
+static const char *const instructions[] = { "auto", "v1", "v3", "v4", NULL };
+
+#define ROW(m, name_, unit_, ...) QUERN_PARAM_AS(quern_general, m, name_, unit_, __VA_ARGS__)
+const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version of the scene format: 1.",
+											   .flags = QUERN_REQUIRED, .min = 1, .max = 1e9),
+	ROW(name, "name", NULL, "A title for people.", .text = "scene"),
+	ROW(model, "model", "1", "Which representations to keep: all sections, or grains or continuum alone.",
+		.choices = models),
+	ROW(dimension, "dimension", "1", "2 (a slab one metre thick) or 3.", .flags = QUERN_REQUIRED, .min = 2,
+		.max = 3),
+	ROW(seed, "seed", "1", "Seed of all random numbers.", .def = 1, .max = 2147483647),
+	ROW(gravity, "gravity", "m/s^2", "Acceleration of gravity.", .flags = QUERN_REQUIRED, .min = -1e6,
+		.max = 1e6),
+	ROW(lower, "domain.lower", "m", "Lower corner of the domain.", .flags = QUERN_REQUIRED, .min = -1e9,
+		.max = 1e9),
+	ROW(upper, "domain.upper", "m", "Upper corner of the domain.", .flags = QUERN_REQUIRED, .min = -1e9,
+		.max = 1e9),
+	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED, .max = 1e12),
+	ROW(step_text, "time.step", "s", "The long step, or auto; grains alone: their step.", .text = "auto"),
+	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit."),
+	ROW(every, "output.every", "s", "Time between frames and between rows of series.csv; default: end/50.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
+	ROW(compress, "output.compress", NULL, "Deflate the frames.", .def = 1),
+	ROW(checkpoint, "checkpoint.every", "s", "Time on the clock between checkpoints.", .def = 300,
+		.max = 1e9),
+	ROW(batch, "run.batch", "1", "Most contacts in a batch; results do not depend on it.", .def = 256,
+		.min = 8, .max = 512, .flags = QUERN_ADVANCED),
+	ROW(instructions, "run.instructions", "1",
+		"Highest instruction set to use, x86-64-v1 to v4; results do not depend on it.",
+		.choices = instructions, .flags = QUERN_ADVANCED),
+	QUERN_END_PARAMS };
+
+static const char *const general_also[] = { "domain.periodic", "output.fields", "observe", "bodies", "grains",
+	"continuum", "hybrid", NULL };
+
+uint64_t quern_hash(const void *data, size_t length) {
+	uint64_t hash = 1469598103934665603u;
+	for (size_t i = 0; i < length; i++) hash = (hash ^ ((const unsigned char *)data)[i]) * 1099511628211u;
+	return hash;
+}
+
+quern_reading quern_scene_reading(const quern_scene *s) {
+	return (quern_reading) { s->report, s->units, (uint32_t)s->general.dimension, s->published,
+		s->n_published, s->tree };
+}
+
+/* ---- services of the set-up phase ---- */
+
+quern_status quern_scene_fail(quern_err *err, quern_status status, const char *param, const char *fmt, ...) {
+	quern_text text = { 0 };
+	va_list list;
+	va_start(list, fmt);
+	quern_text_addv(&text, fmt, list);
+	va_end(list);
+	quern_report_add(err->report, quern_param_mark(err->map, param, err->mark), "%s: %s%s%s", err->owner,
+		param ? param : "", param ? ": " : "", quern_text_string(&text));
+	quern_text_finish(&text);
+	return status;
+}
+
+void quern_scene_publish(const quern_setup *setup, const char *name, const char *unit, quern_real value) {
+	quern_scene *s = setup->scene;
+	for (size_t i = 0; i < s->n_published; i++)
+		if (!strcmp(s->published[i].name, name))
+			return; /* the first to know is right: grains before points */
+	s->published = quern_grow(s->published, s->n_published, &s->published_capacity, sizeof(quern_published));
+	s->published[s->n_published++] = (quern_published) { name, unit, value };
+}
+
+quern_setup quern_scene_setup(const quern_scene *s, const char *path) {
+	quern_setup setup = { .dim = (uint32_t)s->general.dimension,
+		.lanes = QUERN_LANES,
+		.host = s->host,
+		.scene = (void *)(uintptr_t)s };
+	setup.stream =
+		quern_hash(path, strlen(path)) ^ ((uint64_t)(uint32_t)s->general.seed * 0x9e3779b97f4a7c15u);
+	memcpy(setup.gravity, s->general.gravity, sizeof setup.gravity);
+	memcpy(setup.lower, s->general.lower, sizeof setup.lower);
+	memcpy(setup.upper, s->general.upper, sizeof setup.upper);
+	memcpy(setup.periodic, s->general.periodic, sizeof setup.periodic);
+	return setup;
+}
+
+/* ---- the core's own keys ---- */
+
+static double gravity_of(const quern_general *g) {
+	double sum = 0;
+	for (int k = 0; k < g->dimension; k++) sum += g->gravity[k] * g->gravity[k];
+	return sqrt(sum);
+}
+
+static void publish_scene(quern_scene *s) {
+	const quern_setup setup = quern_scene_setup(s, "scene");
+	const quern_general *g = &s->general;
+	const double gravity = gravity_of(g);
+	double size = 0;
+	for (int k = 0; k < g->dimension; k++) { /* the extent along gravity; without gravity, the largest */
+		const double extent = g->upper[k] - g->lower[k];
+		const double share = gravity > 0 ? fabs(g->gravity[k]) / gravity * extent : 0;
+		if (gravity > 0 ? share > size : extent > size) size = gravity > 0 ? share : extent;
+	}
+	quern_scene_publish(&setup, "scene.gravity", "m/s^2", gravity);
+	quern_scene_publish(&setup, "scene.height", "m", size);
+	quern_scene_publish(&setup, "scene.speed", "m/s", sqrt(2 * gravity * size));
+}
+
+static void read_periodic(quern_scene *s, const quern_node *domain) {
+	const quern_node *node = quern_node_find(domain, "periodic");
+	char say[64];
+	if (!node) return;
+	if (node->kind != QUERN_NODE_LIST || node->n != (size_t)s->general.dimension) {
+		quern_report_add(s->report, node->mark,
+			"scene: domain.periodic must be a list of %d of true or false, one per dimension, not %s",
+			s->general.dimension, quern_node_say(node, say));
+		return;
+	}
+	for (size_t k = 0; k < node->n; k++) {
+		const quern_node *value = node->entries[k].value;
+		const char *t = value->kind == QUERN_NODE_SCALAR ? value->text : "";
+		s->general.periodic[k] = !strcmp(t, "true");
+		if (strcmp(t, "true") != 0 && strcmp(t, "false") != 0)
+			quern_report_add(s->report, value->mark, "scene: domain.periodic is %s, must be true or false",
+				quern_node_say(value, say));
+	}
+}
+
+static void read_fields(quern_scene *s, const quern_node *output) {
+	const quern_node *node = quern_node_find(output, "fields");
+	char say[64];
+	if (!node) return;
+	if (node->kind != QUERN_NODE_LIST) {
+		quern_report_add(s->report, node->mark, "scene: output.fields must be a list of field names, not %s",
+			quern_node_say(node, say));
+		return;
+	}
+	s->fields = quern_take(node->n, sizeof(char *));
+	s->field_marks = quern_take(node->n, sizeof(quern_mark));
+	for (size_t k = 0; k < node->n; k++) {
+		const quern_node *value = node->entries[k].value;
+		if (value->kind != QUERN_NODE_SCALAR || !strchr(value->text, '.')) {
+			quern_report_add(s->report, value->mark,
+				"scene: output.fields: %s is no field name such as grain.velocity",
+				quern_node_say(value, say));
+			continue;
+		}
+		s->fields[s->n_fields] = quern_copy(value->text);
+		s->field_marks[s->n_fields++] = value->mark;
+	}
+}
+
+static void read_step(quern_scene *s, const quern_node *root) {
+	char why[160];
+	quern_general *g = &s->general;
+	const quern_mark mark = quern_param_mark(root, "time.step", root->mark);
+	if (!g->step_text || !strcmp(g->step_text, "auto")) return;
+	if (!quern_quantity_read(s->units, g->step_text, "s", &g->step, why))
+		quern_report_add(s->report, mark, "scene: time.step: %s, or auto", why);
+	else if (!(g->step > 0)) quern_report_add(s->report, mark, "scene: time.step must be above 0 s, or auto");
+}
+
+static void check_domain(quern_scene *s, const quern_node *root) {
+	quern_general *g = &s->general;
+	for (int k = 0; k < g->dimension; k++)
+		if (!(g->upper[k] > g->lower[k])) {
+			quern_report_add(s->report, quern_param_mark(root, "domain.upper", root->mark),
+				"scene: domain.upper must be above domain.lower in every direction; axis %d is empty", k);
+			return;
+		}
+	for (int k = 0; k < g->dimension; k++)
+		if (g->periodic[k] && g->gravity[k] != 0 && fabs(g->gravity[k]) > 0.999 * gravity_of(g))
+			quern_report_warn(s->report, quern_param_mark(root, "gravity", root->mark),
+				"gravity acts along the periodic axis %d alone: what falls there never lands", k);
+}
+
+static void read_general(quern_scene *s, quern_node *root) {
+	quern_reading r = quern_scene_reading(s);
+	char why[160];
+	double dimension = 0;
+	const quern_node *node = quern_node_find(root, "dimension");
+	if (node && node->kind == QUERN_NODE_SCALAR)
+		quern_quantity_read(s->units, node->text, "1", &dimension, why);
+	r.dim = dimension == 3 ? 3 : 2;
+	s->general.dimension = (int32_t)r.dim;
+	quern_params_read(&r, "scene", quern_general_rows, root, root->mark, general_also, &s->general);
+	s->general.dimension = (int32_t)r.dim;
+	if (s->general.version > 1)
+		quern_report_add(s->report, quern_param_mark(root, "quern", root->mark),
+			"scene: quern: format %d is newer than this program, which reads 1", s->general.version);
+	if (isnan(s->general.every)) s->general.every = s->general.end > 0 ? s->general.end / 50 : 1;
+	read_periodic(s, quern_node_find(root, "domain"));
+	read_fields(s, quern_node_find(root, "output"));
+	read_step(s, root);
+	if (!quern_report_errors(s->report)) check_domain(s, root);
+	quern_loader_limit(s->loader, (const int[]) { 4, 1, 3, 4 }[s->general.instructions]);
+}
+
+static bool wanted(const quern_scene *s, const char *section) {
+	const bool grains = !strcmp(section, "grains"), continuum = !strcmp(section, "continuum");
+	if (s->general.model == MODEL_GRAINS) return grains || !strcmp(section, "bodies");
+	if (s->general.model == MODEL_CONTINUUM) return continuum || !strcmp(section, "bodies");
+	return true;
+}
+
+static void check_sections(quern_scene *s, quern_mark mark) {
+	const quern_section *grains = quern_scene_section(s, "grains"),
+						*hybrid = quern_scene_section(s, "hybrid"),
+						*continuum = quern_scene_section(s, "continuum");
+	if (!grains && !continuum)
+		quern_report_add(s->report, mark, "scene: nothing to simulate: add a section grains or continuum");
+	else if (grains && continuum && !hybrid)
+		quern_report_add(s->report, continuum->mark,
+			"scene: grains and continuum do not feel each other without a section hybrid; add it, or keep "
+			"one of them "
+			"with 'model: grains' or 'model: continuum'");
+	else if (hybrid && !(grains && continuum))
+		quern_report_add(s->report, hybrid->mark,
+			"scene: hybrid needs both grains and continuum; %s is missing", grains ? "continuum" : "grains");
+}
+
+static void resolve(quern_scene *s) {
+	quern_node *root = s->tree->root;
+	if (!root) return;
+	char say[64];
+	if (root->kind != QUERN_NODE_MAP) {
+		quern_report_add(s->report, root->mark, "a scene is a map, not %s", quern_node_say(root, say));
+		return;
+	}
+	read_general(s, root);
+	publish_scene(s);
+	bool failed = false;
+	for (const quern_section_name *names = quern_section_names; names->section; names++) {
+		const quern_entry *entry = quern_node_entry(root, names->section);
+		if (!entry || quern_node_is_null(entry->value) || !wanted(s, names->section)) continue;
+		const size_t before = s->n_sections;
+		quern_section_read(s, names, entry);
+		failed = failed || s->n_sections == before;
+	}
+	if (!failed) check_sections(s, root->mark);
+	static const quern_slot observe = { .name = "observe", .kind = QUERN_OBSERVER, .list = 1 };
+	s->observe.slot = &observe;
+	s->observe.path = quern_copy("observe");
+	quern_slot_fill(s, &s->observe, quern_node_find(root, "observe"), root->mark);
+}
+
+static quern_scene *create(const quern_host *host) {
+	quern_scene *s = quern_take(1, sizeof *s);
+	s->host = host;
+	s->report = quern_report_create();
+	s->units = quern_units_create();
+	s->loader = quern_loader_create();
+	return s;
+}
+
+quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *host) {
+	quern_scene *s = create(host);
+	s->tree = quern_tree_read(path, s->report);
+	for (; sets && *sets && s->tree->root; sets++) quern_tree_set(s->tree, *sets, s->report);
+	resolve(s);
+	return s;
+}
+
+quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *host) {
+	quern_scene *s = create(host);
+	s->tree = quern_tree_parse(name, data, length, s->report);
+	resolve(s);
+	return s;
+}
+
+const quern_section *quern_scene_section(const quern_scene *s, const char *name) {
+	for (size_t i = 0; i < s->n_sections; i++)
+		if (!strcmp(s->sections[i].name, name)) return &s->sections[i];
+	return NULL;
+}
+
+void quern_scene_destroy(quern_scene *s) {
+	if (!s) return;
+	for (size_t i = 0; i < s->n_sections; i++) {
+		for (size_t k = 0; k < s->sections[i].n_slots; k++) quern_slot_finish(&s->sections[i].slots[k]);
+		free(s->sections[i].slots);
+	}
+	if (s->observe.slot) quern_slot_finish(&s->observe);
+	for (size_t i = s->n_instances; i-- > 0;) quern_instance_destroy(s->instances[i]);
+	for (size_t i = 0; i < s->n_defaults; i++) quern_tree_destroy(s->defaults[i]);
+	for (size_t i = 0; i < s->n_fields; i++) free(s->fields[i]);
+	free(s->instances);
+	free(s->defaults);
+	free(s->fields);
+	free(s->field_marks);
+	free(s->published);
+	quern_tree_destroy(s->tree);
+	quern_loader_destroy(s->loader);
+	quern_units_destroy(s->units);
+	quern_report_destroy(s->report);
+	free(s);
+}

@@ -1,0 +1,106 @@
+/* scene - a scene file read, checked and resolved: every section's solver, every slot's plugins, every default */
+#pragma once
+#include "loader.h"
+#include "param.h"
+
+/* One plugin with its parameters filled in. */
+typedef struct quern_instance {
+	const quern_plugin_file *file;
+	const quern_node *map; /* its parameters as the scene gives them, or NULL */
+	quern_mark mark;
+	char *path; /* "grains.contact" */
+	void *self;
+	bool ready; /* init has succeeded: finish is owed */
+} quern_instance;
+
+/* One entry of a slot: a plugin, the slot's own rows, and instances with another entry's overrides. */
+typedef struct quern_filling {
+	quern_instance *instance;
+	void *item;
+	quern_instance **variant; /* by entry of the overriding slot; NULL where nothing is overridden */
+	size_t n_variant;
+} quern_filling;
+
+typedef struct quern_slot_use {
+	const quern_slot *slot;
+	char *path;             /* "grains.contact" */
+	quern_filling *filling; /* same_as: those of that slot */
+	size_t n;
+	bool borrowed;
+} quern_slot_use;
+
+typedef struct quern_section {
+	const char *name; /* "grains" */
+	quern_node *node;
+	quern_mark mark;
+	quern_instance *solver;
+	const quern_solver_ops *ops;
+	quern_slot_use *slots;
+	size_t n_slots;
+} quern_section;
+
+/* What the core itself takes from a scene. */
+typedef struct quern_general {
+	int32_t version, dimension, seed, model, batch, instructions;
+	const char *name, *step_text;
+	quern_real gravity[3], lower[3], upper[3];
+	bool periodic[3];
+	quern_real end, every, checkpoint, step; /* s; step 0: auto */
+	bool force;
+	bool compress;
+} quern_general;
+
+typedef struct quern_scene {
+	quern_general general;
+	quern_report *report;
+	quern_units *units;
+	quern_loader *loader;
+	quern_tree *tree;
+	quern_tree **defaults; /* slots filled by their `def` */
+	size_t n_defaults, defaults_capacity;
+	quern_section sections[8];
+	size_t n_sections;
+	quern_slot_use observe;
+	char **fields; /* output.fields */
+	quern_mark *field_marks;
+	size_t n_fields;
+	quern_published *published;
+	size_t n_published, published_capacity;
+	quern_instance **instances;
+	size_t n_instances, instances_capacity;
+	const quern_host *host;
+} quern_scene;
+
+/* Reads and resolves; faults are in scene->report. `sets` are the --set options, NULL-terminated. Never NULL. */
+quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *);
+quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *);
+void quern_scene_destroy(quern_scene *);
+
+/* The scene with every default written out, in SI, as YAML; free() it. */
+char *quern_scene_resolved(const quern_scene *);
+/* The rows of the core's own keys, for schema and describe. */
+extern const quern_param quern_general_rows[];
+/* Sections and the solver that reads each by default, NULL-name terminated. */
+typedef struct quern_section_name {
+	const char *section, *solver;
+} quern_section_name;
+extern const quern_section_name quern_section_names[];
+
+const quern_section *quern_scene_section(const quern_scene *, const char *name);
+/* FNV-1a over the resolved text, without what does not change the result (name, output folder, end) */
+uint64_t quern_hash(const void *data, size_t length);
+/* What rows of this scene are read with. */
+quern_reading quern_scene_reading(const quern_scene *);
+/* The set-up record that every init gets. */
+quern_setup quern_scene_setup(const quern_scene *, const char *path);
+
+/* The services of the set-up phase; core/host.c puts them into the table. */
+struct quern_err {
+	quern_report *report;
+	const quern_node *map;
+	quern_mark mark;
+	const char *owner;
+};
+quern_status quern_scene_fail(quern_err *, quern_status, const char *param, const char *fmt, ...)
+	__attribute__((format(printf, 4, 5)));
+void quern_scene_publish(const quern_setup *, const char *name, const char *unit, quern_real value);

@@ -1,0 +1,384 @@
+#include "section.h"
+#include "text.h"
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- instances ---- */
+
+static quern_instance *instance_create(
+	quern_scene *s, const quern_plugin_file *file, const quern_node *map, quern_mark mark, const char *path) {
+	quern_instance *it = quern_take(1, sizeof *it);
+	const size_t size = (file->plugin.instance_size + 127u) & ~(size_t)63;
+	it->file = file;
+	it->map = map;
+	it->mark = mark;
+	it->path = quern_copy(path);
+	it->self = aligned_alloc(64, size);
+	if (!it->self) abort();
+	memset(it->self, 0, size);
+	s->instances = quern_grow(s->instances, s->n_instances, &s->instances_capacity, sizeof(it));
+	s->instances[s->n_instances++] = it;
+	return it;
+}
+
+static void instance_read(quern_scene *s, quern_instance *it, const char *const *also) {
+	const quern_reading r = quern_scene_reading(s);
+	if (!(it->file->plugin.dims & (s->general.dimension == 2 ? QUERN_2D : QUERN_3D)))
+		quern_report_add(s->report, it->mark, "%s does not work in %d dimensions", it->file->plugin.id,
+			s->general.dimension);
+	quern_params_read(&r, it->file->plugin.id, it->file->params, it->map, it->mark, also, it->self);
+}
+
+/* A faulty parameter must not reach init, which may rely on the ranges of its rows. */
+static void instance_init(quern_scene *s, quern_instance *it, size_t errors_before) {
+	if (quern_report_errors(s->report) != errors_before) return;
+	if (it->file->plugin.init) {
+		quern_err err = { s->report, it->map, it->mark, it->file->plugin.id };
+		const quern_setup setup = quern_scene_setup(s, it->path);
+		if (it->file->plugin.init(it->self, &setup, &err) != QUERN_OK) {
+			if (quern_report_errors(s->report) == errors_before)
+				quern_report_add(s->report, it->mark, "%s: cannot be set up", it->file->plugin.id);
+			return;
+		}
+	}
+	it->ready = true;
+}
+
+/* ---- slots ---- */
+
+typedef struct {
+	const char *name;
+	quern_node *map;
+	quern_mark mark;
+} choice;
+
+/* A plugin in a scene is a bare name, or a map of one name to its parameters. */
+static size_t choices_of(
+	quern_scene *s, const char *path, quern_node *node, bool list, choice **out, const char *kind) {
+	size_t n = 0, capacity = 0;
+	char say[64];
+	*out = NULL;
+	if (node->kind == QUERN_NODE_SCALAR) {
+		*out = quern_grow(*out, n, &capacity, sizeof(choice));
+		(*out)[n++] = (choice) { node->text, NULL, node->mark };
+	} else if (node->kind == QUERN_NODE_MAP) {
+		if (node->n != 1 && !list)
+			quern_report_add(
+				s->report, node->mark, "%s: one %s is wanted here, found %zu", path, kind, node->n);
+		for (size_t i = 0; i < node->n && (list || node->n == 1); i++) {
+			*out = quern_grow(*out, n, &capacity, sizeof(choice));
+			(*out)[n++] = (choice) { node->entries[i].key,
+				quern_node_is_null(node->entries[i].value) ? NULL : node->entries[i].value,
+				node->entries[i].mark };
+		}
+	} else if (!list) {
+		quern_report_add(s->report, node->mark, "%s: one %s is wanted here, not %s", path, kind,
+			quern_node_say(node, say));
+	} else {
+		for (size_t i = 0; i < node->n; i++) {
+			quern_node *item = node->entries[i].value;
+			choice *one = NULL;
+			if (item->kind == QUERN_NODE_LIST || (item->kind == QUERN_NODE_MAP && item->n != 1)) {
+				quern_report_add(
+					s->report, item->mark, "%s: an entry is a name, or one name with its parameters", path);
+				continue;
+			}
+			if (choices_of(s, path, item, false, &one, kind) == 1) {
+				*out = quern_grow(*out, n, &capacity, sizeof(choice));
+				(*out)[n++] = *one;
+			}
+			free(one);
+		}
+	}
+	return n;
+}
+
+static const char **first_parts(const quern_param *rows, size_t *n, const char **list, size_t *capacity) {
+	for (; rows && rows->name; rows++) {
+		list = quern_grow(list, *n + 1, capacity, sizeof(char *));
+		list[(*n)++] = rows->name;
+	}
+	return list;
+}
+
+static bool opened_by(const quern_param *rows, const char *key) {
+	const size_t n = strlen(key);
+	for (; rows && rows->name; rows++)
+		if (!strncmp(rows->name, key, n) && (!rows->name[n] || rows->name[n] == '.')) return true;
+	return false;
+}
+
+/* An entry's map holds the plugin's keys, the slot's own and those that override another slot. */
+static void read_entry(quern_scene *s, const quern_slot *slot, quern_filling *f) {
+	quern_instance *it = f->instance;
+	const char **also = NULL;
+	size_t n = 0, capacity = 0;
+	also = first_parts(slot->rows, &n, also, &capacity);
+	for (size_t i = 0; i < n; i++) { /* first parts alone: what lies deeper is the slot's to check */
+		const char *dot = strchr(also[i], '.');
+		if (dot)
+			for (size_t k = 0; it->map && it->map->kind == QUERN_NODE_MAP && k < it->map->n; k++)
+				if (!strncmp(it->map->entries[k].key, also[i], (size_t)(dot - also[i])) &&
+					!it->map->entries[k].key[dot - also[i]])
+					also[i] = it->map->entries[k].key;
+	}
+	also = quern_grow(also, n + 2, &capacity, sizeof(char *));
+	if (slot->override) also[n++] = strchr(slot->override, '.') + 1;
+	also[n] = NULL;
+	instance_read(s, it, also);
+	if (slot->rows) {
+		const quern_reading r = quern_scene_reading(s);
+		const bool map = it->map && it->map->kind == QUERN_NODE_MAP;
+		size_t m = 0;
+		for (size_t i = 0; map && i < it->map->n; i++)
+			if (!opened_by(slot->rows, it->map->entries[i].key)) {
+				also = quern_grow(also, m + 1, &capacity, sizeof(char *));
+				also[m++] = it->map->entries[i].key;
+			}
+		also = quern_grow(also, m, &capacity, sizeof(char *));
+		also[m] = NULL;
+		f->item = quern_take(1, slot->item_size);
+		quern_params_read(&r, it->file->plugin.id, slot->rows, map ? it->map : NULL, it->mark, also, f->item);
+	}
+	free(also);
+}
+
+static void add_filling(quern_scene *s, quern_slot_use *use, const choice *c, quern_kind kind) {
+	if (!c->name) return;
+	const quern_plugin_file *file = quern_loader_find(s->loader, kind, c->name, s->report, c->mark);
+	if (!file) return;
+	use->filling = realloc(use->filling, (use->n + 1) * sizeof(quern_filling));
+	if (!use->filling) abort();
+	quern_filling *f = &use->filling[use->n++];
+	*f = (quern_filling) { .instance = instance_create(s, file, c->map, c->mark, use->path) };
+	const size_t before = quern_report_errors(s->report);
+	read_entry(s, use->slot, f);
+	instance_init(s, f->instance, before);
+}
+
+static quern_node *default_node(quern_scene *s, const char *text, quern_mark mark) {
+	quern_tree *tree = quern_tree_parse("default", text, strlen(text), s->report);
+	s->defaults = quern_grow(s->defaults, s->n_defaults, &s->defaults_capacity, sizeof(tree));
+	s->defaults[s->n_defaults++] = tree;
+	if (tree->root) tree->root->mark = mark;
+	for (size_t i = 0; tree->root && i < tree->root->n; i++) tree->root->entries[i].mark = mark;
+	return tree->root;
+}
+
+static const quern_slot_use *find_slot(const quern_scene *s, const char *path) {
+	for (size_t i = 0; i < s->n_sections; i++)
+		for (size_t k = 0; k < s->sections[i].n_slots; k++)
+			if (!strcmp(s->sections[i].slots[k].path, path)) return &s->sections[i].slots[k];
+	return NULL;
+}
+
+void quern_slot_fill(quern_scene *s, quern_slot_use *use, quern_node *node, quern_mark mark) {
+	const quern_slot *slot = use->slot;
+	if (!node && slot->def) node = default_node(s, slot->def, mark);
+	if (!node && !slot->list)
+		quern_report_add(s->report, mark, "%s is missing: %s", use->path, slot->doc ? slot->doc : "");
+	if (!node) return;
+	choice *choices;
+	const size_t n = choices_of(s, use->path, node, slot->list, &choices, quern_kind_name(slot->kind));
+	for (size_t i = 0; i < n; i++) add_filling(s, use, &choices[i], slot->kind);
+	free(choices);
+}
+
+/* "fill.packer": one plugin for each item of the solver's list "fill". */
+static void fill_items(quern_scene *s, quern_section *section, quern_slot_use *use) {
+	const char *dot = strchr(use->slot->name, '.');
+	char *list_name = quern_copy(use->slot->name);
+	list_name[dot - use->slot->name] = 0;
+	const quern_param *row = quern_param_find(section->solver->file->params, list_name);
+	quern_node *node = quern_node_find(section->node, list_name);
+	const quern_list *list =
+		row ? (const quern_list *)(const void *)((char *)section->solver->self + row->offset) : NULL;
+	for (uint32_t i = 0; list && i < list->n; i++) {
+		quern_node *item = node && node->kind == QUERN_NODE_LIST ? node->entries[i].value : node;
+		quern_slot_fill(s, use, quern_node_find(item, dot + 1), item ? item->mark : section->mark);
+	}
+	free(list_name);
+}
+
+/* A key of another slot's entry, such as a body's `contact`, gives every plugin here a second instance. */
+static void fill_variants(quern_scene *s, quern_slot_use *use) {
+	const quern_slot_use *other = NULL;
+	for (size_t i = 0; i < s->n_sections && !other; i++)
+		for (size_t k = 0; k < s->sections[i].n_slots; k++)
+			if (s->sections[i].slots[k].slot->override && !s->sections[i].slots[k].borrowed &&
+				!strcmp(s->sections[i].slots[k].slot->override, use->path))
+				other = &s->sections[i].slots[k];
+	const char *key = strchr(use->path, '.');
+	for (size_t j = 0; other && j < use->n; j++) {
+		quern_filling *f = &use->filling[j];
+		f->n_variant = other->n;
+		f->variant = quern_take(other->n, sizeof(quern_instance *));
+	}
+	for (size_t b = 0; other && b < other->n; b++) {
+		const quern_node *given = quern_node_find(other->filling[b].instance->map, key + 1);
+		char say[64];
+		if (!given) continue;
+		if (given->kind != QUERN_NODE_MAP) {
+			quern_report_add(s->report, given->mark,
+				"%s here must be a map of parameters to override, not %s", key + 1,
+				quern_node_say(given, say));
+			continue;
+		}
+		for (size_t e = 0; e < given->n; e++) {
+			bool known = false;
+			for (size_t j = 0; j < use->n; j++)
+				known = known || opened_by(use->filling[j].instance->file->params, given->entries[e].key);
+			if (!known && use->n) { /* let the first plugin say what it takes */
+				const quern_reading r = quern_scene_reading(s);
+				const quern_node one = { .kind = QUERN_NODE_MAP, .entries = &given->entries[e], .n = 1 };
+				quern_params_check(&r, use->filling[0].instance->file->plugin.id,
+					use->filling[0].instance->file->params, &one, NULL);
+			}
+		}
+		for (size_t j = 0; j < use->n; j++) {
+			quern_instance *base = use->filling[j].instance;
+			quern_tree *keep = quern_take(1, sizeof *keep);
+			s->defaults = quern_grow(s->defaults, s->n_defaults, &s->defaults_capacity, sizeof(keep));
+			s->defaults[s->n_defaults++] = keep;
+			keep->root = quern_node_create(QUERN_NODE_MAP);
+			quern_node_merge(keep->root, base->map);
+			bool any = false;
+			for (size_t e = 0; e < given->n; e++)
+				if (opened_by(base->file->params, given->entries[e].key)) {
+					quern_node_merge_entry(keep->root, &given->entries[e]);
+					any = true;
+				}
+			if (!any) continue;
+			quern_instance *it = instance_create(s, base->file, keep->root, given->mark, use->path);
+			const size_t before = quern_report_errors(s->report);
+			instance_read(s, it, NULL);
+			instance_init(s, it, before);
+			use->filling[j].variant[b] = it;
+		}
+	}
+}
+
+/* ---- sections ---- */
+
+static const char **section_also(const quern_solver_ops *ops, size_t *n) {
+	const char **also = NULL;
+	size_t capacity = 0;
+	*n = 0;
+	for (const quern_slot *slot = ops->slots; slot && slot->name; slot++) {
+		if (slot->same_as || !*slot->name) continue;
+		also = quern_grow(also, *n + 2, &capacity, sizeof(char *));
+		also[(*n)++] = slot->name;
+	}
+	also = quern_grow(also, *n + 1, &capacity, sizeof(char *));
+	also[(*n)++] = "solver";
+	also[*n] = NULL;
+	return also;
+}
+
+static void section_ready(quern_scene *s, quern_section *section) {
+	if (!section->ops->ready || quern_report_errors(s->report)) return;
+	const quern_setup setup = quern_scene_setup(s, section->name);
+	quern_err err = { s->report, section->node, section->mark, section->solver->file->plugin.id };
+	const quern_bound **slots = quern_take(section->n_slots, sizeof(*slots));
+	uint32_t *counts = quern_take(section->n_slots, sizeof(uint32_t));
+	for (size_t k = 0; k < section->n_slots; k++) {
+		const quern_slot_use *use = &section->slots[k];
+		quern_bound *bound = quern_take(use->n, sizeof(quern_bound));
+		for (size_t i = 0; i < use->n; i++) {
+			const quern_filling *f = &use->filling[i];
+			bound[i] = (quern_bound) { .self = f->instance->self,
+				.ops = f->instance->file->plugin.ops,
+				.item = f->item,
+				.uses = f->instance->file->uses,
+				.n_uses = (uint32_t)f->instance->file->n_uses,
+				.id = f->instance->file->plugin.id,
+				.path = use->path,
+				.n_variant = (uint32_t)f->n_variant };
+			const void **variant = quern_take(f->n_variant, sizeof(void *));
+			for (size_t v = 0; v < f->n_variant; v++)
+				variant[v] = f->variant[v] ? f->variant[v]->self : f->instance->self;
+			bound[i].variant = variant;
+		}
+		slots[k] = bound;
+		counts[k] = (uint32_t)use->n;
+	}
+	if (section->ops->ready(section->solver->self, &setup, slots, counts, &err) != QUERN_OK &&
+		!quern_report_errors(s->report))
+		quern_report_add(s->report, section->mark, "%s: cannot be set up", section->name);
+	for (size_t k = 0; k < section->n_slots; k++) {
+		for (size_t i = 0; i < counts[k]; i++) free((void *)(uintptr_t)slots[k][i].variant);
+		free((void *)(uintptr_t)slots[k]);
+	}
+	free(slots);
+	free(counts);
+}
+
+void quern_section_read(quern_scene *s, const quern_section_name *names, const quern_entry *entry) {
+	quern_node *node = entry->value;
+	const bool map = node->kind == QUERN_NODE_MAP;
+	const quern_node *swap = map ? quern_node_find(node, "solver") : NULL;
+	const char *name = swap && swap->kind == QUERN_NODE_SCALAR ? swap->text : names->solver;
+	const quern_plugin_file *file =
+		quern_loader_find(s->loader, QUERN_SOLVER, name, s->report, swap ? swap->mark : entry->mark);
+	if (!file) return;
+	quern_section *section = &s->sections[s->n_sections++];
+	*section = (quern_section) {
+		.name = names->section, .node = node, .mark = entry->mark, .ops = file->plugin.ops
+	};
+	section->solver = instance_create(s, file, map ? node : NULL, entry->mark, names->section);
+	for (const quern_slot *slot = section->ops->slots; slot && slot->name; slot++) section->n_slots++;
+	section->slots = quern_take(section->n_slots, sizeof(quern_slot_use));
+	bool is_list = false; /* the section is itself the list of its one slot */
+	for (size_t k = 0; k < section->n_slots; k++) {
+		quern_slot_use *use = &section->slots[k];
+		use->slot = &section->ops->slots[k];
+		use->path = *use->slot->name ? quern_format("%s.%s", names->section, use->slot->name)
+									 : quern_copy(names->section);
+		is_list = is_list || !*use->slot->name;
+	}
+	char say[64];
+	if (!map && !is_list)
+		quern_report_add(
+			s->report, node->mark, "%s must be a map, not %s", names->section, quern_node_say(node, say));
+	size_t n;
+	const char **also = section_also(section->ops, &n);
+	const size_t before = quern_report_errors(s->report);
+	if (is_list) section->solver->map = NULL;
+	instance_read(s, section->solver, also);
+	instance_init(s, section->solver, before);
+	free(also);
+	for (size_t k = 0; k < section->n_slots; k++) {
+		quern_slot_use *use = &section->slots[k];
+		const quern_slot *slot = use->slot;
+		if (slot->same_as) {
+			const quern_slot_use *same = find_slot(s, slot->same_as);
+			use->borrowed = true;
+			if (same) use->filling = same->filling, use->n = same->n;
+		} else if (!*slot->name) quern_slot_fill(s, use, node, section->mark);
+		else if (strchr(slot->name, '.')) fill_items(s, section, use);
+		else quern_slot_fill(s, use, quern_node_find(node, slot->name), section->mark);
+		if (!slot->same_as) fill_variants(s, use);
+	}
+	section_ready(s, section);
+}
+
+void quern_slot_finish(quern_slot_use *use) {
+	free(use->path);
+	if (use->borrowed) return;
+	for (size_t i = 0; i < use->n; i++) {
+		free(use->filling[i].variant);
+		if (use->slot->rows && use->filling[i].item)
+			quern_params_finish(use->slot->rows, use->filling[i].item);
+		free(use->filling[i].item);
+	}
+	free(use->filling);
+}
+
+void quern_instance_destroy(quern_instance *it) {
+	if (!it) return;
+	if (it->ready && it->file->plugin.finish) it->file->plugin.finish(it->self);
+	quern_params_finish(it->file->params, it->self);
+	free(it->self);
+	free(it->path);
+	free(it);
+}

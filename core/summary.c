@@ -1,0 +1,133 @@
+#include "summary.h"
+#include "config.h"
+#include "h5.h"
+#include "text.h"
+#include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+
+/* JSON has no NaN: what is not a number is null. */
+static json_t *number(double x) { return isfinite(x) ? json_real(x) : json_null(); }
+
+static json_t *vector(const double *x, uint32_t dim) {
+	json_t *list = json_array();
+	for (uint32_t k = 0; k < dim; k++) json_array_append_new(list, number(x[k]));
+	return list;
+}
+
+static json_t *hash(uint64_t value) {
+	char text[20];
+	snprintf(text, sizeof text, "%016llx", (unsigned long long)value);
+	return json_string(text);
+}
+
+static json_t *stages(const quern_run *run) {
+	json_t *map = json_object();
+	for (size_t o = 0; o < run->plan->n_stages; o++) {
+		const quern_plan_stage *stage = &run->plan->stages[run->plan->order[o]];
+		if (stage->stage) json_object_set_new(map, stage->name, number(stage->seconds));
+	}
+	return map;
+}
+
+static json_t *plugins(const quern_run *run) {
+	json_t *list = json_array();
+	for (size_t i = 0; i < quern_loader_count(run->scene->loader); i++) {
+		const quern_plugin_file *f = quern_loader_at(run->scene->loader, i);
+		json_t *one = json_object();
+		json_object_set_new(one, "id", json_string(f->plugin.id));
+		json_object_set_new(one, "version", json_string(f->library->version));
+		json_object_set_new(one, "file", json_string(f->path));
+		json_object_set_new(one, "hash", hash(f->hash));
+		json_array_append_new(list, one);
+	}
+	return list;
+}
+
+static void observers(json_t *root, const quern_series *s) {
+	for (size_t c = 0; c < s->n; c++) {
+		const quern_observed *o = &s->column[c];
+		const char *dot = strchr(o->name, '.');
+		if (!dot) continue;
+		char *owner = quern_copy(o->name);
+		owner[dot - o->name] = 0;
+		json_t *map = json_object_get(root, owner);
+		if (!map) json_object_set_new(root, owner, map = json_object());
+		json_t *one = json_object();
+		json_object_set_new(one, "unit", json_string(o->unit));
+		json_object_set_new(one, "first", number(o->first));
+		json_object_set_new(one, "last", number(o->last));
+		json_object_set_new(one, "mean", number(o->n ? o->sum / (double)o->n : NAN));
+		json_object_set_new(one, "min", number(o->least));
+		json_object_set_new(one, "max", number(o->most));
+		json_object_set_new(map, dot + 1, one);
+		free(owner);
+	}
+}
+
+static double mean_of(const quern_series *s, const char *name, double otherwise) {
+	for (size_t c = 0; c < s->n; c++)
+		if (!strcmp(s->column[c].name, name) && s->column[c].n)
+			return s->column[c].sum / (double)s->column[c].n;
+	return otherwise;
+}
+
+static json_t *provenance(const quern_run *run) {
+	char *resolved = quern_scene_resolved(run->scene);
+	json_t *p = json_object();
+	json_object_set_new(p, "program", json_string("quern " QUERN_VERSION));
+	json_object_set_new(p, "compiler", json_string(QUERN_COMPILER));
+	json_object_set_new(p, "flags", json_string(QUERN_FLAGS));
+	json_object_set_new(p, "scene_hash", hash(quern_hash(resolved, strlen(resolved))));
+	json_object_set_new(p, "seed", json_integer(run->scene->general.seed));
+	json_object_set_new(p, "plugins", plugins(run));
+	free(resolved);
+	return p;
+}
+
+bool quern_summary_write(
+	quern_run *run, const quern_series *series, const char *status, double wall, char why[256]) {
+	const quern_account a = quern_run_account(run);
+	const uint32_t dim = (uint32_t)run->scene->general.dimension;
+	struct rusage usage;
+	getrusage(RUSAGE_SELF, &usage);
+	json_t *root = json_object();
+	json_object_set_new(root, "status", json_string(status));
+	if (run->message) json_object_set_new(root, "message", json_string(run->message));
+	json_object_set_new(root, "name", json_string(run->scene->general.name));
+	json_object_set_new(root, "steps", json_integer(run->clock.step));
+	json_object_set_new(root, "substeps", json_integer(run->clock.substep));
+	json_object_set_new(root, "settle_steps", json_integer(run->clock.settle_step));
+	json_object_set_new(root, "time_end", number(quern_run_time(run)));
+	json_object_set_new(root, "time_step", number(run->clock.dt));
+	json_object_set_new(root, "step_limited_by", json_string(run->limit_reason));
+	json_object_set_new(root, "wall_seconds", number(wall));
+	json_object_set_new(root, "settle_seconds", number(run->settle_wall));
+	json_object_set_new(root, "threads", json_integer(quern_pool_workers(run->pool)));
+	json_object_set_new(root, "grains", json_integer(quern_host_table.set(run, "grain").n));
+	json_object_set_new(root, "points", json_integer(quern_host_table.set(run, "point").n));
+	json_object_set_new(root, "grain_steps", json_integer(run->clock.grain_steps));
+	json_object_set_new(root, "point_steps", json_integer(run->clock.point_steps));
+	json_object_set_new(root, "seconds_by_stage", stages(run));
+	json_object_set_new(root, "mass_initial", number(run->mass_initial));
+	json_object_set_new(root, "mass_final", number(a.mass));
+	json_object_set_new(root, "mass_ledger", number(a.owed));
+	json_object_set_new(root, "mass_defect", number((a.mass + a.owed) / run->mass_initial - 1));
+	json_object_set_new(root, "invariant_defect", number(a.defect));
+	json_object_set_new(root, "momentum", vector(a.momentum, dim));
+	json_object_set_new(root, "energy", number(a.kinetic + a.potential + a.elastic));
+	json_object_set_new(root, "discrete_share",
+		number(mean_of(series, "discrete_share.share", a.mass > 0 ? a.discrete / a.mass : NAN)));
+	json_object_set_new(root, "peak_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024));
+	observers(root, series);
+	json_object_set_new(root, "provenance", provenance(run));
+	char *text = json_dumps(root, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(17));
+	char *path = quern_format("%s/summary.json", run->folder);
+	const bool good = text && quern_save_bytes(path, text, strlen(text), why);
+	free(path);
+	free(text);
+	json_decref(root);
+	return good;
+}

@@ -1,0 +1,498 @@
+#include "tree.h"
+#include "text.h"
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <yaml.h>
+
+/* A scene is written by hand: these limits are far above any, and keep alias bombs and binary files harmless. */
+enum { MAX_DEPTH = 32, MAX_NODES = 200000, MAX_BYTES = 16 << 20 };
+
+typedef struct {
+	char *name;
+	quern_node *node;
+} anchor;
+
+typedef struct {
+	yaml_parser_t yaml;
+	quern_report *report;
+	const char *file;
+	bool option; /* text of the command line: marks carry no line */
+	anchor *anchors;
+	size_t n_anchors, anchors_capacity, n_nodes;
+	bool failed;
+} reader;
+
+void quern_node_destroy(quern_node *node) {
+	if (!node) return;
+	for (size_t i = 0; i < node->n; i++) {
+		free(node->entries[i].key);
+		quern_node_destroy(node->entries[i].value);
+	}
+	free(node->entries);
+	free(node->text);
+	free(node);
+}
+
+static quern_mark mark_of(const reader *r, yaml_mark_t mark) {
+	if (r->option) return (quern_mark) { .file = r->file };
+	return (quern_mark) { r->file, mark.line + 1, mark.column + 1 };
+}
+
+static quern_node *fail(reader *r, quern_mark mark, const char *message) {
+	if (!r->failed) quern_report_add(r->report, mark, "%s", message);
+	r->failed = true;
+	return NULL;
+}
+
+static quern_node *take_node(reader *r, quern_node_kind kind, quern_mark mark) {
+	if (++r->n_nodes > MAX_NODES)
+		return fail(r, mark, "the scene has more than 200000 values, aliases counted");
+	quern_node *node = quern_take(1, sizeof *node);
+	node->kind = kind;
+	node->mark = mark;
+	return node;
+}
+
+static quern_node *copy(reader *r, const quern_node *old) {
+	quern_node *node = take_node(r, old->kind, old->mark);
+	if (!node) return NULL;
+	node->quoted = old->quoted;
+	if (old->text) node->text = quern_copy(old->text);
+	for (size_t i = 0; i < old->n; i++) {
+		quern_node *value = copy(r, old->entries[i].value);
+		if (!value) return quern_node_destroy(node), NULL;
+		node->entries = quern_grow(node->entries, node->n, &node->capacity, sizeof(quern_entry));
+		node->entries[node->n++] = (quern_entry) {
+			.key = old->entries[i].key ? quern_copy(old->entries[i].key) : NULL,
+			.mark = old->entries[i].mark,
+			.value = value,
+		};
+	}
+	return node;
+}
+
+static bool next(reader *r, yaml_event_t *event) {
+	if (yaml_parser_parse(&r->yaml, event)) return true;
+	if (!r->failed) {
+		const yaml_mark_t at = r->yaml.problem ? r->yaml.problem_mark : r->yaml.context_mark;
+		quern_report_add(r->report, mark_of(r, at), "not valid YAML: %s%s%s",
+			r->yaml.problem ? r->yaml.problem : "unreadable", r->yaml.context ? ", " : "",
+			r->yaml.context ? r->yaml.context : "");
+	}
+	r->failed = true;
+	return false;
+}
+
+static quern_node *value(reader *r, yaml_event_t *event, int depth);
+
+static bool duplicate(reader *r, const quern_node *map, const char *key, quern_mark mark) {
+	for (size_t i = 0; i < map->n; i++)
+		if (!strcmp(map->entries[i].key, key)) {
+			quern_report_add(r->report, mark, "'%s' stands twice in this map; first at line %zu: remove one",
+				key, map->entries[i].mark.line);
+			return true;
+		}
+	return false;
+}
+
+static bool children(reader *r, quern_node *node, int depth) {
+	const bool map = node->kind == QUERN_NODE_MAP;
+	for (;;) {
+		yaml_event_t event;
+		char *key = NULL;
+		quern_mark mark;
+		if (!next(r, &event)) return false;
+		mark = mark_of(r, event.start_mark);
+		if (event.type == (map ? YAML_MAPPING_END_EVENT : YAML_SEQUENCE_END_EVENT))
+			return yaml_event_delete(&event), true;
+		if (map) {
+			if (event.type != YAML_SCALAR_EVENT) {
+				yaml_event_delete(&event);
+				return fail(r, mark, "a key must be a word") != NULL;
+			}
+			key = quern_copy((const char *)event.data.scalar.value);
+			yaml_event_delete(&event);
+			if (!next(r, &event)) return free(key), false;
+		}
+		quern_node *child = value(r, &event, depth + 1);
+		if (!child) return free(key), false;
+		if (map && duplicate(r, node, key, mark)) {
+			free(key);
+			quern_node_destroy(child);
+			continue;
+		}
+		node->entries = quern_grow(node->entries, node->n, &node->capacity, sizeof(quern_entry));
+		node->entries[node->n++] = (quern_entry) { key, mark, child };
+	}
+}
+
+static void remember(reader *r, const yaml_char_t *name, quern_node *node) {
+	if (!name || !node) return;
+	r->anchors = quern_grow(r->anchors, r->n_anchors, &r->anchors_capacity, sizeof(anchor));
+	r->anchors[r->n_anchors++] = (anchor) { quern_copy((const char *)name), node };
+}
+
+static quern_node *alias(reader *r, const char *name, quern_mark mark) {
+	for (size_t i = r->n_anchors; i-- > 0;)
+		if (!strcmp(r->anchors[i].name, name)) return copy(r, r->anchors[i].node);
+	if (!r->failed) quern_report_add(r->report, mark, "'*%s' names no anchor that stands before it", name);
+	r->failed = true;
+	return NULL;
+}
+
+/* Takes over the event. */
+static quern_node *value(reader *r, yaml_event_t *event, int depth) {
+	const quern_mark mark = mark_of(r, event->start_mark);
+	quern_node *node = NULL;
+	if (depth > MAX_DEPTH) fail(r, mark, "nested deeper than 32 levels");
+	else switch (event->type) {
+		case YAML_ALIAS_EVENT: node = alias(r, (const char *)event->data.alias.anchor, mark); break;
+		case YAML_SCALAR_EVENT:
+			node = take_node(r, QUERN_NODE_SCALAR, mark);
+			if (!node) break;
+			if (strlen((const char *)event->data.scalar.value) != event->data.scalar.length) {
+				quern_node_destroy(node);
+				node = fail(r, mark, "a value with a zero byte in it");
+				break;
+			}
+			node->text = quern_copy((const char *)event->data.scalar.value);
+			node->quoted = event->data.scalar.style != YAML_PLAIN_SCALAR_STYLE;
+			remember(r, event->data.scalar.anchor, node);
+			break;
+		case YAML_SEQUENCE_START_EVENT:
+		case YAML_MAPPING_START_EVENT:
+			node = take_node(
+				r, event->type == YAML_MAPPING_START_EVENT ? QUERN_NODE_MAP : QUERN_NODE_LIST, mark);
+			if (node && !children(r, node, depth)) {
+				quern_node_destroy(node);
+				node = NULL;
+			}
+			/* remembered only when complete, so an alias inside its own anchor finds nothing */
+			remember(r,
+				event->type == YAML_MAPPING_START_EVENT ? event->data.mapping_start.anchor
+														: event->data.sequence_start.anchor,
+				node);
+			break;
+		default: fail(r, mark, "the scene ends too early"); break;
+		}
+	yaml_event_delete(event);
+	return node;
+}
+
+static quern_node *document(reader *r) {
+	quern_node *root = NULL;
+	for (bool more = true; more && !r->failed;) {
+		yaml_event_t event;
+		if (!next(r, &event)) break;
+		const quern_mark mark = mark_of(r, event.start_mark);
+		switch (event.type) {
+		case YAML_STREAM_END_EVENT:
+			more = false;
+			yaml_event_delete(&event);
+			break;
+		case YAML_STREAM_START_EVENT:
+		case YAML_DOCUMENT_START_EVENT:
+			if (root && event.type == YAML_DOCUMENT_START_EVENT)
+				fail(r, mark, "a second document: a scene is one document");
+			yaml_event_delete(&event);
+			break;
+		case YAML_DOCUMENT_END_EVENT: yaml_event_delete(&event); break;
+		default: root = value(r, &event, 0); break;
+		}
+	}
+	for (size_t i = 0; i < r->n_anchors; i++) free(r->anchors[i].name);
+	free(r->anchors);
+	if (r->failed) {
+		quern_node_destroy(root);
+		root = NULL;
+	}
+	return root;
+}
+
+const char *quern_tree_keep(quern_tree *tree, const char *name) {
+	tree->names = quern_grow(tree->names, tree->n_names, &tree->names_capacity, sizeof(char *));
+	return tree->names[tree->n_names++] = quern_copy(name);
+}
+
+static quern_node *parse(
+	quern_tree *tree, const char *name, const char *data, size_t length, bool option, quern_report *report) {
+	reader r = { .report = report, .file = quern_tree_keep(tree, name), .option = option };
+	if (!yaml_parser_initialize(&r.yaml)) return NULL;
+	yaml_parser_set_input_string(&r.yaml, (const unsigned char *)data, length);
+	quern_node *root = document(&r);
+	yaml_parser_delete(&r.yaml);
+	return root;
+}
+
+quern_tree *quern_tree_parse(const char *name, const char *data, size_t length, quern_report *report) {
+	quern_tree *tree = quern_take(1, sizeof *tree);
+	tree->root = parse(tree, name, data, length, false, report);
+	if (!tree->root && !quern_report_errors(report))
+		quern_report_add(report, (quern_mark) { .file = tree->names[0] }, "the scene is empty");
+	return tree;
+}
+
+quern_tree *quern_tree_read(const char *path, quern_report *report) {
+	quern_text text = { 0 };
+	char buffer[65536];
+	FILE *file = fopen(path, "rb");
+	if (!file) {
+		quern_report_add(report, (quern_mark) { .file = path }, "cannot be opened: %s", strerror(errno));
+		return quern_take(1, sizeof(quern_tree));
+	}
+	size_t n;
+	while (text.length <= MAX_BYTES && (n = fread(buffer, 1, sizeof buffer, file)) > 0) {
+		text.data = quern_grow(text.data, text.length + n, &text.capacity, 1);
+		memcpy(text.data + text.length, buffer, n);
+		text.length += n;
+	}
+	const bool unreadable = ferror(file);
+	const int why = errno;
+	fclose(file);
+	quern_tree *tree = NULL;
+	if (unreadable || text.length > MAX_BYTES) {
+		quern_report_add(report, (quern_mark) { .file = path }, "cannot be read: %s",
+			unreadable ? strerror(why) : "it is larger than 16 MiB, so it is no scene");
+		tree = quern_take(1, sizeof(quern_tree));
+	} else tree = quern_tree_parse(path, text.data ? text.data : "", text.length, report);
+	quern_text_finish(&text);
+	return tree;
+}
+
+void quern_tree_destroy(quern_tree *tree) {
+	if (!tree) return;
+	quern_node_destroy(tree->root);
+	for (size_t i = 0; i < tree->n_names; i++) free(tree->names[i]);
+	free(tree->names);
+	free(tree);
+}
+
+bool quern_node_is_null(const quern_node *node) {
+	if (!node || node->kind != QUERN_NODE_SCALAR || node->quoted) return !node;
+	return !*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null");
+}
+
+const quern_entry *quern_node_entry(const quern_node *map, const char *key) {
+	if (!map || map->kind != QUERN_NODE_MAP) return NULL;
+	for (size_t i = 0; i < map->n; i++)
+		if (!strcmp(map->entries[i].key, key)) return &map->entries[i];
+	return NULL;
+}
+
+quern_node *quern_node_find(const quern_node *map, const char *key) {
+	const quern_entry *entry = quern_node_entry(map, key);
+	return entry && !quern_node_is_null(entry->value) ? entry->value : NULL;
+}
+
+const char *quern_node_say(const quern_node *node, char buffer[64]) {
+	if (quern_node_is_null(node)) return "nothing";
+	if (node->kind == QUERN_NODE_MAP) return "a map";
+	if (node->kind == QUERN_NODE_LIST) return "a list";
+	snprintf(buffer, 64, "'%.40s%s'", node->text, strlen(node->text) > 40 ? "..." : "");
+	return buffer;
+}
+
+/* One step of a path: the entry of that name or index, made if it is a map's new key. NULL: no such item. */
+static quern_entry *descend(quern_node *node, const char *key, quern_mark mark) {
+	if (node->kind == QUERN_NODE_LIST) {
+		char *end;
+		const unsigned long k = strtoul(key, &end, 10);
+		return *key && !*end && k < node->n ? &node->entries[k] : NULL;
+	}
+	if (node->kind == QUERN_NODE_SCALAR) { /* a plugin's bare name is opened: affine -> {affine: {}} */
+		const bool bare = !strcmp(node->text, key);
+		if (!bare && !quern_node_is_null(node)) return NULL;
+		free(node->text);
+		node->text = NULL;
+		node->kind = QUERN_NODE_MAP;
+	}
+	const quern_entry *found = quern_node_entry(node, key);
+	if (!found) {
+		quern_node *empty = quern_take(1, sizeof *empty);
+		empty->mark = mark;
+		empty->text = quern_copy("");
+		node->entries = quern_grow(node->entries, node->n, &node->capacity, sizeof(quern_entry));
+		node->entries[node->n++] = (quern_entry) { quern_copy(key), mark, empty };
+		found = &node->entries[node->n - 1];
+	}
+	return &node->entries[found - node->entries];
+}
+
+void quern_tree_set(quern_tree *tree, const char *assignment, quern_report *report) {
+	const char *equals = strchr(assignment, '=');
+	char *option = quern_format("--set %s", assignment);
+	const quern_mark mark = { .file = quern_tree_keep(tree, option) };
+	free(option);
+	if (!equals || equals == assignment) {
+		quern_report_add(report, mark, "is not of the form path.to.key=value");
+		return;
+	}
+	if (!tree->root) return;
+	char *path = quern_copy(assignment), *rest = path, *key;
+	path[equals - assignment] = 0;
+	quern_node *node = tree->root;
+	quern_entry *entry = NULL;
+	while ((key = strsep(&rest, "."))) {
+		entry = descend(node, key, mark);
+		if (!entry) {
+			char say[64];
+			quern_report_add(report, mark, "'%s' cannot be reached: above it stands %s%s", key,
+				quern_node_say(node, say),
+				node->kind == QUERN_NODE_LIST ? " (name its items by number, from 0)" : "");
+			free(path);
+			return;
+		}
+		node = entry->value;
+	}
+	quern_node *given = parse(tree, mark.file, equals + 1, strlen(equals + 1), true, report);
+	if (!given && !quern_report_errors(report)) { /* an empty value is null */
+		given = quern_take(1, sizeof *given);
+		given->mark = mark;
+		given->text = quern_copy("");
+	}
+	if (given) {
+		entry->mark = mark;
+		quern_node_destroy(entry->value);
+		entry->value = given;
+	}
+	free(path);
+}
+
+/* ---- building and writing ---- */
+
+quern_node *quern_node_create(quern_node_kind kind) {
+	quern_node *node = quern_take(1, sizeof *node);
+	node->kind = kind;
+	return node;
+}
+
+static quern_node *attach(quern_node *parent, const char *key, quern_node *child) {
+	parent->entries = quern_grow(parent->entries, parent->n, &parent->capacity, sizeof(quern_entry));
+	parent->entries[parent->n++] = (quern_entry) { .key = key ? quern_copy(key) : NULL, .value = child };
+	return child;
+}
+
+static quern_node *put(quern_node *map, const char *name, quern_node *child) {
+	char part[64];
+	for (;;) {
+		const size_t n = strcspn(name, ".");
+		snprintf(part, sizeof part, "%.*s", (int)n, name);
+		if (!name[n]) return attach(map, part, child);
+		const quern_entry *entry = quern_node_entry(map, part);
+		if (entry && entry->value->kind != QUERN_NODE_MAP) { /* a choice gives way to the map beside it */
+			quern_node *value = entry->value;
+			free(value->text);
+			value->text = NULL;
+			value->kind = QUERN_NODE_MAP;
+		}
+		map = entry ? entry->value : attach(map, part, quern_node_create(QUERN_NODE_MAP));
+		name += n + 1;
+	}
+}
+
+quern_node *quern_node_put(quern_node *map, const char *name, const char *text) {
+	quern_node *node = quern_node_create(QUERN_NODE_SCALAR);
+	node->text = quern_copy(text);
+	return put(map, name, node);
+}
+
+quern_node *quern_node_put_quoted(quern_node *map, const char *name, const char *text) {
+	quern_node *node = quern_node_put(map, name, text);
+	node->quoted = true;
+	return node;
+}
+
+quern_node *quern_node_put_list(quern_node *map, const char *name) {
+	return put(map, name, quern_node_create(QUERN_NODE_LIST));
+}
+
+quern_node *quern_node_put_map(quern_node *map, const char *name) {
+	return put(map, name, quern_node_create(QUERN_NODE_MAP));
+}
+
+quern_node *quern_node_append(quern_node *list, const char *text) {
+	quern_node *node = quern_node_create(QUERN_NODE_SCALAR);
+	node->text = quern_copy(text);
+	return attach(list, NULL, node);
+}
+
+quern_node *quern_node_append_map(quern_node *list) {
+	return attach(list, NULL, quern_node_create(QUERN_NODE_MAP));
+}
+
+static quern_node *clone(const quern_node *old) {
+	quern_node *node = quern_node_create(old->kind);
+	node->quoted = old->quoted;
+	node->mark = old->mark;
+	if (old->text) node->text = quern_copy(old->text);
+	for (size_t i = 0; i < old->n; i++) {
+		attach(node, old->entries[i].key, clone(old->entries[i].value));
+		node->entries[i].mark = old->entries[i].mark;
+	}
+	return node;
+}
+
+void quern_node_merge_entry(quern_node *map, const quern_entry *entry) {
+	const quern_entry *found = quern_node_entry(map, entry->key);
+	if (found && found->value->kind == QUERN_NODE_MAP && entry->value->kind == QUERN_NODE_MAP) {
+		quern_node_merge(found->value, entry->value);
+	} else if (found) {
+		quern_entry *mine = &map->entries[found - map->entries];
+		quern_node_destroy(mine->value);
+		mine->value = clone(entry->value);
+		mine->mark = entry->mark;
+	} else {
+		attach(map, entry->key, clone(entry->value));
+		map->entries[map->n - 1].mark = entry->mark;
+	}
+}
+
+void quern_node_merge(quern_node *map, const quern_node *over) {
+	for (size_t i = 0; over && over->kind == QUERN_NODE_MAP && i < over->n; i++)
+		quern_node_merge_entry(map, &over->entries[i]);
+}
+
+static void print_scalar(const quern_node *node, quern_text *out) {
+	if (!node->quoted) {
+		quern_text_add(out, "%s", node->text);
+		return;
+	}
+	quern_text_add(out, "\"");
+	for (const char *c = node->text; *c; c++)
+		if (*c == '"' || *c == '\\') quern_text_add(out, "\\%c", *c);
+		else if ((unsigned char)*c < 32) quern_text_add(out, "\\x%02x", (unsigned)*c);
+		else quern_text_add(out, "%c", *c);
+	quern_text_add(out, "\"");
+}
+
+static bool is_flat(const quern_node *node) {
+	for (size_t i = 0; i < node->n; i++)
+		if (node->entries[i].value->kind != QUERN_NODE_SCALAR) return false;
+	return node->kind == QUERN_NODE_LIST;
+}
+
+void quern_node_print(const quern_node *node, int indent, quern_text *out) {
+	if (node->kind == QUERN_NODE_SCALAR) {
+		print_scalar(node, out);
+		return;
+	}
+	if (!node->n || is_flat(node)) {
+		quern_text_add(out, node->kind == QUERN_NODE_LIST ? "[" : "{");
+		for (size_t i = 0; i < node->n; i++) {
+			if (i) quern_text_add(out, ", ");
+			print_scalar(node->entries[i].value, out);
+		}
+		quern_text_add(out, node->kind == QUERN_NODE_LIST ? "]" : "}");
+		return;
+	}
+	for (size_t i = 0; i < node->n; i++) {
+		const quern_node *child = node->entries[i].value;
+		if (i || out->length) quern_text_add(out, "\n%*s", 2 * indent, "");
+		if (node->kind == QUERN_NODE_LIST) quern_text_add(out, "-");
+		else quern_text_add(out, "%s:", node->entries[i].key);
+		if (child->kind == QUERN_NODE_SCALAR || !child->n || is_flat(child)) quern_text_add(out, " ");
+		quern_node_print(child, indent + 1, out);
+	}
+}
