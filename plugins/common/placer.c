@@ -1,0 +1,159 @@
+#include "placer.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uint32_t hash(const int32_t c[3]) {
+	return ((uint32_t)c[0] * 73856093u) ^ ((uint32_t)c[1] * 19349663u) ^ ((uint32_t)c[2] * 83492791u);
+}
+
+quern_status quern_placer_init(placer *p, uint32_t dim, const quern_real lower[3], const quern_real upper[3],
+	const bool periodic[3], quern_real most) {
+	*p = (placer) { .dim = dim, .n_heads = 1024 };
+	for (uint32_t k = 0; k < 3; k++) {
+		p->cell[k] = 2 * most;
+		if (k >= dim) continue;
+		p->lower[k] = lower[k];
+		p->length[k] = upper[k] - lower[k];
+		p->periodic[k] = periodic[k];
+		if (!periodic[k]) continue;
+		const quern_real cells = floor(p->length[k] / p->cell[k]);
+		p->wrap[k] = cells < 1 ? 1 : (int32_t)cells;
+		p->cell[k] = p->length[k] / p->wrap[k];
+	}
+	p->head = malloc(p->n_heads * sizeof(int32_t));
+	if (!p->head) return QUERN_E_MEMORY;
+	memset(p->head, 0xff, p->n_heads * sizeof(int32_t));
+	return QUERN_OK;
+}
+
+void quern_placer_finish(placer *p) {
+	if (!p) return;
+	free(p->spot);
+	free(p->next);
+	free(p->head);
+	*p = (placer) { 0 };
+}
+
+static int32_t cell_of(const placer *p, uint32_t k, quern_real x) {
+	const int32_t c = (int32_t)floor((x - p->lower[k]) / p->cell[k]);
+	if (!p->periodic[k]) return c;
+	const int32_t m = c % p->wrap[k];
+	return m < 0 ? m + p->wrap[k] : m;
+}
+
+static void link_spot(placer *p, uint32_t i) {
+	int32_t c[3] = { 0 };
+	for (uint32_t k = 0; k < p->dim; k++) c[k] = cell_of(p, k, p->spot[i].x[k]);
+	int32_t *head = &p->head[hash(c) & (p->n_heads - 1)];
+	p->next[i] = *head;
+	*head = (int32_t)i;
+}
+
+static void grow(placer *p) {
+	const uint32_t cap = p->cap ? p->cap * 2 : 1024;
+	quern_spot *spot = realloc(p->spot, cap * sizeof(quern_spot));
+	if (spot) p->spot = spot;
+	int32_t *next = realloc(p->next, cap * sizeof(int32_t));
+	if (next) p->next = next;
+	int32_t *head = realloc(p->head, (size_t)cap * 2 * sizeof(int32_t));
+	if (head) p->head = head;
+	p->failed = p->failed || !spot || !next || !head;
+	if (p->failed) return;
+	p->cap = cap;
+	p->n_heads = cap * 2;
+	memset(p->head, 0xff, p->n_heads * sizeof(int32_t));
+	for (uint32_t i = 0; i < p->n; i++) link_spot(p, i);
+}
+
+void quern_placer_add(placer *p, const quern_spot *s) {
+	if (p->n == p->cap) grow(p);
+	if (p->failed) return;
+	p->spot[p->n] = *s;
+	link_spot(p, p->n++);
+}
+
+static quern_real nearest_image(const placer *p, uint32_t k, quern_real d) {
+	if (!p->periodic[k]) return d;
+	return d - p->length[k] * floor(d / p->length[k] + 0.5);
+}
+
+static bool overlaps(const placer *p, const quern_spot *a, const quern_spot *b) {
+	quern_real d2 = 0;
+	for (uint32_t k = 0; k < p->dim; k++) {
+		const quern_real d = nearest_image(p, k, a->x[k] - b->x[k]);
+		d2 += d * d;
+	}
+	const quern_real reach = (a->radius + b->radius) - 1e-9 * a->radius;
+	return d2 < reach * reach;
+}
+
+static bool meets_body(const placer *p, const quern_spot *s) {
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	_Alignas(64) quern_real x[3][QUERN_LANES] = { { 0 } }, radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES],
+							normal[3][QUERN_LANES], velocity[3][QUERN_LANES];
+	for (uint32_t k = 0; k < 3; k++) x[k][0] = s->x[k];
+	radius[0] = s->radius;
+	for (uint32_t b = 0; b < p->n_bodies; b++) {
+		const quern_body_batch batch = { .n = 1,
+			.cap = QUERN_LANES,
+			.dim = p->dim,
+			.pose = &still,
+			.position = { x[0], x[1], x[2] },
+			.radius = radius,
+			.gap = gap,
+			.normal = { normal[0], normal[1], normal[2] },
+			.velocity = { velocity[0], velocity[1], velocity[2] } };
+		((const quern_body_ops *)p->body[b].ops)->closest(p->body[b].self, &batch);
+		if (gap[0] < -1e-9 * s->radius) return true;
+	}
+	return false;
+}
+
+/* Cells are at least a largest diameter wide, so only the nearest ones can hold a neighbour. Along a short periodic
+ * axis two offsets may name the same cell; looking twice does no harm. */
+bool quern_placer_free(const placer *p, const quern_spot *s) {
+	const int depth = p->dim == 3 ? 1 : 0;
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -1; y <= 1; y++)
+			for (int x = -1; x <= 1; x++) {
+				const int offset[3] = { x, y, z };
+				int32_t c[3] = { 0 };
+				for (uint32_t k = 0; k < p->dim; k++) c[k] = cell_of(p, k, s->x[k] + offset[k] * p->cell[k]);
+				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i])
+					if (overlaps(p, s, &p->spot[i])) return false;
+			}
+	return !meets_body(p, s);
+}
+
+uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const quern_real upper[3],
+	quern_real reach, quern_spot *out, uint32_t cap) {
+	uint32_t n = 0;
+	int32_t count[3] = { 1, 1, 1 };
+	for (uint32_t k = 0; k < p->dim; k++) {
+		count[k] = (int32_t)ceil((upper[k] - lower[k] + 2 * reach) / p->cell[k]) + 1;
+		if (p->periodic[k] && count[k] > p->wrap[k]) count[k] = p->wrap[k];
+	}
+	for (int32_t z = 0; z < count[2]; z++)
+		for (int32_t y = 0; y < count[1]; y++)
+			for (int32_t x = 0; x < count[0]; x++) {
+				const int32_t offset[3] = { x, y, z };
+				int32_t c[3] = { 0 };
+				for (uint32_t k = 0; k < p->dim; k++)
+					c[k] = cell_of(p, k, lower[k] - reach + offset[k] * p->cell[k]);
+				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i]) {
+					quern_spot s = p->spot[i];
+					bool near = true;
+					for (uint32_t k = 0; k < p->dim; k++) {
+						if (cell_of(p, k, s.x[k]) != c[k]) near = false; /* another cell of the same hash */
+						const quern_real middle = 0.5 * (lower[k] + upper[k]);
+						s.x[k] = middle + nearest_image(p, k, s.x[k] - middle);
+						near = near && s.x[k] >= lower[k] - reach && s.x[k] <= upper[k] + reach;
+					}
+					if (!near) continue;
+					if (n < cap) out[n] = s;
+					n++;
+				}
+			}
+	return n;
+}

@@ -1,0 +1,31 @@
+/* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
+#pragma once
+#include <quern/abi.h>
+
+typedef struct placer {
+	uint32_t dim;
+	bool periodic[3];
+	quern_real lower[3], length[3]; /* of the domain; length matters along periodic axes */
+	quern_real cell[3];             /* m, at least the largest diameter */
+	int32_t wrap[3];                /* cells along a periodic axis */
+	quern_spot *spot;
+	int32_t *next;
+	uint32_t n, cap;
+	int32_t *head;
+	uint32_t n_heads;        /* a power of two */
+	const quern_bound *body; /* bodies that grains must not touch */
+	uint32_t n_bodies;
+	bool failed; /* memory ran out */
+} placer;
+
+/* `most`: the largest radius that will ever be added or asked for. */
+quern_status quern_placer_init(placer *, uint32_t dim, const quern_real lower[3], const quern_real upper[3],
+	const bool periodic[3], quern_real most);
+void quern_placer_finish(placer *);
+void quern_placer_add(placer *, const quern_spot *);
+/* No overlap with grains or bodies above 1e-9 of the spot's radius. */
+bool quern_placer_free(const placer *, const quern_spot *);
+/* Appends to `out` (capacity `cap`) the grains whose centre is within `reach` of the box; along periodic axes as the
+ * image nearest to it. Returns how many there are. */
+uint32_t quern_placer_near(const placer *, const quern_real lower[3], const quern_real upper[3],
+	quern_real reach, quern_spot *out, uint32_t cap);

@@ -1,0 +1,151 @@
+/* contact.linear - spring and dashpot, with a tangential spring and dashpot under a Coulomb cone.
+ * docs/theory/contacts.md, section 2. Start here to write a law of your own. */
+#include <quern/contact.h>
+
+typedef struct {
+	quern_real stiffness, restitution, friction, tangential_stiffness,
+		tangential_damping; /* from the scene */
+	quern_real loss;        /* gamma_n = loss sqrt(k m) */
+} linear;
+
+static const quern_param params[] = { QUERN_PARAM(linear, stiffness, "N/m", "Normal spring k_n.",
+										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e15),
+	QUERN_PARAM(linear, restitution, "1", "Normal restitution of a pair, exact for any masses.", .def = 0.5,
+		.min = 0.01, .max = 1),
+	QUERN_PARAM(linear, friction, "1", "Coulomb coefficient; 0: no slip, no spin.", .def = 0.5, .max = 10),
+	QUERN_PARAM(linear, tangential_stiffness, "1", "k_t / k_n; the default gives both directions one period.",
+		.def = 2.0 / 7, .planar = 1.0 / 3, .flags = QUERN_PLANAR | QUERN_MIN_OPEN, .max = 10),
+	QUERN_PARAM(linear, tangential_damping, "1", "gamma_t / gamma_n.", .def = 2.0 / 7, .planar = 1.0 / 3,
+		.flags = QUERN_PLANAR, .max = 10),
+	QUERN_END_PARAMS };
+
+enum { SLIP, SPIN };
+static const quern_use uses[] = { { .field = "contact.slip",
+									  .unit = "m",
+									  .doc = "Tangential spring; 2-D: along the normal turned left.",
+									  .access = QUERN_UPDATE,
+									  .shape = QUERN_AXIAL,
+									  .when = "friction" },
+	{ .field = "grain.spin",
+		.unit = "rad/s",
+		.doc = "Angular velocity; a frictional contact turns its grains.",
+		.access = QUERN_READ,
+		.shape = QUERN_AXIAL,
+		.flags = QUERN_OTHERS,
+		.when = "friction" },
+	QUERN_END_USES };
+
+static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
+	linear *law = self;
+	(void)setup, (void)err;
+	law->loss = 2 * quern_damping_ratio(law->restitution);
+	return QUERN_OK;
+}
+
+/* `dim`, `rough` and `energy` are constants in every caller, so dead branches vanish and names stay in the debugger. */
+QUERN_INLINE void kernel(
+	const int dim, const bool rough, const bool energy, const linear *self, const quern_contact_batch *b) {
+	const linear law = *self;
+	const quern_real dt = b->dt, kn = law.stiffness, kt = law.tangential_stiffness * kn, one_over_kt = 1 / kt;
+	const quern_real *restrict overlap = b->overlap, *restrict mass = b->mass;
+	quern_real *const *slip = rough ? b->use[SLIP].real : NULL;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < b->n; i++) {
+		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim);
+		const quern_real d = overlap[i], vn = quern_vec_dot(v, n, dim);
+		const bool touching = d > 0;
+		const quern_onset onset = quern_first_touch(d, -vn, dt, 0);
+		const quern_real damping = law.loss * __builtin_sqrt(kn * mass[i]) * onset.weight;
+		/* f_n = max(0, k_n d - gamma_n v_n) */
+		const quern_real pushed = kn * d - damping * vn, fn = (touching & (pushed > 0)) ? pushed : 0;
+		quern_vec f = quern_vec_scale(fn, n), viscous = quern_vec_scale(fn - (touching ? kn * d : 0), n);
+		quern_real sheared = 0, rubbed = 0;
+		if (rough && dim == 3) {
+			/* xi' = v_t in the tangent plane; |k_t s xi + gamma_t v_t| = mu f_n */
+			const quern_vec vt = quern_vec_axpy(-vn, n, v);
+			const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { slip[0][i], slip[1][i], slip[2][i] };
+			const quern_vec was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
+			const quern_vec trial = quern_vec_axpy(onset.time, vt, was);
+			const quern_vec a = quern_vec_scale(kt, trial),
+							g = quern_vec_scale(law.tangential_damping * damping, vt);
+			const quern_cone cone = quern_cone_shares(a, g, law.friction * fn);
+			const quern_vec now = quern_vec_scale(touching ? cone.spring : 0, trial);
+			const quern_vec drag = quern_vec_scale(touching ? cone.damper : 0, g);
+			QUERN_VEC_PUT(slip, i, now, 3);
+			f = quern_vec_sub(f, quern_vec_axpy(kt, now, drag));
+			viscous = quern_vec_sub(viscous, drag);
+			sheared = 0.5 * kt * quern_vec_dot(now, now, 3);
+			const quern_vec slid = quern_vec_sub(trial, now);
+			rubbed = touching ? 0.5 * kt * quern_vec_dot(quern_vec_add(was, now), slid, 3) : 0;
+		}
+		if (rough && dim == 2) { /* the same along the one tangent (-n_y, n_x) */
+			const quern_real vt = n.x * v.y - n.y * v.x, was = slip[0][i], trial = was + onset.time * vt;
+			quern_real spring;
+			const quern_real total = quern_cone_planar(
+				kt * trial, law.tangential_damping * damping * vt, law.friction * fn, &spring);
+			const quern_real now = touching ? spring * one_over_kt : 0, ft = touching ? total : 0;
+			slip[0][i] = now;
+			f.x += ft * n.y;
+			f.y -= ft * n.x;
+			viscous.x += (ft - kt * now) * n.y;
+			viscous.y -= (ft - kt * now) * n.x;
+			sheared = 0.5 * kt * now * now;
+			rubbed = touching ? 0.5 * kt * (was + now) * (trial - now) : 0;
+		}
+		b->force[0][i] += f.x;
+		b->force[1][i] += f.y;
+		if (dim == 3) b->force[2][i] += f.z;
+		if (energy) {
+			b->dashpot[0][i] += viscous.x;
+			b->dashpot[1][i] += viscous.y;
+			if (dim == 3) b->dashpot[2][i] += viscous.z;
+			b->stored[i] += touching ? 0.5 * kn * d * d : 0;
+			b->sheared[i] += sheared;
+			b->rubbed[i] += rubbed;
+		}
+	}
+}
+
+QUERN_INLINE void force(const int dim, const void *self, const quern_contact_batch *b) {
+	const bool rough = ((const linear *)self)->friction > 0;
+	if (b->stored) {
+		if (rough) kernel(dim, true, true, self, b);
+		else kernel(dim, false, true, self, b);
+	} else if (rough) kernel(dim, true, false, self, b);
+	else kernel(dim, false, false, self, b);
+}
+static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }
+static void force_3d(const void *self, const quern_contact_batch *b) { force(3, self, b); }
+
+/* pi/omega of the stiffest mode; rotation makes a tangential spring act on m/3 (discs) or m/3.5 (spheres). */
+static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_real radius) {
+	const linear *law = self;
+	(void)radius;
+	const quern_real turning = law->friction > 0 ? (dim == 2 ? 3 : 3.5) * law->tangential_stiffness : 0;
+	return 3.14159265358979312 * __builtin_sqrt(mass / (law->stiffness * (turning > 1 ? turning : 1)));
+}
+
+static quern_real stiffness(const void *self, uint32_t dim, quern_real radius, quern_real at_force) {
+	(void)dim, (void)radius, (void)at_force;
+	return ((const linear *)self)->stiffness;
+}
+
+static const quern_contact_ops ops = {
+	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .stiffness = stiffness
+};
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_CONTACT,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "contact.linear",
+	.brief = "Linear spring and dashpot with Coulomb friction.",
+	.doc = "The normal force is never attractive, and the restitution asked for is the one that is found, "
+		   "for any "
+		   "pair of masses.",
+	.cite = "Cundall & Strack 1979; Schwager & Poeschel 2007",
+	.instance_size = sizeof(linear),
+	.params = params,
+	.uses = uses,
+	.init = init,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,0 +1,116 @@
+/* dem - the grain solver's own parameters and the rows of its stages, shared by its source files */
+#pragma once
+#include "../bodies/bodies.h"
+#include "../common/radius.h"
+#include "../common/tools.h"
+
+typedef struct dem {
+	quern_real density, skin, drag, rest; /* from the scene */
+	radius_law radii;
+	quern_list fill, place;
+	const char *file;
+	int32_t settle_most;
+	bool fixed; /* some grains do not move */
+	bool settles;
+	quern_real reach; /* m, of the laws beyond touching */
+	uint32_t dim;
+} dem;
+
+typedef struct dem_fill {
+	quern_real lower[3], upper[3], velocity[3];
+	bool settle, fixed;
+} dem_fill;
+
+typedef struct dem_place {
+	quern_real position[3], velocity[3], spin[3], radius;
+	bool fixed;
+} dem_place;
+
+/* slots, in the order of the solver's table */
+enum { SLOT_CONTACT, SLOT_NEIGHBOURS, SLOT_INTEGRATOR, SLOT_BODIES, SLOT_PACKER };
+
+/* rows of dem.fill */
+enum {
+	FILL_POSITION,
+	FILL_VELOCITY,
+	FILL_RADIUS,
+	FILL_MASS,
+	FILL_SPIN,
+	FILL_WEIGHT,
+	FILL_FIXED,
+	FILL_ID,
+	FILL_DISPLACEMENT
+};
+/* rows of dem.open */
+enum { OPEN_POSITION, OPEN_VELOCITY, OPEN_SPIN, OPEN_ANCHOR, OPEN_FIXED, OPEN_DISPLACEMENT };
+/* rows of dem.neighbours */
+enum {
+	NEAR_POSITION,
+	NEAR_RADIUS,
+	NEAR_ID,
+	NEAR_FIXED,
+	NEAR_DISPLACEMENT,
+	NEAR_ANCHOR,
+	NEAR_FIRST,
+	NEAR_SECOND,
+	NEAR_GRAIN,
+	NEAR_BODY
+};
+/* rows of dem.forces */
+enum {
+	FORCE_OLD_POSITION,
+	FORCE_OLD_VELOCITY,
+	FORCE_OLD_SPIN,
+	FORCE_POSITION,
+	FORCE_VELOCITY,
+	FORCE_SPIN,
+	FORCE_RADIUS,
+	FORCE_MASS,
+	FORCE_WEIGHT,
+	FORCE_FIXED,
+	FORCE_ANCHOR,
+	FORCE_DISPLACEMENT,
+	FORCE_FIRST,
+	FORCE_SECOND,
+	FORCE_GRAIN,
+	FORCE_BODY,
+	FORCE_CONTACT,
+	FORCE_TOUCH,
+	FORCE_SUM,
+	FORCE_IMPULSE,
+	FORCE_SUPPORT,
+	FORCE_CONTACT_SHEARED,
+	FORCE_TOUCH_SHEARED,
+	FORCE_KINETIC,
+	FORCE_POTENTIAL,
+	FORCE_STORED,
+	FORCE_SHEARED,
+	FORCE_DAMPED,
+	FORCE_RUBBED,
+	FORCE_ID
+};
+
+/* disc or sphere */
+QUERN_INLINE quern_real dem_mass(quern_real density, quern_real radius, uint32_t dim) {
+	const quern_real area = 3.141592653589793 * radius * radius;
+	return density * (dim == 2 ? area : 4.0 / 3 * area * radius);
+}
+/* moment of inertia over mass times radius squared */
+QUERN_INLINE quern_real dem_inertia(uint32_t dim) { return dim == 2 ? 0.5 : 0.4; }
+
+quern_status quern_dem_fill(const void *self, const quern_step *);
+quern_status quern_dem_open(const void *self, const quern_step *);
+quern_status quern_dem_neighbours(const void *self, const quern_step *);
+quern_status quern_dem_forces(const void *self, const quern_step *);
+bool quern_dem_settled(const void *self, const quern_step *);
+
+/* ---- grain_file.c ---- */
+typedef struct grain_table {
+	dem_place *grain;
+	uint32_t n, cap;
+} grain_table;
+/* Reads "x y [z] radius ..." columns; on a fault returns false with one sentence in `why`. Velocities, spins and
+ * `fixed` may be left out; a missing radius is NaN. */
+bool quern_grain_table_read(const char *data, size_t length, uint32_t dim, grain_table *, char why[200]);
+bool quern_grain_table_load(const char *path, uint32_t dim, grain_table *, char why[200]);
+void quern_grain_table_finish(grain_table *);

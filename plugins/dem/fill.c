@@ -1,0 +1,232 @@
+/* fill - the first grains: packed cell by cell, given one by one, or read from a table; and when they have settled */
+#include "../common/placer.h"
+#include "dem.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+	const dem *d;
+	const quern_step *step;
+	placer placer;
+	dem_place *grain;
+	uint32_t n, cap;
+	uint64_t draws;
+	const dem_fill *item;
+	quern_real lower[3], upper[3]; /* of the cell that is being filled */
+	bool last[3]; /* the cell ends the region along this axis: its upper face belongs to it */
+	bool failed;
+} filling;
+
+static void add(filling *f, const dem_place *grain) {
+	if (f->n == f->cap) {
+		f->cap = f->cap ? 2 * f->cap : 1024;
+		dem_place *grown = realloc(f->grain, f->cap * sizeof(dem_place));
+		if (!grown) {
+			f->failed = true;
+			return;
+		}
+		f->grain = grown;
+	}
+	f->grain[f->n++] = *grain;
+	quern_spot spot = { .radius = grain->radius };
+	for (uint32_t k = 0; k < f->d->dim; k++) spot.x[k] = grain->position[k];
+	quern_placer_add(&f->placer, &spot);
+}
+
+static quern_real job_radius(quern_pack_job *job) {
+	const filling *f = job->scene;
+	return quern_radius_draw(&f->d->radii, job->host, f->draws);
+}
+
+static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
+	const filling *f = job->scene;
+	for (uint32_t k = 0; k < f->d->dim; k++)
+		if (x[k] < f->lower[k] || (f->last[k] ? x[k] > f->upper[k] : x[k] >= f->upper[k])) return false;
+	return true;
+}
+
+static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
+	return quern_placer_free(&((const filling *)job->scene)->placer, spot);
+}
+
+static bool job_place(quern_pack_job *job, const quern_spot *spot) {
+	filling *f = job->scene;
+	dem_place grain = { .radius = spot->radius, .fixed = f->item->fixed };
+	for (uint32_t k = 0; k < f->d->dim; k++)
+		grain.position[k] = spot->x[k], grain.velocity[k] = f->item->velocity[k];
+	add(f, &grain);
+	f->draws++;
+	return !f->failed && !f->placer.failed;
+}
+
+static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
+	enum { MOST = 4096 };
+	quern_spot *seed = malloc(MOST * sizeof(quern_spot));
+	if (!seed) {
+		f->failed = true;
+		return;
+	}
+	quern_pack_job job = { .dim = f->d->dim,
+		.stream = f->d->radii.stream + 1,
+		.key = key,
+		.host = f->step->host,
+		.seed = seed,
+		.radius = job_radius,
+		.inside = job_inside,
+		.free = job_free,
+		.place = job_place,
+		.scene = f };
+	memcpy(job.lower, f->lower, sizeof job.lower);
+	memcpy(job.upper, f->upper, sizeof job.upper);
+	/* a new grain can touch what is as far as its own radius and the other's */
+	const quern_real reach = 4 * quern_radius_most(&f->d->radii);
+	const uint32_t n = quern_placer_near(&f->placer, f->lower, f->upper, reach, seed, MOST);
+	job.n_seed = n < MOST ? n : MOST;
+	const quern_packer_ops *ops = packer->ops;
+	ops->pack[f->d->dim - 2](packer->self, &job);
+	free(seed);
+}
+
+/* Cells of about two diameters, along gravity last, so that the packing grows upwards as it would by pouring. */
+static void fill_region(filling *f, const dem_fill *item, const quern_bound *packer, uint64_t key) {
+	const uint32_t dim = f->d->dim;
+	uint32_t count[3] = { 1, 1, 1 };
+	f->item = item;
+	for (uint32_t k = 0; k < dim; k++) {
+		const quern_real cells = (item->upper[k] - item->lower[k]) / (4 * f->d->radii.mean);
+		count[k] = cells > 1 ? (uint32_t)cells : 1;
+	}
+	for (uint32_t z = 0; z < count[2]; z++)
+		for (uint32_t y = 0; y < count[1]; y++)
+			for (uint32_t x = 0; x < count[0] && !f->failed; x++) {
+				const uint32_t at[3] = { x, y, z };
+				for (uint32_t k = 0; k < dim; k++) {
+					const quern_real width = (item->upper[k] - item->lower[k]) / count[k];
+					f->lower[k] = item->lower[k] + at[k] * width;
+					f->last[k] = at[k] + 1 == count[k];
+					f->upper[k] = f->last[k] ? item->upper[k] : item->lower[k] + (at[k] + 1) * width;
+				}
+				fill_cell(f, packer, key + ((uint64_t)z * count[1] + y) * count[0] + x);
+			}
+}
+
+static quern_status read_file(filling *f) {
+	char why[200];
+	grain_table table = { 0 };
+	if (!quern_grain_table_load(f->d->file, f->d->dim, &table, why)) {
+		quern_grain_table_finish(&table);
+		return f->step->host->stop(f->step->run, QUERN_E_PARAM, NULL, -1, "%s: %s", f->d->file, why);
+	}
+	for (uint32_t i = 0; i < table.n; i++) {
+		if (isnan(table.grain[i].radius)) table.grain[i].radius = f->d->radii.mean;
+		add(f, &table.grain[i]);
+	}
+	quern_grain_table_finish(&table);
+	return QUERN_OK;
+}
+
+static quern_status store(filling *f) {
+	const quern_step *s = f->step;
+	const uint32_t dim = f->d->dim;
+	int32_t *from = s->host->memory(s->run, ((size_t)f->n + 1) * sizeof(int32_t));
+	if (!from) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < f->n; i++) from[i] = -1;
+	const quern_status status = s->host->remap(s->run, "grain", f->n, from, 0, NULL);
+	if (status != QUERN_OK) return status;
+	const quern_column *use = s->use;
+	for (uint32_t i = 0; i < f->n; i++) {
+		const dem_place *g = &f->grain[i];
+		for (uint32_t k = 0; k < dim; k++) {
+			use[FILL_POSITION].real[k][i] = g->position[k];
+			use[FILL_VELOCITY].real[k][i] = g->fixed ? 0 : g->velocity[k];
+		}
+		for (uint32_t k = 0; use[FILL_SPIN].real[0] && k < (dim == 3 ? 3u : 1u); k++)
+			use[FILL_SPIN].real[k][i] = g->fixed ? 0 : g->spin[k];
+		use[FILL_RADIUS].real[0][i] = g->radius;
+		use[FILL_MASS].real[0][i] = dem_mass(f->d->density, g->radius, dim);
+		if (use[FILL_FIXED].index) use[FILL_FIXED].index[i] = g->fixed;
+	}
+	use[FILL_DISPLACEMENT].real[0][0] = INFINITY;
+	return QUERN_OK;
+}
+
+/* Widest radius that any source of grains may bring: the cells of the placer must hold it. */
+static quern_real widest(const dem *d) {
+	quern_real most = quern_radius_most(&d->radii);
+	const dem_place *place = d->place.items;
+	for (uint32_t i = 0; i < d->place.n; i++)
+		if (place[i].radius > most) most = place[i].radius;
+	return most;
+}
+
+static quern_status fill_all(filling *f) {
+	const quern_step *s = f->step;
+	const dem *d = f->d;
+	const dem_place *place = d->place.items;
+	const dem_fill *item = d->fill.items;
+	for (uint32_t i = 0; i < d->place.n; i++) {
+		dem_place grain = place[i];
+		if (isnan(grain.radius)) grain.radius = d->radii.mean;
+		add(f, &grain);
+	}
+	if (d->file) {
+		const quern_status status = read_file(f);
+		if (status != QUERN_OK) return status;
+	}
+	for (int fixed = 1; fixed >= 0; fixed--) /* floors first: what falls must find them */
+		for (uint32_t i = 0; i < d->fill.n; i++)
+			if (item[i].fixed == fixed)
+				fill_region(f, &item[i], &s->slot[SLOT_PACKER][i], (uint64_t)(i + 1) << 40);
+	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
+	if (!f->n)
+		return s->host->stop(
+			s->run, QUERN_E_PARAM, NULL, -1, "the fill places no grain: is its region too small?");
+	s->host->log(s->run, 0, "%u grains placed", f->n);
+	return store(f);
+}
+
+quern_status quern_dem_fill(const void *self, const quern_step *s) {
+	filling f = { .d = self, .step = s };
+	quern_status status =
+		quern_placer_init(&f.placer, f.d->dim, s->lower, s->upper, s->periodic, widest(f.d));
+	f.placer.body = s->slot[SLOT_BODIES];
+	f.placer.n_bodies = s->n_slot[SLOT_BODIES];
+	if (status == QUERN_OK) status = fill_all(&f);
+	quern_placer_finish(&f.placer);
+	free(f.grain);
+	return status;
+}
+
+/* At rest: the mean kinetic energy is small against m g d, looked at every 200 steps, and not before the grains had
+ * the time to fall by a diameter. */
+bool quern_dem_settled(const void *self, const quern_step *s) {
+	const dem *d = self;
+	const quern_set_view grains = s->host->set(s->run, "grain");
+	quern_real g2 = 0;
+	if (!d->settles || !grains.n) return true;
+	if (s->substep % 200) return false;
+	if (s->substep >= d->settle_most) {
+		s->host->log(
+			s->run, 2, "settling was cut off after %d steps: the grains are not at rest", d->settle_most);
+		return true;
+	}
+	for (uint32_t k = 0; k < d->dim; k++) g2 += s->gravity[k] * s->gravity[k];
+	const quern_real diameter = 2 * d->radii.mean, g = sqrt(g2), fall = 2 * sqrt(2 * diameter / g);
+	if ((quern_real)s->substep * s->dt < fall) return false;
+	const quern_real *mass = s->use[FILL_MASS].real[0];
+	const int32_t *fixed = s->use[FILL_FIXED].index;
+	quern_real *energy = s->host->memory(s->run, ((size_t)grains.n + 1) * sizeof(quern_real));
+	quern_real moving = 0;
+	if (!energy) return false;
+	for (uint32_t i = 0; i < grains.n; i++) {
+		quern_real v2 = 0;
+		if (fixed && fixed[i]) continue;
+		moving += mass[i];
+		for (uint32_t k = 0; k < d->dim; k++)
+			v2 += s->use[FILL_VELOCITY].real[k][i] * s->use[FILL_VELOCITY].real[k][i];
+		energy[i] = 0.5 * mass[i] * v2;
+	}
+	const quern_real mean = s->host->sum(s->run, grains.n, energy);
+	return mean <= d->rest * moving * g * diameter;
+}

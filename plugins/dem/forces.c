@@ -1,0 +1,238 @@
+/* forces - the stage that takes most of a run: block by block, distance test, laws, sums and integration.
+ *
+ * A block's grains are written by one worker alone. A pair inside a block is computed once; a pair across two blocks
+ * once in each, with the same operands in the same order, so both see the same force. Sums run in list order. */
+#include "forces.h"
+#include <math.h>
+#include <string.h>
+
+typedef struct {
+	char *at;
+} carver;
+
+static void *carve(carver *c, size_t bytes) {
+	void *memory = c->at;
+	c->at += (bytes + 127) & ~(size_t)63;
+	return memory;
+}
+
+static void carve_columns(carver *c, quern_real **column, uint32_t n, uint32_t cap) {
+	for (uint32_t k = 0; k < n; k++) column[k] = carve(c, cap * sizeof(quern_real));
+}
+
+/* Lays the columns out from `base`; with base NULL it only measures. Returns the bytes. */
+static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
+	carver c = { base };
+	const uint32_t cap = sh->cap, dim = sh->s->dim;
+	*w = (forces_work) { 0 };
+	carve_columns(&c, &w->overlap, 1, cap);
+	carve_columns(&c, w->normal, dim, cap);
+	carve_columns(&c, w->velocity, dim, cap);
+	carve_columns(&c, &w->radius, 1, cap);
+	carve_columns(&c, &w->mass, 1, cap);
+	carve_columns(&c, &w->weight, 1, cap);
+	carve_columns(&c, w->force, dim, cap);
+	carve_columns(&c, w->arm, 2, cap);
+	if (sh->spin) {
+		carve_columns(&c, w->spin, dim == 3 ? 3 : 1, cap);
+		carve_columns(&c, w->torque, dim == 3 ? 3 : 1, cap);
+		if (dim == 3) carve_columns(&c, w->turn, 3, cap);
+	}
+	if (sh->energy) {
+		carve_columns(&c, w->dashpot, dim, cap);
+		carve_columns(&c, &w->stored, 1, cap);
+		carve_columns(&c, &w->sheared, 1, cap);
+		carve_columns(&c, &w->rubbed, 1, cap);
+		if (sh->spin) carve_columns(&c, w->drag_torque, dim == 3 ? 3 : 1, cap);
+	}
+	for (uint32_t l = 0; l < sh->n_laws; l++) {
+		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
+		for (uint32_t r = 0; r < law->n_uses; r++) {
+			const uint32_t n = quern_shape_size(law->uses[r].shape, dim);
+			const bool own = !strncmp(law->uses[r].field, "contact.", 8);
+			carve_columns(&c, w->history[l][r], n, cap);
+			if (!own) carve_columns(&c, w->other[l][r], n, cap);
+		}
+	}
+	w->first = carve(&c, cap * sizeof(int32_t));
+	w->second = carve(&c, cap * sizeof(int32_t));
+	w->slot = carve(&c, cap * sizeof(int32_t));
+	carve_columns(&c, w->grains, 34, GRAINS);
+	w->row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
+	if (sh->energy) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
+	return (size_t)(c.at - base) + 64;
+}
+
+/* ---- forces_shared by pairs and touches ---- */
+
+void quern_dem_clear(const forces_shared *sh, const forces_work *w, uint32_t n) {
+	for (uint32_t k = 0; k < sh->s->dim; k++) {
+		memset(w->force[k], 0, n * sizeof(quern_real));
+		if (sh->energy) memset(w->dashpot[k], 0, n * sizeof(quern_real));
+	}
+	if (!sh->energy) return;
+	memset(w->stored, 0, n * sizeof(quern_real));
+	memset(w->sheared, 0, n * sizeof(quern_real));
+	memset(w->rubbed, 0, n * sizeof(quern_real));
+}
+
+bool quern_dem_is_history(const quern_use *row) { return !strncmp(row->field, "contact.", 8); }
+
+quern_contact_batch quern_dem_batch(const forces_shared *sh, const forces_work *w, uint32_t n) {
+	quern_contact_batch b = { .n = n,
+		.cap = sh->cap,
+		.dt = sh->s->dt,
+		.overlap = w->overlap,
+		.radius = w->radius,
+		.mass = w->mass,
+		.stored = w->stored,
+		.sheared = w->sheared,
+		.rubbed = w->rubbed };
+	for (uint32_t k = 0; k < 3; k++) {
+		b.normal[k] = w->normal[k];
+		b.velocity[k] = w->velocity[k];
+		b.spin[k] = w->spin[k];
+		b.turn[k] = w->turn[k];
+		b.force[k] = w->force[k];
+		b.dashpot[k] = w->dashpot[k];
+	}
+	return b;
+}
+
+void quern_dem_keep_force(const forces_shared *sh, const forces_work *w, quern_column out, uint32_t begin,
+	uint32_t n_slots, uint32_t n) {
+	for (uint32_t k = 0; k < sh->s->dim && out.real[0]; k++) {
+		memset(out.real[k] + begin, 0, n_slots * sizeof(quern_real));
+		for (uint32_t q = 0; q < n; q++) out.real[k][begin + (uint32_t)w->slot[q]] = w->force[k][q];
+	}
+}
+
+/* A spring that opens gives up what it held in the tangential direction: that is lost to sliding. Of a pair across
+ * blocks the first grain's block keeps the books. */
+void quern_dem_book(const forces_shared *sh, const forces_work *w, quern_column held, uint32_t begin,
+	uint32_t n_slots, uint32_t n, uint32_t first_grain, uint32_t last_grain, const int32_t *first,
+	quern_real *sums) {
+	quern_real *restrict old = held.real[0] + begin;
+	for (uint32_t q = 0; q < n; q++) {
+		const uint32_t i = (uint32_t)w->first[q];
+		const quern_real share = sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1;
+		if (w->overlap[q] > 0) old[w->slot[q]] = 0; /* the law has accounted for it */
+		if (i < first_grain || i >= last_grain) continue;
+		sums[E_STORED] += share * w->stored[q];
+		sums[E_SHEARED] += share * w->sheared[q];
+		sums[E_RUBBED] += share * w->rubbed[q];
+	}
+	for (uint32_t k = 0; k < n_slots; k++) {
+		const uint32_t i = (uint32_t)first[k];
+		if (i >= first_grain && i < last_grain) sums[E_RUBBED] += old[k];
+		old[k] = 0;
+	}
+	for (uint32_t q = 0; q < n; q++) {
+		const quern_real share = sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1;
+		old[w->slot[q]] = w->overlap[q] > 0 ? share * w->sheared[q] : 0;
+	}
+}
+
+/* ---- the stage ---- */
+static void move_block(void *arg, uint32_t b, uint32_t worker) {
+	const forces_shared *sh = arg;
+	forces_work w;
+	char *base = sh->s->host->scratch(sh->s->run, worker, lay_out(sh, &w, NULL));
+	if (!base) {
+		sh->bad[b] = (int32_t)sh->grain[b];
+		return;
+	}
+	lay_out(sh, &w, base);
+	const uint32_t n = sh->grain[b + 1] - sh->grain[b];
+	quern_real *sums = sh->sums + (size_t)b * N_ENERGIES;
+	memset(w.row, 0, ((size_t)n + 1) * sizeof *w.row);
+	if (sh->energy) memset(w.drag_row, 0, ((size_t)n + 1) * sizeof *w.row);
+	if (sh->contact) quern_dem_pairs(sh, &w, b, sums);
+	if (sh->touch) quern_dem_touches(sh, &w, b, sums);
+	quern_dem_integrate(sh, &w, b, sums);
+}
+
+static bool prepare(forces_shared *sh, const quern_set_view grains) {
+	const quern_step *s = sh->s;
+	const quern_set_view contacts = s->host->set(s->run, "contact"), touches = s->host->set(s->run, "touch");
+	sh->use = s->use;
+	sh->cap = s->batch;
+	sh->n_bodies = s->n_slot[SLOT_BODIES];
+	sh->n_laws = s->n_slot[SLOT_CONTACT] < MOST_LAWS ? s->n_slot[SLOT_CONTACT] : MOST_LAWS;
+	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
+	sh->energy = s->use[FORCE_STORED].real[0] != NULL;
+	sh->drag = s->settling ? sh->d->drag : 0;
+	sh->grain = grains.block;
+	sh->contact = contacts.block;
+	sh->touch = touches.n ? touches.block : NULL;
+	for (uint32_t b = 0; b < grains.n_blocks; b++) {
+		const uint32_t n = grains.block[b + 1] - grains.block[b];
+		sh->most_grains = n > sh->most_grains ? n : sh->most_grains;
+	}
+	for (uint32_t k = 0; k < 3; k++) {
+		const bool periodic = k < s->dim && s->periodic[k];
+		sh->length[k] = periodic ? s->upper[k] - s->lower[k] : 0;
+		sh->half[k] = periodic ? 0.5 * sh->length[k] : INFINITY;
+	}
+	sh->impulse =
+		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * 3 * sizeof(quern_real));
+	sh->sums = s->host->memory(s->run, (size_t)grains.n_blocks * N_ENERGIES * sizeof(quern_real));
+	sh->farthest = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(quern_real));
+	sh->bad = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(int32_t));
+	for (uint32_t b = 0; b < grains.n_blocks && sh->bad; b++) sh->bad[b] = -1;
+	return sh->impulse && sh->sums && sh->farthest && sh->bad;
+}
+
+/* Blocks in order, so that sums do not depend on who did what. */
+static void collect(const forces_shared *sh, uint32_t n_blocks) {
+	const quern_step *s = sh->s;
+	const quern_column *u = sh->use;
+	quern_real farthest = u[FORCE_DISPLACEMENT].real[0][0];
+	quern_real energy[N_ENERGIES] = { 0 };
+	for (uint32_t b = 0; b < n_blocks; b++) {
+		const quern_real way = sqrt(sh->farthest[b]);
+		farthest = way > farthest ? way : farthest;
+		for (uint32_t k = 0; k < s->dim; k++) {
+			const quern_real *impulse = sh->impulse + (size_t)b * (sh->n_bodies + 1) * 3;
+			for (uint32_t body = 0; body < sh->n_bodies && u[FORCE_IMPULSE].real[0]; body++)
+				u[FORCE_IMPULSE].real[k][body] += impulse[body * 3 + k];
+			if (u[FORCE_SUPPORT].real[0]) u[FORCE_SUPPORT].real[k][0] += impulse[sh->n_bodies * 3 + k];
+		}
+		for (int e = 0; e < N_ENERGIES; e++) energy[e] += sh->sums[(size_t)b * N_ENERGIES + (uint32_t)e];
+	}
+	u[FORCE_DISPLACEMENT].real[0][0] = farthest;
+	if (!sh->energy) return;
+	for (int e = E_KINETIC; e <= E_SHEARED; e++) u[FORCE_KINETIC + e].real[0][0] = energy[e];
+	if (!s->settling) {
+		u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
+		u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
+	}
+}
+
+static quern_status lost(const forces_shared *sh, int32_t i) {
+	const quern_column *u = sh->use;
+	const quern_step *s = sh->s;
+	quern_real v2 = 0;
+	for (uint32_t k = 0; k < s->dim; k++) v2 += u[FORCE_VELOCITY].real[k][i] * u[FORCE_VELOCITY].real[k][i];
+	const char *law = sh->n_laws ? s->slot[SLOT_CONTACT][0].id : "gravity";
+	if (!isfinite(v2))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", u[FORCE_ID].id[i],
+			"grain.velocity is not a number after %s: is the step of %.3g s too long?", law, s->dt);
+	return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", u[FORCE_ID].id[i],
+		"grain.velocity of %.3g m/s moves it by %.2g of its radius in one step of %.3g s (%s): unstable, or "
+		"the stiffness "
+		"is too low for such speeds",
+		sqrt(v2), sqrt(v2) * s->dt / u[FORCE_RADIUS].real[0][i], s->dt, law);
+}
+
+quern_status quern_dem_forces(const void *self, const quern_step *s) {
+	forces_shared sh = { .d = self, .s = s };
+	const quern_set_view grains = s->host->set(s->run, "grain");
+	if (!grains.n) return QUERN_OK;
+	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);
+	for (uint32_t b = 0; b < grains.n_blocks; b++)
+		if (sh.bad[b] >= 0) return lost(&sh, sh.bad[b]);
+	collect(&sh, grains.n_blocks);
+	return QUERN_OK;
+}

@@ -1,0 +1,160 @@
+/* integrate - moves the grains of one block, holds those that are fixed, and looks for those that are lost */
+#include "forces.h"
+#include <math.h>
+#include <string.h>
+
+enum {
+	G_FORCE,
+	G_TORQUE = 3,
+	G_MASS = 6,
+	G_INERTIA,
+	G_POSITION,
+	G_VELOCITY = 11,
+	G_SPIN = 14,
+	G_MEAN = 17,
+	G_MEAN_SPIN = 20,
+	G_DRAG = 23,
+	G_DRAG_TORQUE = 26
+};
+
+/* What leaves this stage must be finite, and slower than a radius per step. */
+static void check_grains(
+	const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
+	const quern_column *u = sh->use;
+	const quern_real *restrict radius = u[FORCE_RADIUS].real[0] + begin;
+	const quern_real dt = sh->s->dt;
+	quern_real farthest = sh->farthest[b], worst = 0;
+	quern_real *restrict way = w->grains[G_DRAG], *restrict fast = w->grains[G_DRAG + 1];
+	memset(way, 0, n * sizeof(quern_real));
+	memset(fast, 0, n * sizeof(quern_real));
+	for (uint32_t k = 0; k < sh->s->dim; k++) {
+		const quern_real *restrict x = u[FORCE_POSITION].real[k] + begin, *restrict v =
+																			  u[FORCE_VELOCITY].real[k] +
+																			  begin;
+		const quern_real *restrict anchor = u[FORCE_ANCHOR].real[k] + begin;
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			const quern_real d = x[i] - anchor[i];
+			way[i] += d * d;
+			fast[i] += v[i] * v[i];
+		}
+	}
+	/* an unordered comparison is what finds a NaN; it then stays in `worst` */
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real step = fast[i] * dt * dt, most = radius[i] * radius[i];
+		farthest = way[i] > farthest ? way[i] : farthest;
+		if (!(step <= most) && !(worst > 0)) worst = 1, sh->bad[b] = (int32_t)(begin + i);
+	}
+	sh->farthest[b] = farthest;
+}
+
+static void energies(
+	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n, quern_real *sums) {
+	const quern_column *u = sh->use;
+	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
+	for (uint32_t i = 0; i < n; i++) {
+		quern_real v2 = 0, s2 = 0, height = 0, lost = 0;
+		if (u[FORCE_FIXED].index && u[FORCE_FIXED].index[begin + i]) continue;
+		for (uint32_t k = 0; k < dim; k++) {
+			const quern_real v = w->grains[G_MEAN + k][i];
+			v2 += v * v;
+			height -= sh->s->gravity[k] * u[FORCE_OLD_POSITION].real[k][begin + i];
+			lost -= w->grains[G_DRAG + k][i] * v;
+		}
+		for (uint32_t k = 0; k < n_spin; k++) {
+			const quern_real s = w->grains[G_MEAN_SPIN + k][i];
+			s2 += s * s;
+			lost -= w->grains[G_DRAG_TORQUE + k][i] * s;
+		}
+		sums[E_KINETIC] += 0.5 * (w->grains[G_MASS][i] * v2 + w->grains[G_INERTIA][i] * s2);
+		sums[E_POTENTIAL] += w->grains[G_MASS][i] * height;
+		sums[E_DAMPED] += lost * sh->s->dt;
+	}
+}
+
+static void load_grains(
+	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t row, uint32_t n) {
+	const quern_column *u = sh->use;
+	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
+	const quern_real *weight = u[FORCE_WEIGHT].real[0], turning = dem_inertia(dim);
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real m = (weight ? weight[begin + i] : 1) * u[FORCE_MASS].real[0][begin + i];
+		const quern_real r = u[FORCE_RADIUS].real[0][begin + i];
+		w->grains[G_MASS][i] = m;
+		w->grains[G_INERTIA][i] = turning * m * r * r;
+		for (uint32_t k = 0; k < dim; k++) w->grains[G_FORCE + k][i] = w->row[row + i][k];
+		for (uint32_t k = 0; k < n_spin; k++) w->grains[G_TORQUE + k][i] = w->row[row + i][dim + k];
+	}
+	for (uint32_t i = 0; i < n && sh->energy; i++) {
+		for (uint32_t k = 0; k < dim; k++) w->grains[G_DRAG + k][i] = w->drag_row[row + i][k];
+		for (uint32_t k = 0; k < n_spin; k++) w->grains[G_DRAG_TORQUE + k][i] = w->drag_row[row + i][dim + k];
+	}
+	if (sh->drag > 0)
+		for (uint32_t i = 0; i < n; i++) {
+			for (uint32_t k = 0; k < dim; k++)
+				w->grains[G_FORCE + k][i] -=
+					sh->drag * w->grains[G_MASS][i] * u[FORCE_OLD_VELOCITY].real[k][begin + i];
+			for (uint32_t k = 0; k < n_spin; k++)
+				w->grains[G_TORQUE + k][i] -=
+					sh->drag * w->grains[G_INERTIA][i] * u[FORCE_OLD_SPIN].real[k][begin + i];
+		}
+}
+
+/* Fixed grains stay; what they take up is an impulse on the others. */
+static void hold_fixed(
+	const forces_shared *sh, const forces_work *w, uint32_t b, uint32_t begin, uint32_t n) {
+	const quern_column *u = sh->use;
+	const int32_t *fixed = u[FORCE_FIXED].index;
+	quern_real *support = sh->impulse + ((size_t)b * (sh->n_bodies + 1) + sh->n_bodies) * 3;
+	for (uint32_t i = 0; i < n && fixed; i++) {
+		if (!fixed[begin + i]) continue;
+		for (uint32_t k = 0; k < sh->s->dim; k++) {
+			support[k] -= w->grains[G_FORCE + k][i] * sh->s->dt;
+			u[FORCE_POSITION].real[k][begin + i] = u[FORCE_OLD_POSITION].real[k][begin + i];
+			u[FORCE_VELOCITY].real[k][begin + i] = u[FORCE_OLD_VELOCITY].real[k][begin + i];
+		}
+		for (uint32_t k = 0; k < (sh->s->dim == 3 ? 3u : 1u) && sh->spin; k++)
+			u[FORCE_SPIN].real[k][begin + i] = u[FORCE_OLD_SPIN].real[k][begin + i];
+	}
+}
+
+void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums) {
+	const quern_bound *bound = &sh->s->slot[SLOT_INTEGRATOR][0];
+	const quern_integrator_ops *ops = bound->ops;
+	const quern_column *u = sh->use;
+	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
+	for (uint32_t begin = sh->grain[b], end = sh->grain[b + 1]; begin < end; begin += GRAINS) {
+		const uint32_t n = end - begin < GRAINS ? end - begin : GRAINS;
+		quern_column own[MOST_ROWS];
+		quern_integrator_batch batch = { .n = n,
+			.cap = GRAINS,
+			.dt = sh->s->dt,
+			.mass = w->grains[G_MASS],
+			.inertia = w->grains[G_INERTIA],
+			.use = own };
+		load_grains(sh, w, begin, begin - sh->grain[b], n);
+		for (uint32_t r = 0; r < bound->n_uses && r < MOST_ROWS; r++)
+			own[r] = quern_column_from(bound->column[r], bound->uses[r].shape, begin);
+		for (uint32_t k = 0; k < dim; k++) {
+			batch.gravity[k] = sh->s->gravity[k];
+			batch.force[k] = w->grains[G_FORCE + k];
+			batch.position[k] = u[FORCE_OLD_POSITION].real[k] + begin;
+			batch.velocity[k] = u[FORCE_OLD_VELOCITY].real[k] + begin;
+			batch.new_position[k] = u[FORCE_POSITION].real[k] + begin;
+			batch.new_velocity[k] = u[FORCE_VELOCITY].real[k] + begin;
+			if (sh->energy) batch.mean_velocity[k] = w->grains[G_MEAN + k];
+			if (u[FORCE_SUM].real[0])
+				memcpy(u[FORCE_SUM].real[k] + begin, batch.force[k], n * sizeof(quern_real));
+		}
+		for (uint32_t k = 0; k < n_spin; k++) {
+			batch.torque[k] = w->grains[G_TORQUE + k];
+			batch.spin[k] = u[FORCE_OLD_SPIN].real[k] + begin;
+			batch.new_spin[k] = u[FORCE_SPIN].real[k] + begin;
+			if (sh->energy) batch.mean_spin[k] = w->grains[G_MEAN_SPIN + k];
+		}
+		ops->close[dim - 2](bound->self, &batch);
+		hold_fixed(sh, w, b, begin, n);
+		if (sh->energy) energies(sh, w, begin, n, sums);
+		check_grains(sh, b, begin, n, w);
+	}
+}

@@ -1,0 +1,115 @@
+/* integrator.velocity_verlet - second order, also with dashpots: forces see v + dt a, the velocity that the old
+ * acceleration predicts. docs/theory/grains.md, section 3 */
+#include <quern/abi.h>
+
+typedef struct {
+	int32_t unused;
+} verlet;
+static const quern_param params[] = { QUERN_END_PARAMS };
+
+enum { ACCELERATION, SPIN_ACCELERATION, OPEN_ACCELERATION, OPEN_SPIN_ACCELERATION };
+/* Of a new grain no acceleration is known: NaN. Its first step moves it with its velocity and kicks it once, which
+ * costs an error of second order, once. */
+static const quern_use uses[] = { { .field = "grain.acceleration",
+									  .unit = "m/s^2",
+									  .doc = "Of the last step, gravity included; NaN: not known yet.",
+									  .access = QUERN_UPDATE,
+									  .shape = QUERN_VECTOR,
+									  .initial = __builtin_nan("") },
+	{ .field = "grain.spin_acceleration",
+		.unit = "rad/s^2",
+		.doc = "Of the last step; NaN: not known yet.",
+		.access = QUERN_UPDATE,
+		.shape = QUERN_AXIAL,
+		.with = "grain.spin",
+		.initial = __builtin_nan("") },
+	{ .field = "grain.acceleration",
+		.unit = "m/s^2",
+		.access = QUERN_READ,
+		.shape = QUERN_VECTOR,
+		.hook = QUERN_INTEGRATOR_OPEN },
+	{ .field = "grain.spin_acceleration",
+		.unit = "rad/s^2",
+		.access = QUERN_READ,
+		.shape = QUERN_AXIAL,
+		.with = "grain.spin",
+		.hook = QUERN_INTEGRATOR_OPEN },
+	QUERN_END_USES };
+
+/* x += dt v + dt^2 a / 2; v becomes the prediction v + dt a. */
+QUERN_INLINE void open(const int dim, const quern_integrator_batch *b) {
+	const quern_real dt = b->dt;
+	for (int k = 0; k < dim; k++) {
+		const quern_real *restrict a = b->use[OPEN_ACCELERATION].real[k], *restrict x = b->position[k];
+		const quern_real *restrict v = b->velocity[k];
+		quern_real *restrict nx = b->new_position[k], *restrict nv = b->new_velocity[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < b->n; i++) {
+			const quern_real known = a[i] == a[i] ? a[i] : 0;
+			nx[i] = x[i] + dt * (v[i] + 0.5 * dt * known);
+			nv[i] = v[i] + dt * known;
+		}
+	}
+	for (int k = 0; k < (dim == 3 ? 3 : 1) && b->spin[0]; k++) {
+		const quern_real *restrict a = b->use[OPEN_SPIN_ACCELERATION].real[k], *restrict w = b->spin[k];
+		quern_real *restrict nw = b->new_spin[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < b->n; i++) nw[i] = w[i] + (a[i] == a[i] ? dt * a[i] : 0);
+	}
+}
+
+/* v = prediction + dt (a_new - a_old) / 2, which is v_old + dt (a_old + a_new) / 2. */
+QUERN_INLINE void close(const int dim, const quern_integrator_batch *b) {
+	const quern_real dt = b->dt;
+	const quern_real *restrict m = b->mass;
+	for (int k = 0; k < dim; k++) {
+		const quern_real *restrict f = b->force[k], *restrict x = b->position[k],
+								   *restrict v = b->velocity[k];
+		quern_real *restrict nx = b->new_position[k], *restrict nv = b->new_velocity[k];
+		quern_real *restrict a = b->use[ACCELERATION].real[k];
+		const quern_real g = b->gravity[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < b->n; i++) {
+			const quern_real now = f[i] / m[i] + g;
+			nv[i] = v[i] + (a[i] == a[i] ? 0.5 * dt * (now - a[i]) : dt * now);
+			nx[i] = x[i];
+			a[i] = now;
+		}
+		if (b->mean_velocity[0]) /* the kick around this evaluation is centred on it */
+			for (uint32_t i = 0; i < b->n; i++) b->mean_velocity[k][i] = nv[i];
+	}
+	for (int k = 0; k < (dim == 3 ? 3 : 1) && b->torque[0]; k++) {
+		const quern_real *restrict t = b->torque[k], *restrict w = b->spin[k], *restrict moment = b->inertia;
+		quern_real *restrict nw = b->new_spin[k], *restrict a = b->use[SPIN_ACCELERATION].real[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < b->n; i++) {
+			const quern_real now = t[i] / moment[i];
+			nw[i] = w[i] + (a[i] == a[i] ? 0.5 * dt * (now - a[i]) : dt * now);
+			a[i] = now;
+		}
+		if (b->mean_spin[0])
+			for (uint32_t i = 0; i < b->n; i++) b->mean_spin[k][i] = nw[i];
+	}
+}
+
+static void open_2d(const void *self, const quern_integrator_batch *b) { (void)self, open(2, b); }
+static void open_3d(const void *self, const quern_integrator_batch *b) { (void)self, open(3, b); }
+static void close_2d(const void *self, const quern_integrator_batch *b) { (void)self, close(2, b); }
+static void close_3d(const void *self, const quern_integrator_batch *b) { (void)self, close(3, b); }
+
+static const quern_integrator_ops ops = {
+	.size = sizeof ops, .close = { close_2d, close_3d }, .open = { open_2d, open_3d }
+};
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_INTEGRATOR,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "integrator.velocity_verlet",
+	.brief = "Second order, with one evaluation a step.",
+	.doc = "Dashpots act on the predicted velocity, which keeps the order. Remembers the last acceleration.",
+	.cite = "Swope et al. 1982",
+	.instance_size = sizeof(verlet),
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

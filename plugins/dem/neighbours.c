@@ -1,0 +1,319 @@
+/* neighbours - the stage that sorts grains, lists near pairs and near bodies, and carries their history over */
+#include "../common/sort.h"
+#include "dem.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+	const dem *d;
+	const quern_step *s;
+	const quern_bound *search;
+	const quern_neighbour_ops *ops;
+	quern_neighbour_job job;
+	const int32_t *fixed;
+	const int64_t *id;
+	uint32_t cap;     /* of each block's buffer, in pairs per grain */
+	quern_pair *pair; /* buffers of all blocks, one after the other */
+	uint32_t *found;  /* by block */
+	uint32_t *start;  /* by block: of the final list */
+	quern_pair *list;
+	int32_t *list_from;
+	const uint32_t *bucket; /* by grain: its old entries in `entry` */
+	const int32_t *entry;
+	const int32_t *old_first, *old_second;
+} listing;
+
+/* ---- sorting ---- */
+
+static quern_real largest_radius(const quern_real *radius, uint32_t n) {
+	quern_real most = 0;
+	for (uint32_t i = 0; i < n; i++) most = radius[i] > most ? radius[i] : most;
+	return most;
+}
+
+static void set_job(listing *l) {
+	const quern_step *s = l->s;
+	const dem *d = l->d;
+	const quern_set_view grains = s->host->set(s->run, "grain");
+	l->job.n = grains.n;
+	l->job.dim = s->dim;
+	for (uint32_t k = 0; k < 3; k++) {
+		l->job.position[k] = k < s->dim ? s->use[NEAR_POSITION].real[k] : NULL;
+		l->job.lower[k] = s->lower[k];
+		l->job.upper[k] = s->upper[k];
+		l->job.periodic[k] = s->periodic[k];
+	}
+	l->job.radius = s->use[NEAR_RADIUS].real[0];
+	l->job.largest = largest_radius(l->job.radius, grains.n);
+	l->job.reach = d->skin * 2 * d->radii.mean + d->reach;
+	l->job.n_blocks = grains.n_blocks;
+	l->job.block = grains.block;
+	l->fixed = s->use[NEAR_FIXED].index;
+	l->id = s->use[NEAR_ID].id;
+}
+
+static quern_status sort_grains(listing *l) {
+	const quern_step *s = l->s;
+	set_job(l);
+	const uint32_t n = l->job.n;
+	uint64_t *key = s->host->memory(s->run, ((size_t)n + 1) * sizeof(uint64_t));
+	int32_t *from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
+	uint64_t *work = s->host->memory(s->run, quern_sort_bytes(n));
+	uint32_t *block = s->host->memory(s->run, ((size_t)n + 2) * sizeof(uint32_t));
+	if (!key || !from || !work || !block) return QUERN_E_MEMORY;
+	const size_t wanted = l->ops->keys(l->search->self, &l->job, key);
+	quern_sort_order(n, key, from, work);
+	uint32_t n_blocks = 0;
+	for (uint32_t i = 0; i < n; i++)
+		if (!i || key[from[i]] >> 32 != key[from[i - 1]] >> 32) block[n_blocks++] = i;
+	block[n_blocks] = n;
+	const quern_status status = s->host->remap(s->run, "grain", n, from, n_blocks, block);
+	if (status != QUERN_OK) return status;
+	set_job(l);
+	l->job.memory = s->host->memory(s->run, wanted + 64);
+	if (!l->job.memory) return QUERN_E_MEMORY;
+	if (l->ops->index) l->ops->index(l->search->self, &l->job);
+	return QUERN_OK;
+}
+
+/* ---- pairs ---- */
+
+static int by_place(const void *pa, const void *pb) {
+	const quern_pair *a = pa, *b = pb;
+	if (a->first != b->first) return a->first < b->first ? -1 : 1;
+	return a->second < b->second ? -1 : a->second > b->second;
+}
+
+/* In the order of (grain of this block, partner): the order in which forces are added, the same for any search. */
+static void sort_pairs(quern_pair *pair, uint32_t n) {
+	bool sorted = true;
+	for (uint32_t i = 1; i < n && sorted; i++) sorted = by_place(&pair[i - 1], &pair[i]) < 0;
+	if (!sorted) qsort(pair, n, sizeof *pair, by_place);
+}
+
+static void find_pairs(void *arg, uint32_t b, uint32_t worker) {
+	listing *l = arg;
+	(void)worker;
+	const uint32_t begin = l->job.block[b], end = l->job.block[b + 1];
+	const uint32_t cap = (end - begin) * l->cap;
+	quern_pair *out = l->pair + (size_t)begin * l->cap;
+	const uint32_t n = l->ops->pairs(l->search->self, &l->job, b, cap, out);
+	if (n > cap) {
+		l->found[b] = n;
+		return;
+	}
+	uint32_t kept = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		quern_pair p = out[i];
+		if (l->fixed && l->fixed[p.first] && l->fixed[p.second]) continue;
+		const bool inside = (uint32_t)p.second >= begin && (uint32_t)p.second < end;
+		if (inside && p.second < p.first) p = (quern_pair) { p.second, p.first };
+		out[kept++] = p;
+	}
+	sort_pairs(out, kept);
+	for (uint32_t i = 0; i < kept; i++) /* the first is the one of lower id, for ever */
+		if (l->id[out[i].first] > l->id[out[i].second]) out[i] = (quern_pair) { out[i].second, out[i].first };
+	l->found[b] = kept;
+}
+
+/* Entries of the old list by their first grain: an entry across blocks stands there twice, with equal contents. */
+static quern_status index_old(listing *l, const char *set, const int32_t *first, uint32_t n_grains) {
+	const quern_step *s = l->s;
+	const uint32_t n = s->host->set(s->run, set).n;
+	uint32_t *bucket = s->host->memory(s->run, ((size_t)n_grains + 2) * sizeof(uint32_t));
+	int32_t *entry = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
+	if (!bucket || !entry) return QUERN_E_MEMORY;
+	for (uint32_t k = 0; k < n; k++) bucket[first[k] + 2]++;
+	for (uint32_t i = 0; i < n_grains; i++) bucket[i + 2] += bucket[i + 1];
+	for (uint32_t k = 0; k < n; k++) entry[bucket[first[k] + 1]++] = (int32_t)k;
+	l->bucket = bucket;
+	l->entry = entry;
+	l->old_first = first;
+	return QUERN_OK;
+}
+
+static int32_t old_entry(const listing *l, int32_t first, int32_t second) {
+	for (uint32_t k = l->bucket[first]; k < l->bucket[first + 1]; k++)
+		if (l->old_second[l->entry[k]] == second) return l->entry[k];
+	return -1;
+}
+
+static void gather_pairs(void *arg, uint32_t b, uint32_t worker) {
+	listing *l = arg;
+	(void)worker;
+	const quern_pair *in = l->pair + (size_t)l->job.block[b] * l->cap;
+	for (uint32_t i = 0; i < l->found[b]; i++) {
+		const uint32_t to = l->start[b] + i;
+		l->list[to] = in[i];
+		l->list_from[to] = old_entry(l, in[i].first, in[i].second);
+	}
+}
+
+/* Every block has room for `cap` pairs per grain; if one needs more, all get twice as much. */
+static quern_status search_pairs(listing *l) {
+	const quern_step *s = l->s;
+	l->found = s->host->memory(s->run, ((size_t)l->job.n_blocks + 1) * sizeof(uint32_t));
+	l->start = s->host->memory(s->run, ((size_t)l->job.n_blocks + 1) * sizeof(uint32_t));
+	if (!l->found || !l->start) return QUERN_E_MEMORY;
+	for (l->cap = s->dim == 2 ? 8 : 12;; l->cap *= 2) {
+		bool enough = true;
+		l->pair = s->host->memory(s->run, ((size_t)l->job.n * l->cap + 1) * sizeof(quern_pair));
+		if (!l->pair) return QUERN_E_MEMORY;
+		s->host->parallel(s->run, l->job.n_blocks, find_pairs, l);
+		for (uint32_t b = 0; b < l->job.n_blocks; b++)
+			enough = enough && l->found[b] <= (l->job.block[b + 1] - l->job.block[b]) * l->cap;
+		if (enough) break;
+	}
+	for (uint32_t b = 0; b < l->job.n_blocks; b++) l->start[b + 1] = l->start[b] + l->found[b];
+	return QUERN_OK;
+}
+
+static quern_status list_contacts(listing *l) {
+	const quern_step *s = l->s;
+	quern_status status = search_pairs(l);
+	if (status != QUERN_OK) return status;
+	const uint32_t n = l->start[l->job.n_blocks];
+	l->list = s->host->memory(s->run, ((size_t)n + 1) * sizeof(quern_pair));
+	l->list_from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
+	if (!l->list || !l->list_from) return QUERN_E_MEMORY;
+	status = index_old(l, "contact", s->use[NEAR_FIRST].index, l->job.n);
+	if (status != QUERN_OK) return status;
+	l->old_second = s->use[NEAR_SECOND].index;
+	s->host->parallel(s->run, l->job.n_blocks, gather_pairs, l);
+	status = s->host->remap(s->run, "contact", n, l->list_from, l->job.n_blocks, l->start);
+	if (status != QUERN_OK) return status;
+	int32_t *first = s->use[NEAR_FIRST].index, *second = s->use[NEAR_SECOND].index;
+	for (uint32_t k = 0; k < n; k++) first[k] = l->list[k].first, second[k] = l->list[k].second;
+	return QUERN_OK;
+}
+
+/* ---- grains near bodies ---- */
+
+enum { CHUNK = 256 };
+
+typedef struct {
+	_Alignas(64) quern_real gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
+} near_body;
+
+static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, quern_pair *out) {
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	const quern_step *s = l->s;
+	const quern_real reach = l->job.reach;
+	uint32_t n = 0;
+	for (uint32_t body = 0; body < s->n_slot[SLOT_BODIES]; body++) {
+		const quern_bound *bound = &s->slot[SLOT_BODIES][body];
+		if (!quern_body_is_there(bound, s->settling)) continue;
+		for (uint32_t i = l->job.block[b]; i < l->job.block[b + 1]; i += CHUNK) {
+			const uint32_t m = l->job.block[b + 1] - i < CHUNK ? l->job.block[b + 1] - i : CHUNK;
+			quern_body_batch batch = { .n = m,
+				.cap = CHUNK,
+				.dim = s->dim,
+				.pose = &still,
+				.radius = l->job.radius + i,
+				.gap = w->gap };
+			for (uint32_t k = 0; k < s->dim; k++) {
+				batch.position[k] = l->job.position[k] + i;
+				batch.normal[k] = w->normal[k];
+				batch.velocity[k] = w->velocity[k];
+			}
+			((const quern_body_ops *)bound->ops)->closest(bound->self, &batch);
+			for (uint32_t k = 0; k < m; k++) {
+				if (!(w->gap[k] < reach) || (l->fixed && l->fixed[i + k])) continue;
+				if (out) out[n] = (quern_pair) { (int32_t)(i + k), (int32_t)body };
+				n++;
+			}
+		}
+	}
+	return n;
+}
+
+static void count_touches(void *arg, uint32_t b, uint32_t worker) {
+	listing *l = arg;
+	near_body *w = l->s->host->scratch(l->s->run, worker, sizeof *w);
+	l->found[b] = w ? touches_of_block(l, b, w, NULL) : 0;
+}
+
+static void gather_touches(void *arg, uint32_t b, uint32_t worker) {
+	listing *l = arg;
+	near_body *w = l->s->host->scratch(l->s->run, worker, sizeof *w);
+	if (!w) return;
+	touches_of_block(l, b, w, l->list + l->start[b]);
+	for (uint32_t k = l->start[b]; k < l->start[b + 1]; k++)
+		l->list_from[k] = old_entry(l, l->list[k].first, l->list[k].second);
+}
+
+static quern_status list_touches(listing *l) {
+	const quern_step *s = l->s;
+	s->host->parallel(s->run, l->job.n_blocks, count_touches, l);
+	l->start[0] = 0;
+	for (uint32_t b = 0; b < l->job.n_blocks; b++) l->start[b + 1] = l->start[b] + l->found[b];
+	const uint32_t n = l->start[l->job.n_blocks];
+	l->list = s->host->memory(s->run, ((size_t)n + 1) * sizeof(quern_pair));
+	l->list_from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
+	if (!l->list || !l->list_from) return QUERN_E_MEMORY;
+	quern_status status = index_old(l, "touch", s->use[NEAR_GRAIN].index, l->job.n);
+	if (status != QUERN_OK) return status;
+	l->old_second = s->use[NEAR_BODY].index;
+	s->host->parallel(s->run, l->job.n_blocks, gather_touches, l);
+	status = s->host->remap(s->run, "touch", n, l->list_from, l->job.n_blocks, l->start);
+	if (status != QUERN_OK) return status;
+	int32_t *grain = s->use[NEAR_GRAIN].index, *body = s->use[NEAR_BODY].index;
+	for (uint32_t k = 0; k < n; k++) grain[k] = l->list[k].first, body[k] = l->list[k].second;
+	return QUERN_OK;
+}
+
+/* ---- the stage ---- */
+
+/* A periodic image is found as the nearest one, which is right only if a pair cannot meet twice through the seam. */
+static quern_status check_periodic(const listing *l) {
+	const quern_step *s = l->s;
+	for (uint32_t k = 0; k < s->dim; k++)
+		if (s->periodic[k] && s->upper[k] - s->lower[k] < 2 * (2 * l->job.largest + l->job.reach))
+			return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
+				"the domain is periodic along axis %u and only %.3g m wide there: it must hold two largest "
+				"grains "
+				"and their skins, %.3g m",
+				k, s->upper[k] - s->lower[k], 2 * (2 * l->job.largest + l->job.reach));
+	return QUERN_OK;
+}
+
+/* A closed domain has bodies that keep grains inside; periodic axes bring them back here, where lists are remade. */
+static quern_status keep_inside(const listing *l) {
+	const quern_step *s = l->s;
+	const uint32_t n = s->host->set(s->run, "grain").n;
+	const int32_t *fixed = s->use[NEAR_FIXED].index;
+	for (uint32_t k = 0; k < s->dim; k++) {
+		quern_real *x = s->use[NEAR_POSITION].real[k];
+		const quern_real lower = s->lower[k], upper = s->upper[k], length = upper - lower;
+		for (uint32_t i = 0; i < n; i++) {
+			if (s->periodic[k]) {
+				x[i] = x[i] >= upper ? x[i] - length : x[i];
+				x[i] = x[i] < lower ? x[i] + length : x[i];
+			} else if (!(x[i] >= lower && x[i] <= upper) && !(fixed && fixed[i]))
+				return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", s->use[NEAR_ID].id[i],
+					"left the domain along axis %u, at %.4g m: put a body there or make the domain larger", k,
+					x[i]);
+		}
+	}
+	return QUERN_OK;
+}
+
+quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
+	listing l = { .d = self, .s = s, .search = &s->slot[SLOT_NEIGHBOURS][0] };
+	l.ops = l.search->ops;
+	const quern_real moved = s->use[NEAR_DISPLACEMENT].real[0][0];
+	const bool released = !s->settling && s->step == 0 && s->substep == 0;
+	if (moved < 0.5 * l.d->skin * 2 * l.d->radii.mean && !released) return QUERN_OK;
+	quern_status status = keep_inside(&l);
+	if (status == QUERN_OK) status = sort_grains(&l);
+	if (status == QUERN_OK) status = check_periodic(&l);
+	if (status == QUERN_OK) status = list_contacts(&l);
+	if (status == QUERN_OK && s->n_slot[SLOT_BODIES]) status = list_touches(&l);
+	if (status != QUERN_OK) return status;
+	for (uint32_t k = 0; k < s->dim; k++)
+		memcpy(
+			s->use[NEAR_ANCHOR].real[k], s->use[NEAR_POSITION].real[k], (size_t)l.job.n * sizeof(quern_real));
+	s->use[NEAR_DISPLACEMENT].real[0][0] = 0;
+	return QUERN_OK;
+}

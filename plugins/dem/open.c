@@ -1,0 +1,77 @@
+/* open - the integrator's part before the forces, where it has one */
+#include "dem.h"
+#include <math.h>
+#include <string.h>
+
+enum { CHUNK = 256 };
+
+typedef struct {
+	const quern_step *s;
+	const quern_bound *bound;
+	uint32_t n, n_spin;
+	quern_real *farthest; /* by chunk: square of the way since the last list */
+} opening;
+
+typedef struct {
+	_Alignas(64) quern_real position[3][CHUNK], velocity[3][CHUNK], spin[3][CHUNK];
+} opened;
+
+/* The new state is made aside and then copied: an integrator may read and write as if the columns were distinct. */
+static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
+	const opening *o = arg;
+	const quern_column *u = o->s->use;
+	const uint32_t begin = chunk * CHUNK, n = o->n - begin < CHUNK ? o->n - begin : CHUNK, dim = o->s->dim;
+	opened *w = o->s->host->scratch(o->s->run, worker, sizeof *w);
+	quern_column own[8];
+	if (!w) {
+		o->farthest[chunk] = INFINITY;
+		return;
+	}
+	quern_integrator_batch b = { .n = n, .cap = CHUNK, .dt = o->s->dt, .use = own };
+	for (uint32_t r = 0; r < o->bound->n_uses && r < 8; r++)
+		own[r] = quern_column_from(o->bound->column[r], o->bound->uses[r].shape, begin);
+	for (uint32_t k = 0; k < dim; k++) {
+		b.gravity[k] = o->s->gravity[k];
+		b.position[k] = u[OPEN_POSITION].real[k] + begin;
+		b.velocity[k] = u[OPEN_VELOCITY].real[k] + begin;
+		b.new_position[k] = w->position[k];
+		b.new_velocity[k] = w->velocity[k];
+	}
+	for (uint32_t k = 0; k < o->n_spin; k++) {
+		b.spin[k] = u[OPEN_SPIN].real[k] + begin;
+		b.new_spin[k] = w->spin[k];
+	}
+	((const quern_integrator_ops *)o->bound->ops)->open[dim - 2](o->bound->self, &b);
+	const int32_t *fixed = u[OPEN_FIXED].index;
+	quern_real farthest = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		quern_real way = 0;
+		if (fixed && fixed[begin + i]) continue;
+		for (uint32_t k = 0; k < dim; k++) {
+			const quern_real d = w->position[k][i] - u[OPEN_ANCHOR].real[k][begin + i];
+			way += d * d;
+			u[OPEN_POSITION].real[k][begin + i] = w->position[k][i];
+			u[OPEN_VELOCITY].real[k][begin + i] = w->velocity[k][i];
+		}
+		for (uint32_t k = 0; k < o->n_spin; k++) u[OPEN_SPIN].real[k][begin + i] = w->spin[k][i];
+		farthest = way > farthest ? way : farthest;
+	}
+	o->farthest[chunk] = farthest;
+}
+
+quern_status quern_dem_open(const void *self, const quern_step *s) {
+	opening o = { .s = s, .bound = &s->slot[SLOT_INTEGRATOR][0], .n = s->host->set(s->run, "grain").n };
+	(void)self;
+	if (!((const quern_integrator_ops *)o.bound->ops)->open[s->dim - 2] || !o.n) return QUERN_OK;
+	o.n_spin = s->use[OPEN_SPIN].real[0] ? (s->dim == 3 ? 3 : 1) : 0;
+	const uint32_t chunks = (o.n + CHUNK - 1) / CHUNK;
+	o.farthest = s->host->memory(s->run, chunks * sizeof(quern_real));
+	if (!o.farthest) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, chunks, open_chunk, &o);
+	quern_real *farthest = s->use[OPEN_DISPLACEMENT].real[0];
+	for (uint32_t c = 0; c < chunks; c++) {
+		const quern_real way = sqrt(o.farthest[c]);
+		*farthest = way > *farthest ? way : *farthest;
+	}
+	return QUERN_OK;
+}

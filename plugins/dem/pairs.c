@@ -1,0 +1,256 @@
+/* pairs - contacts between grains of one block: distance test, laws, sums in list order */
+#include "forces.h"
+#include <string.h>
+
+/* Half a periodic domain's length and the length; infinity and zero where it is not periodic. */
+typedef struct {
+	quern_vec half, length;
+} period;
+
+static period period_of(const forces_shared *sh) {
+	return (period) { { sh->half[0], sh->half[1], sh->half[2] },
+		{ sh->length[0], sh->length[1], sh->length[2] } };
+}
+
+QUERN_INLINE quern_real image(quern_real d, quern_real half, quern_real length) {
+	d = d > half ? d - length : d;
+	return d < -half ? d + length : d;
+}
+
+QUERN_INLINE quern_vec nearest(quern_vec d, period p, const int dim) {
+	return (quern_vec) { image(d.x, p.half.x, p.length.x), image(d.y, p.half.y, p.length.y),
+		dim == 3 ? image(d.z, p.half.z, p.length.z) : 0 };
+}
+
+/* Slots whose grains are within the laws' reach, in list order. */
+QUERN_INLINE uint32_t compact(
+	const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n, const int dim) {
+	const quern_column at = sh->use[FORCE_OLD_POSITION];
+	const quern_real *restrict x = at.real[0], *restrict y = at.real[1], *restrict z = at.real[2];
+	const quern_real *restrict radius = sh->use[FORCE_RADIUS].real[0];
+	const int32_t *restrict first = sh->use[FORCE_FIRST].index + begin, *restrict second =
+																			sh->use[FORCE_SECOND].index +
+																			begin;
+	const quern_real reach = sh->d->reach;
+	const period p = period_of(sh);
+	int32_t *restrict near = w->slot;
+	uint32_t kept = 0;
+	QUERN_SIMD
+	for (uint32_t k = 0; k < n; k++) {
+		const int32_t i = first[k], j = second[k];
+		const quern_vec d =
+			nearest((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
+		const quern_real most = radius[i] + radius[j] + reach;
+		near[k] = quern_vec_dot(d, d, dim) < most * most;
+	}
+	for (uint32_t k = 0; k < n; k++) {
+		const int32_t is = near[k];
+		w->first[kept] = first[k];
+		w->second[kept] = second[k];
+		near[kept] = (int32_t)k;
+		kept += (uint32_t)is;
+	}
+	return kept;
+}
+
+QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32_t n, const int dim) {
+	const quern_column at = sh->use[FORCE_OLD_POSITION];
+	const quern_real *restrict x = at.real[0], *restrict y = at.real[1], *restrict z = at.real[2];
+	const quern_real *restrict radius = sh->use[FORCE_RADIUS].real[0];
+	const int32_t *restrict first = w->first, *restrict second = w->second;
+	const period p = period_of(sh);
+	quern_real *restrict overlap = w->overlap, *restrict effective = w->radius;
+	quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
+	quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
+	QUERN_SIMD
+	for (uint32_t q = 0; q < n; q++) {
+		const int32_t i = first[q], j = second[q];
+		const quern_vec d =
+			nearest((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
+		const quern_real ri = radius[i], rj = radius[j];
+		const quern_real length = __builtin_sqrt(quern_vec_dot(d, d, dim)),
+						 one_over = length > 0 ? 1 / length : 0;
+		nx[q] = d.x * one_over;
+		ny[q] = d.y * one_over;
+		if (dim == 3) nz[q] = d.z * one_over;
+		const quern_real o = ri + rj - length;
+		overlap[q] = o;
+		arm_i[q] = ri - 0.5 * o;
+		arm_j[q] = rj - 0.5 * o;
+		effective[q] = ri * rj / (ri + rj);
+	}
+}
+
+/* v_c = v_i - v_j + w_i x b_i - w_j x b_j with b_i = -arm_i n, b_j = arm_j n */
+QUERN_INLINE void motion(
+	const forces_shared *sh, const forces_work *w, uint32_t n, const int dim, const bool spin) {
+	const quern_column v = sh->use[FORCE_OLD_VELOCITY], s = sh->use[FORCE_OLD_SPIN];
+	const quern_real *restrict u = v.real[0], *restrict uy = v.real[1], *restrict uz = v.real[2];
+	const quern_real *restrict s0 = s.real[0], *restrict s1 = s.real[1], *restrict s2 = s.real[2];
+	const int32_t *restrict first = w->first, *restrict second = w->second;
+	const quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
+	const quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
+	quern_real *restrict vx = w->velocity[0], *restrict vy = w->velocity[1], *restrict vz = w->velocity[2];
+	quern_real *restrict sx = w->spin[0], *restrict sy = w->spin[1], *restrict sz = w->spin[2];
+	quern_real *restrict tx = w->turn[0], *restrict ty = w->turn[1], *restrict tz = w->turn[2];
+	QUERN_SIMD
+	for (uint32_t q = 0; q < n; q++) {
+		const int32_t i = first[q], j = second[q];
+		quern_real x = u[i] - u[j], y = uy[i] - uy[j], z = dim == 3 ? uz[i] - uz[j] : 0;
+		if (spin && dim == 2) {
+			const quern_real wi = s0[i], wj = s0[j], sum = arm_i[q] * wi + arm_j[q] * wj;
+			x += sum * ny[q];
+			y -= sum * nx[q];
+			sx[q] = wi - wj;
+		}
+		if (spin && dim == 3) {
+			const quern_vec wi = { s0[i], s1[i], s2[i] }, wj = { s0[j], s1[j], s2[j] };
+			const quern_vec sum = { arm_i[q] * wi.x + arm_j[q] * wj.x, arm_i[q] * wi.y + arm_j[q] * wj.y,
+				arm_i[q] * wi.z + arm_j[q] * wj.z };
+			x -= sum.y * nz[q] - sum.z * ny[q];
+			y -= sum.z * nx[q] - sum.x * nz[q];
+			z -= sum.x * ny[q] - sum.y * nx[q];
+			sx[q] = wi.x - wj.x, sy[q] = wi.y - wj.y, sz[q] = wi.z - wj.z;
+			tx[q] = 0.5 * (wi.x + wj.x), ty[q] = 0.5 * (wi.y + wj.y), tz[q] = 0.5 * (wi.z + wj.z);
+		}
+		vx[q] = x;
+		vy[q] = y;
+		if (dim == 3) vz[q] = z;
+	}
+}
+
+/* m_i m_j/(m_i + m_j), where a fixed grain counts as a wall; weight min(w_i, w_j). */
+static void masses(const forces_shared *sh, const forces_work *w, uint32_t n) {
+	const quern_real *restrict mass = sh->use[FORCE_MASS].real[0], *restrict weight =
+																	   sh->use[FORCE_WEIGHT].real[0];
+	const int32_t *restrict fixed = sh->use[FORCE_FIXED].index, *restrict first = w->first,
+							*restrict second = w->second;
+	quern_real *restrict out = w->mass, *restrict share = w->weight;
+	QUERN_SIMD
+	for (uint32_t q = 0; q < n; q++) {
+		const quern_real a = mass[first[q]], b = mass[second[q]];
+		out[q] = a * b / (a + b);
+	}
+	if (fixed)
+		for (uint32_t q = 0; q < n; q++) {
+			out[q] = fixed[first[q]] ? mass[second[q]] : out[q];
+			out[q] = fixed[second[q]] ? mass[first[q]] : out[q];
+		}
+	if (weight)
+		for (uint32_t q = 0; q < n; q++) {
+			const quern_real a = weight[first[q]], b = weight[second[q]];
+			share[q] = a < b ? a : b;
+		}
+}
+
+/* ---- laws ---- */
+/* Own columns of the pairs kept, or of both grains. */
+static void gather_rows(const forces_shared *sh, forces_work *w, const quern_bound *law, uint32_t l,
+	uint32_t begin, uint32_t n, quern_column *use, quern_column *use_second) {
+	for (uint32_t r = 0; r < law->n_uses; r++) {
+		const quern_use *row = &law->uses[r];
+		use[r] = use_second[r] = (quern_column) { .real = { NULL } };
+		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
+			const quern_real *restrict whole = law->column[r].real[k];
+			if (!whole || row->shape == QUERN_INDEX || row->shape == QUERN_ID) continue;
+			quern_real *restrict mine = w->history[l][r][k], *restrict other = w->other[l][r][k];
+			if (quern_dem_is_history(row))
+				for (uint32_t q = 0; q < n; q++) mine[q] = whole[begin + (uint32_t)w->slot[q]];
+			else
+				for (uint32_t q = 0; q < n; q++) mine[q] = whole[w->first[q]], other[q] = whole[w->second[q]];
+			use[r].real[k] = mine;
+			use_second[r].real[k] = other;
+		}
+	}
+}
+
+/* Pairs that were left out forget, pairs that were kept remember. */
+static void scatter_rows(const forces_shared *sh, const forces_work *w, const quern_bound *law,
+	uint32_t begin, uint32_t n_slots, uint32_t n, quern_column *use) {
+	for (uint32_t r = 0; r < law->n_uses; r++) {
+		const quern_use *row = &law->uses[r];
+		if (!quern_dem_is_history(row) || row->access == QUERN_READ) continue;
+		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
+			quern_real *restrict whole = law->column[r].real[k];
+			const quern_real *restrict mine = use[r].real[k];
+			if (!mine) continue;
+			for (uint32_t q = 0; q < n_slots; q++) whole[begin + q] = row->initial;
+			for (uint32_t q = 0; q < n; q++) whole[begin + (uint32_t)w->slot[q]] = mine[q];
+		}
+	}
+}
+
+static void call_laws(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n_slots, uint32_t n) {
+	quern_column use[MOST_ROWS], use_second[MOST_ROWS];
+	quern_contact_batch b = quern_dem_batch(sh, w, n);
+	b.use = use;
+	b.use_second = use_second;
+	quern_dem_clear(sh, w, n);
+	for (uint32_t l = 0; l < sh->n_laws; l++) {
+		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
+		gather_rows(sh, w, law, l, begin, n, use, use_second);
+		if (n) ((const quern_contact_ops *)law->ops)->force[sh->s->dim - 2](law->self, &b);
+		scatter_rows(sh, w, law, begin, n_slots, n, use);
+	}
+}
+
+/* ---- sums ---- */
+typedef quern_real lanes8 __attribute__((vector_size(64)));
+
+/* Adds to the rows of the block's grains; a partner outside goes to the spare row. */
+QUERN_INLINE void add_pairs(const forces_shared *sh, const forces_work *w, quern_real (*row)[8],
+	quern_real *const force[3], quern_real *const torque[3], uint32_t begin, uint32_t end, uint32_t n,
+	const int dim, const bool spin) {
+	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
+	const uint32_t spare = end - begin;
+	for (uint32_t q = 0; q < n; q++) {
+		uint32_t i = (uint32_t)w->first[q] - begin, j = (uint32_t)w->second[q] - begin;
+		i = i < spare ? i : spare;
+		j = j < spare ? j : spare;
+		const quern_real share = weighted ? w->weight[q] : 1;
+		if (dim == 2) {
+			const quern_real x = share * force[0][q], y = share * force[1][q],
+							 t = spin ? share * torque[0][q] : 0;
+			row[i][0] += x, row[i][1] += y;
+			row[j][0] -= x, row[j][1] -= y;
+			if (spin) row[i][2] += w->arm[0][q] * t, row[j][2] += w->arm[1][q] * t;
+		} else {
+			const quern_real a = w->arm[0][q], b = w->arm[1][q];
+			const lanes8 f = { force[0][q], force[1][q], force[2][q], spin ? torque[0][q] : 0,
+				spin ? torque[1][q] : 0, spin ? torque[2][q] : 0, 0, 0 };
+			const lanes8 to_first = { share, share, share, share * a, share * a, share * a, 0, 0 };
+			const lanes8 to_second = { -share, -share, -share, share * b, share * b, share * b, 0, 0 };
+			*(lanes8 *)(void *)row[i] += to_first * f;
+			*(lanes8 *)(void *)row[j] += to_second * f;
+		}
+	}
+}
+
+QUERN_INLINE void block(
+	const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums, const int dim, const bool spin) {
+	const uint32_t first = sh->grain[b], last = sh->grain[b + 1];
+	for (uint32_t begin = sh->contact[b], end = sh->contact[b + 1]; begin < end; begin += sh->cap) {
+		const uint32_t n_slots = end - begin < sh->cap ? end - begin : sh->cap;
+		const uint32_t n = compact(sh, w, begin, n_slots, dim);
+		geometry(sh, w, n, dim);
+		motion(sh, w, n, dim, spin);
+		masses(sh, w, n);
+		call_laws(sh, w, begin, n_slots, n);
+		if (spin) dem_torques(w, w->force, w->torque, n, dim);
+		add_pairs(sh, w, w->row, w->force, w->torque, first, last, n, dim, spin);
+		quern_dem_keep_force(sh, w, sh->use[FORCE_CONTACT], begin, n_slots, n);
+		if (!sh->energy) continue;
+		if (spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
+		add_pairs(sh, w, w->drag_row, w->dashpot, w->drag_torque, first, last, n, dim, spin);
+		quern_dem_book(sh, w, sh->use[FORCE_CONTACT_SHEARED], begin, n_slots, n, first, last,
+			sh->use[FORCE_FIRST].index + begin, sums);
+	}
+}
+
+void quern_dem_pairs(const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums) {
+	if (sh->s->dim == 2) {
+		if (sh->spin) block(sh, w, b, sums, 2, true);
+		else block(sh, w, b, sums, 2, false);
+	} else if (sh->spin) block(sh, w, b, sums, 3, true);
+	else block(sh, w, b, sums, 3, false);
+}

@@ -1,0 +1,340 @@
+/* solver.dem - grains: discs and spheres with contact laws. docs/theory/grains.md */
+#include "dem.h"
+#include <math.h>
+#include <quern/math.h>
+#include <stdio.h>
+
+static const char *const radius_laws[] = { "normal", "uniform", NULL };
+static const quern_param fill_rows[] = { QUERN_PARAM_AS(dem_fill, lower, "region.box.lower", "m",
+											 "Lower corner of the region of centres.",
+											 .flags = QUERN_REQUIRED),
+	QUERN_PARAM_AS(dem_fill, upper, "region.box.upper", "m",
+		"Upper corner; may equal the lower one along an axis.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM(dem_fill, velocity, "m/s", "Velocity at the start."),
+	QUERN_PARAM(dem_fill, settle, NULL, "Let the grains come to rest before time starts."),
+	QUERN_PARAM(dem_fill, fixed, NULL, "These grains never move: a rough floor."), QUERN_END_PARAMS };
+static const quern_param place_rows[] = { QUERN_PARAM(
+											  dem_place, position, "m", "Centre.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM(dem_place, velocity, "m/s", "Velocity."),
+	QUERN_PARAM(dem_place, spin, "rad/s", "Angular velocity; in 2-D the first number counts."),
+	QUERN_PARAM(dem_place, radius, "m", "Radius; default: the mean.", .flags = QUERN_MAYBE | QUERN_MIN_OPEN,
+		.max = 1e6),
+	QUERN_PARAM(dem_place, fixed, NULL, "It never moves."), QUERN_END_PARAMS };
+static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.density", "kg/m^3",
+										  "Density of the grains' material.",
+										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM_AS(dem, radii.mean, "material.radius.mean", "m", "Mean radius.",
+		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM_AS(dem, radii.spread, "material.radius.spread", "1",
+		"Over the mean: standard deviation (normal, cut at two of them) or half-width (uniform).",
+		.max = 0.45),
+	QUERN_PARAM_AS(
+		dem, radii.law, "material.radius.law", "1", "Distribution of radii.", .choices = radius_laws),
+	QUERN_PARAM(
+		dem, fill, NULL, "Regions to fill with grains.", .rows = fill_rows, .item_size = sizeof(dem_fill)),
+	QUERN_PARAM(dem, place, NULL, "Single grains.", .rows = place_rows, .item_size = sizeof(dem_place)),
+	QUERN_PARAM(dem, file, NULL, "Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed].",
+		.flags = QUERN_FILE),
+	QUERN_PARAM(dem, skin, "1",
+		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
+		.min = 0.001, .max = 2, .flags = QUERN_ADVANCED),
+	QUERN_PARAM_AS(dem, rest, "settle.energy", "1",
+		"At rest when the mean kinetic energy of a grain is below this share of m g d.", .def = 1e-5,
+		.flags = QUERN_MIN_OPEN, .max = 1),
+	QUERN_PARAM_AS(dem, drag, "settle.drag", "1/s",
+		"Drag on every grain while settling; default sqrt(g/d)/10.", .flags = QUERN_MAYBE, .min = 0,
+		.max = 1e9),
+	QUERN_PARAM_AS(dem, settle_most, "settle.most", "1",
+		"Most steps of settling; then the run goes on with a warning.", .def = 1e6, .min = 1, .max = 2e9),
+	QUERN_PARAM(dem, fixed, NULL,
+		"Keep a flag for grains that do not move; set by itself where one is needed.",
+		.flags = QUERN_ADVANCED),
+	QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+
+static const quern_set sets[] = { { .name = "grain", .doc = "Discs or spheres, sorted by block and cell." },
+	{ .name = "contact", .doc = "Pairs of grains that are near; by block, pairs across blocks in both." },
+	{ .name = "touch", .doc = "Grains near bodies, by block, body and grain.", .slot = "bodies" },
+	{ .name = NULL } };
+
+static const quern_slot slots[] = { { .name = "contact",
+										.doc = "contact laws; the forces of a list add up",
+										.kind = QUERN_CONTACT,
+										.list = 1,
+										.stage = { "dem.forces" },
+										.repeat = "touch" },
+	{ .name = "neighbours",
+		.doc = "the search for near pairs",
+		.kind = QUERN_NEIGHBOURS,
+		.def = "cells",
+		.stage = { "dem.neighbours" } },
+	{ .name = "integrator",
+		.doc = "the step in time",
+		.kind = QUERN_INTEGRATOR,
+		.def = "symplectic_euler",
+		.stage = { "dem.forces", "dem.open" } },
+	{ .name = "bodies", .kind = QUERN_BODY, .list = 1, .stage = { "dem.forces" }, .same_as = "bodies" },
+	{ .name = "fill.packer",
+		.doc = "who places the grains",
+		.kind = QUERN_PACKER,
+		.def = "two_point_tangent",
+		.stage = { "dem.fill" } },
+	{ .name = NULL } };
+
+#define DISPLACEMENT                                                                                         \
+	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR,                                                 \
+		.doc = "Farthest way of a grain since the last list; infinite: the list is stale.")
+#define FIXED(access)                                                                                        \
+	F("grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed",                        \
+		.doc = "1: it does not move.")
+
+static const quern_use fill_uses[] = { F("grain.position", "m", QUERN_WRITE, QUERN_VECTOR,
+										   .flags = QUERN_SHOWN, .doc = "Centre."),
+	F("grain.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."),
+	F("grain.radius", "m", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, .doc = "Radius."),
+	F("grain.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted."),
+	F("grain.spin", "rad/s", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL, .doc = "Angular velocity."),
+	F("grain.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1,
+		.doc = "Share of its mass that the grain carries."),
+	FIXED(QUERN_WRITE),
+	F("grain.id", "1", QUERN_WRITE, QUERN_ID, .flags = QUERN_SHOWN, .doc = "Number of the grain, for ever."),
+	DISPLACEMENT, QUERN_END_USES };
+static const quern_use open_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
+	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
+	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
+	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), FIXED(QUERN_READ), DISPLACEMENT, QUERN_END_USES };
+static const quern_use near_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
+										   .flags = QUERN_OTHERS),
+	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
+	F("grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS), FIXED(QUERN_READ), DISPLACEMENT,
+	F("grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made."),
+	F("contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of lower id."),
+	F("contact.second", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of higher id."),
+	F("touch.grain", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain."),
+	F("touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body."), QUERN_END_USES };
+#define ENERGY(name, access, text)                                                                           \
+	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = text)
+static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
+											.flags = QUERN_OTHERS),
+	F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),
+	F("grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL),
+	F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
+	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
+	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
+	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
+	F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
+	F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL),
+	FIXED(QUERN_READ), F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), DISPLACEMENT,
+	F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
+	F("contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
+	F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
+	F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body"),
+	F("contact.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
+		.doc = "On the first, unweighted."),
+	F("touch.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
+		.doc = "On the grain, unweighted."),
+	F("grain.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
+		.doc = "Of all contacts, weighted; without gravity."),
+	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
+	F("total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
+		.doc = "Impulse that fixed grains have given to moving ones."),
+	F("contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "In the tangential spring."),
+	F("touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "In the tangential spring."),
+	ENERGY("kinetic", QUERN_WRITE, "Of the grains."),
+	ENERGY("potential", QUERN_WRITE, "Of the grains, -m g x."),
+	ENERGY("stored", QUERN_WRITE, "In normal springs."),
+	ENERGY("sheared", QUERN_WRITE, "In tangential springs."),
+	ENERGY("damped", QUERN_UPDATE, "Lost in dashpots so far."),
+	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."), F("grain.id", "1", QUERN_READ, QUERN_ID),
+	QUERN_END_USES };
+
+static const quern_stage stages[] = { { .name = "dem.fill",
+										  .doc = "Places the first grains.",
+										  .phase = QUERN_SETUP,
+										  .uses = fill_uses,
+										  .run = quern_dem_fill },
+	{ .name = "dem.open",
+		.doc = "The integrator's part before the forces, if it has one.",
+		.phase = QUERN_GRAINS,
+		.uses = open_uses,
+		.run = quern_dem_open },
+	{ .name = "dem.neighbours",
+		.doc = "Sorts grains, lists near pairs, carries their history.",
+		.phase = QUERN_GRAINS,
+		.sometimes = 1,
+		.uses = near_uses,
+		.run = quern_dem_neighbours },
+	{ .name = "dem.forces",
+		.doc = "Block by block: test, laws, sums, integration.",
+		.phase = QUERN_GRAINS,
+		.uses = force_uses,
+		.run = quern_dem_forces },
+	{ .name = NULL } };
+
+static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
+	dem *d = self;
+	quern_real g2 = 0, height = 0;
+	d->dim = setup->dim;
+	d->radii.stream = setup->stream;
+	const dem_fill *fill = d->fill.items;
+	for (uint32_t i = 0; i < d->fill.n; i++) {
+		for (uint32_t k = 0; k < d->dim; k++) {
+			if (!(fill[i].upper[k] >= fill[i].lower[k]))
+				return setup->host->fail(err, QUERN_E_PARAM, "fill",
+					"the region's upper corner must not be below the lower "
+					"one; axis %u is",
+					k);
+			if (!fill[i].fixed && (fill[i].lower[k] < setup->lower[k] || fill[i].upper[k] > setup->upper[k]))
+				return setup->host->fail(
+					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
+			const quern_real extent = fill[i].upper[k] - fill[i].lower[k];
+			height = !fill[i].fixed && extent > height ? extent : height;
+		}
+		d->fixed = d->fixed || fill[i].fixed;
+		d->settles = d->settles || fill[i].settle;
+	}
+	const dem_place *place = d->place.items;
+	for (uint32_t i = 0; i < d->place.n; i++) d->fixed = d->fixed || place[i].fixed;
+	if (!d->fill.n && !d->place.n && !d->file)
+		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
+	if (d->file) d->fixed = true; /* its header may say so */
+	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
+	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
+	if (isnan(d->drag)) d->drag = 0.1 * sqrt(gravity / diameter);
+	setup->host->publish(setup, "grain.diameter", "m", diameter);
+	setup->host->publish(setup, "grain.density", "kg/m^3", d->density);
+	setup->host->publish(setup, "grain.radius_spread", "1", d->radii.spread);
+	setup->host->publish(setup, "grain.radius_law", "1", d->radii.law);
+	setup->host->publish(
+		setup, "fill.height", "m", height > 0 ? height : setup->upper[d->dim - 1] - setup->lower[d->dim - 1]);
+	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
+	return QUERN_OK;
+}
+
+/* A random packing's bulk modulus, from the affine estimates of docs/theory/grains.md, section 5, with what real
+ * packings reach of them: 0.3 k_n for discs, 0.6 of z phi k_n / (3 pi D) for spheres (z = 5). */
+static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
+	const uint32_t *n_slot, quern_err *err) {
+	dem *d = self;
+	quern_real kn = 0, g2 = 0;
+	(void)err;
+	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
+	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
+	quern_real height = setup->upper[d->dim - 1] - setup->lower[d->dim - 1];
+	const dem_fill *fill = d->fill.items;
+	for (uint32_t i = 0; i < d->fill.n; i++)
+		if (!fill[i].fixed) height = fill[i].upper[d->dim - 1] - fill[i].lower[d->dim - 1];
+	const quern_real pressure = packing * d->density * sqrt(g2) * height;
+	const quern_real force = pressure * diameter * (d->dim == 3 ? diameter : 1);
+	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
+		const quern_bound *law = &slot[SLOT_CONTACT][l];
+		const quern_contact_ops *ops = law->ops;
+		if (ops->stiffness) kn += ops->stiffness(law->self, d->dim, 0.5 * d->radii.mean, 0.5 * force);
+		const quern_real reach = ops->reach ? ops->reach(law->self, 0.5 * quern_radius_most(&d->radii)) : 0;
+		d->reach = reach > d->reach ? reach : d->reach;
+	}
+	const quern_real bulk =
+		d->dim == 2 ? 0.3 * kn : 0.6 * 5 * packing * kn / (3 * 3.141592653589793 * diameter);
+	setup->host->publish(setup, "grain.stiffness", "N/m", kn);
+	setup->host->publish(setup, "grain.bulk_modulus", "Pa", bulk);
+	setup->host->publish(setup, "grain.packed_density", "kg/m^3", packing * d->density);
+	setup->host->publish(setup, "grain.critical_density", "kg/m^3", (packing - 0.03) * d->density);
+	return QUERN_OK;
+}
+
+/* The stiffest contact is that of the two lightest grains, or of the lightest against a body. */
+static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
+	const dem *d = self;
+	const quern_set_view grains = s->host->set(s->run, "grain");
+	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
+	const int32_t *fixed = s->use[FILL_FIXED].index;
+	quern_real least[2] = { INFINITY, INFINITY }, small = INFINITY, shortest = INFINITY;
+	for (uint32_t i = 0; i < grains.n; i++) {
+		if (fixed && fixed[i]) continue;
+		if (mass[i] < least[0]) least[1] = least[0], least[0] = mass[i], small = radius[i];
+		else if (mass[i] < least[1]) least[1] = mass[i];
+	}
+	if (!isfinite(least[0])) { /* none yet: what the distribution may bring */
+		small = quern_radius_least(&d->radii);
+		least[0] = least[1] = dem_mass(d->density, small, d->dim);
+	}
+	const quern_real pair = isfinite(least[1]) ? least[0] * least[1] / (least[0] + least[1]) : least[0];
+	const quern_bound *law = s->slot[SLOT_CONTACT];
+	for (uint32_t l = 0; l < s->n_slot[SLOT_CONTACT]; l++) {
+		const quern_contact_ops *ops = law[l].ops;
+		if (!ops->period) continue;
+		quern_real t = ops->period(law[l].self, d->dim, pair, 0.5 * small);
+		if (t < shortest)
+			shortest = t, snprintf(reason, 160, "%s between the two lightest grains", law[l].id);
+		for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
+			t = ops->period(law[l].n_variant ? law[l].variant[b] : law[l].self, d->dim, least[0], small);
+			if (t < shortest)
+				shortest = t, snprintf(reason, 160, "%s of the lightest grain on %s", law[l].id,
+								  s->slot[SLOT_BODIES][b].id);
+		}
+	}
+	const size_t n = __builtin_strlen(reason);
+	if (isfinite(shortest)) snprintf(reason + n, 160 - n, ", half-period %.3g s / 50", shortest);
+	else snprintf(reason, 160, "grains without a contact law");
+	*hard = 0.2 * shortest;
+	return shortest / 50;
+}
+
+static void account(const void *self, const quern_step *s, quern_account *out) {
+	const dem *d = self;
+	const quern_set_view grains = s->host->set(s->run, "grain");
+	const quern_column *use = s->use;
+	const quern_real *mass = use[FILL_MASS].real[0], *weight = use[FILL_WEIGHT].real[0],
+					 *radius = use[FILL_RADIUS].real[0];
+	const int32_t *fixed = use[FILL_FIXED].index;
+	const uint32_t n_spin = d->dim == 3 ? 3 : 1;
+	quern_real *sum = s->host->memory(s->run, ((size_t)grains.n + 1) * 6 * sizeof(quern_real));
+	if (!sum || !grains.n) return;
+	const size_t n = grains.n;
+	for (size_t i = 0; i < n; i++) {
+		const quern_real m = (fixed && fixed[i] ? 0 : 1) * (weight ? weight[i] : 1) * mass[i];
+		quern_real v2 = 0, w2 = 0, height = 0;
+		for (uint32_t k = 0; k < d->dim; k++) {
+			const quern_real v = use[FILL_VELOCITY].real[k][i];
+			v2 += v * v;
+			height -= s->gravity[k] * use[FILL_POSITION].real[k][i];
+			sum[(1 + k) * n + i] = m * v;
+		}
+		for (uint32_t k = 0; use[FILL_SPIN].real[0] && k < n_spin; k++)
+			w2 += use[FILL_SPIN].real[k][i] * use[FILL_SPIN].real[k][i];
+		sum[i] = m;
+		sum[4 * n + i] = 0.5 * m * (v2 + dem_inertia(d->dim) * radius[i] * radius[i] * w2);
+		sum[5 * n + i] = m * height;
+	}
+	const quern_real total = s->host->sum(s->run, n, sum);
+	out->mass += total;
+	out->discrete += total;
+	for (uint32_t k = 0; k < d->dim; k++) out->momentum[k] += s->host->sum(s->run, n, sum + (1 + k) * n);
+	out->kinetic += s->host->sum(s->run, n, sum + 4 * n);
+	out->potential += s->host->sum(s->run, n, sum + 5 * n);
+}
+
+static const quern_solver_ops ops = { .size = sizeof ops,
+	.sets = sets,
+	.slots = slots,
+	.stages = stages,
+	.ready = ready,
+	.limit = limit,
+	.settled = quern_dem_settled,
+	.account = account };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_SOLVER,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "solver.dem",
+	.brief = "Grains: discs and spheres with contact laws.",
+	.doc = "The discrete element method with linked cells, Verlet lists and batches of contacts.",
+	.cite = "Cundall & Strack 1979",
+	.instance_size = sizeof(dem),
+	.params = params,
+	.uses = uses,
+	.init = init,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");
