@@ -91,9 +91,11 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 		quern_h5_number(&h, h.file, "wall", run->wall_before);
 		quern_h5_number(&h, h.file, "settle_wall", run->settle_wall);
 		quern_h5_number(&h, h.file, "mass_initial", run->mass_initial);
-		if (run->has_grid)
-			close_set(quern_h5_write(
-				&h, h.file, "blocks", H5T_NATIVE_INT32, run->grid.view.n_blocks, 3, run->grid.at));
+		if (run->has_grid) {
+			const uint32_t n = run->grid.view.n_blocks;
+			close_set(quern_h5_write(&h, h.file, "blocks", H5T_NATIVE_INT32, n, 3, run->grid.at));
+			close_set(quern_h5_write(&h, h.file, "asked", H5T_NATIVE_UINT8, n, 1, run->grid.asked));
+		}
 		for (int s = 0; s < (int)run->plan->store.n_sets; s++) write_set(&h, run, s);
 		good = quern_h5_save(&h, path, why);
 	}
@@ -171,11 +173,14 @@ static bool read_grid(quern_run *run, quern_h5 *h, char why[256]) {
 	if (!quern_h5_read_size(h->file, "blocks", &rows, &columns) || rows > MOST_ENTRIES / 64)
 		return fault(why, "blocks", "the grid");
 	int32_t(*at)[3] = quern_take(rows, sizeof *at);
-	bool good = quern_h5_read(h->file, "blocks", H5T_NATIVE_INT32, rows, 3, at);
+	uint8_t *asked = quern_take(rows, 1);
+	bool good = quern_h5_read(h->file, "blocks", H5T_NATIVE_INT32, rows, 3, at) &&
+				quern_h5_read(h->file, "asked", H5T_NATIVE_UINT8, rows, 1, asked);
 	for (size_t b = 0; good && b < rows; b++)
 		for (int k = 0; k < 3; k++) good = good && at[b][k] >= 0 && at[b][k] < run->grid.blocks[k];
-	good = good && quern_grid_restore(&run->grid, (uint32_t)rows, (const int32_t(*)[3])at) == QUERN_OK;
+	good = good && quern_grid_restore(&run->grid, (uint32_t)rows, (const int32_t(*)[3])at, asked) == QUERN_OK;
 	free(at);
+	free(asked);
 	if (!good) return fault(why, "blocks", "the grid");
 	for (size_t s = 0; s < run->plan->store.n_sets; s++)
 		if (run->plan->store.sets[s].rows &&

@@ -76,11 +76,13 @@ quern_status quern_grid_init(quern_grid *g, uint32_t dim, double cell, const dou
 
 static void clear(quern_grid *g) {
 	free(g->at);
+	free(g->asked);
 	free(g->tile);
 	free(g->colour);
 	free(g->by_colour);
 	free(g->slot);
 	g->at = NULL;
+	g->asked = NULL;
 	g->tile = NULL;
 	g->colour = g->by_colour = NULL;
 	g->slot = NULL;
@@ -200,19 +202,22 @@ static quern_status colour_blocks(quern_grid *g, uint32_t n) {
 	return QUERN_OK;
 }
 
-quern_status quern_grid_restore(quern_grid *g, uint32_t n, const int32_t (*block)[3]) {
+quern_status quern_grid_restore(quern_grid *g, uint32_t n, const int32_t (*block)[3], const uint8_t *asked) {
 	quern_grid_view *v = &g->view;
 	clear(g);
 	g->at = malloc(((size_t)n + 1) * sizeof *g->at);
 	g->tile = malloc(((size_t)n * v->tile_size + 1) * sizeof(int32_t));
-	if (!g->at || !g->tile) return QUERN_E_MEMORY;
+	g->asked = calloc((size_t)n + 1, 1);
+	if (!g->at || !g->tile || !g->asked) return QUERN_E_MEMORY;
 	if (n) memcpy(g->at, block, n * sizeof *g->at);
+	if (n && asked) memcpy(g->asked, asked, n);
 	quern_status status = index_blocks(g, n);
 	if (status == QUERN_OK) status = colour_blocks(g, n);
 	if (status != QUERN_OK) return status;
 	for (uint32_t b = 0; b < n; b++) fill_tile(g, b, g->tile + (size_t)b * v->tile_size);
 	v->n_blocks = n;
 	v->at = (const int32_t(*)[3])g->at;
+	v->asked = g->asked;
 	v->tile = g->tile;
 	v->colour = g->colour;
 	v->by_colour = g->by_colour;
@@ -253,18 +258,29 @@ static quern_status carry_cells(const quern_grid *g, const quern_grid *old, quer
 	return status;
 }
 
+/* Marks the blocks that were asked for among those that came of it. */
+static void mark_asked(quern_grid *g, uint32_t n, const int32_t (*block)[3]) {
+	memset(g->asked, 0, g->view.n_blocks);
+	for (uint32_t i = 0; i < n; i++) {
+		const int32_t b = quern_grid_find(g, block[i]);
+		if (b >= 0) g->asked[b] = 1;
+	}
+}
+
 quern_status quern_grid_cover(quern_grid *g, quern_store *store, uint32_t n, const int32_t (*block)[3]) {
 	uint32_t m = 0;
 	int32_t(*wanted)[3] = dilate(g, n, block, &m);
 	if (!wanted) return QUERN_E_MEMORY;
 	if (m == g->view.n_blocks && g->at && !memcmp(wanted, g->at, m * sizeof *wanted)) {
+		mark_asked(g, n, block);
 		free(wanted);
 		return QUERN_OK;
 	}
 	quern_grid old = { .at = g->at, .slot = g->slot, .n_slots = g->n_slots };
 	g->at = NULL;
 	g->slot = NULL;
-	quern_status status = quern_grid_restore(g, m, (const int32_t(*)[3])wanted);
+	quern_status status = quern_grid_restore(g, m, (const int32_t(*)[3])wanted, NULL);
+	if (status == QUERN_OK) mark_asked(g, n, block);
 	for (size_t s = 0; s < store->n_sets && status == QUERN_OK; s++) {
 		if (!store->sets[s].grid) continue;
 		status = store->sets[s].rows ? quern_store_rows(store, (int)s, m * CELLS)

@@ -7,6 +7,7 @@ typedef struct quern_grid {
 	int32_t blocks[3];        /* per axis: as many as hold a node of the domain */
 	uint32_t *axis_colour[3]; /* by block coordinate; NULL: parity */
 	int32_t (*at)[3];
+	uint8_t *asked;
 	int32_t *tile;
 	uint32_t *colour, *by_colour;
 	int32_t *slot; /* hash table of block indices, -1 free */
@@ -22,5 +23,5 @@ void quern_grid_finish(quern_grid *);
  * their fields, rows are cleared. Blocks outside the domain are ignored. */
 quern_status quern_grid_cover(quern_grid *, quern_store *, uint32_t n, const int32_t (*block)[3]);
 /* Takes the blocks as they are, sorted and complete: a checkpoint's. Cells are not carried. */
-quern_status quern_grid_restore(quern_grid *, uint32_t n, const int32_t (*block)[3]);
+quern_status quern_grid_restore(quern_grid *, uint32_t n, const int32_t (*block)[3], const uint8_t *asked);
 int32_t quern_grid_find(const quern_grid *, const int32_t at[3]); /* -1: not allocated */

@@ -200,6 +200,7 @@ typedef struct quern_grid_view {
 	int32_t cells[3];   /* of the domain, per axis */
 	bool periodic[3];
 	const int32_t (*at)[3]; /* sorted */
+	const uint8_t *asked;   /* 1: by the last cover(); 0: a neighbour of such a block */
 	const int32_t *tile;    /* [n_blocks][tile_size]: entry of each tile node, -1 where there is none */
 	uint32_t n_colours;
 	const uint32_t *colour; /* colour[c] .. colour[c + 1] into by_colour: no two tiles share a node */
@@ -463,7 +464,6 @@ typedef struct quern_transfer_batch {
 	quern_real dt;
 	const quern_real *pic[3];    /* m/s, sum S v_i */
 	const quern_real *change[3]; /* m/s, sum S (v_i - v_i before forces and coupling) */
-	const quern_real *moment[9]; /* 1/s, sum S v_i (x) (x_i - x_p)/D; NULL unless ops->affine */
 	const quern_real *echo[3];   /* m/s, what the last pass sent, gone to the grid and back; NULL in pass 0 */
 	quern_real *send[3];         /* m/s, what to send next; NULL in the last pass */
 	quern_real *velocity[3];     /* m/s, in: old, out (last pass only): new */
@@ -471,8 +471,8 @@ typedef struct quern_transfer_batch {
 } quern_transfer_batch;
 
 typedef struct quern_transfer_ops {
-	uint32_t size, affine; /* affine: 1 keeps <set>.affine and sends m (v + C (x_i - x_p)) */
-	uint32_t passes, pad;  /* extra round trips */
+	uint32_t size;
+	uint32_t passes;                                                   /* extra round trips; 0: none */
 	void (*gather[2])(const void *self, const quern_transfer_batch *); /* [batch] */
 } quern_transfer_ops;
 

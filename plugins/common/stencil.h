@@ -1,0 +1,108 @@
+/* stencil - particles of one grid block and the nodes they reach, in the block's tile; for points and grains alike */
+#pragma once
+#include <quern/grid.h>
+
+enum { STENCIL = 64 }; /* particles at once */
+
+typedef struct stencil {
+	_Alignas(64) quern_real position[3][STENCIL]; /* m from the grid's lower corner */
+	quern_real value[3][3][STENCIL], slope[3][3][STENCIL];
+	int32_t first[3][STENCIL];
+	int32_t node[STENCIL]; /* of the lowest node, in the tile */
+} stencil;
+
+/* x: whole columns; the particles are entries begin .. begin + n, or those that `index` names. */
+QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shape, uint32_t block,
+	quern_real *const x[3], uint32_t begin, const int32_t *index, uint32_t n, stencil *s) {
+	quern_shape_batch b = { .n = n, .cap = STENCIL, .dim = g->dim, .inverse_cell = 1 / g->cell };
+	for (uint32_t a = 0; a < g->dim; a++) {
+		const quern_real lower = g->lower[a];
+		const quern_real *restrict from = x[a] + begin;
+		if (index)
+			for (uint32_t i = 0; i < n; i++) s->position[a][i] = x[a][index[i]] - lower;
+		else
+			for (uint32_t i = 0; i < n; i++) s->position[a][i] = from[i] - lower;
+		b.position[a] = s->position[a];
+		b.wall[a][0] = g->periodic[a] ? INT32_MIN : 0;
+		b.wall[a][1] = g->periodic[a] ? INT32_MAX : g->cells[a];
+		b.first[a] = s->first[a];
+		for (int k = 0; k < 3; k++) b.value[a][k] = s->value[a][k], b.slope[a][k] = s->slope[a][k];
+	}
+	((const quern_shape_ops *)shape->ops)->weights(shape->self, &b);
+	const int32_t span = (int32_t)g->span;
+	for (uint32_t i = 0; i < n; i++) {
+		int32_t node = 0;
+		for (uint32_t a = g->dim; a-- > 0;)
+			node = node * span + s->first[a][i] - (g->at[block][a] * (int32_t)g->edge - 1);
+		s->node[i] = node;
+	}
+}
+
+/* True while every node that a particle at x may reach lies in the tile of its block: half a cell beyond it. */
+QUERN_INLINE bool stencil_holds(const quern_grid_view *g, uint32_t block, uint32_t axis, quern_real x) {
+	const quern_real t =
+		(x - g->lower[axis]) * (1 / g->cell) - (quern_real)(g->at[block][axis] * (int32_t)g->edge);
+	return t >= -0.5 && t <= (quern_real)g->edge + 0.5;
+}
+
+/* What a particle sends: `base` to every node; `along` per metre of way from the particle to the node (a velocity
+ * gradient); `slope` per unit of the function's slope (a stress). Lanes that `along` and `slope` use must differ. */
+typedef struct sent {
+	quern_row base, along[3], slope[3];
+} sent;
+
+/* Adds one particle to the tile. `split` holds 1 in the lanes of `slope`, 0 elsewhere. */
+QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, quern_row split,
+	quern_row *tile, const int dim, quern_real cell, int32_t span) {
+	const quern_row rest = 1 - split;
+	quern_real way[3][3];
+	for (int a = 0; a < dim; a++)
+		for (int k = 0; k < 3; k++) way[a][k] = (quern_real)(s->first[a][i] + k) * cell - s->position[a][i];
+	for (int z = 0; z < (dim == 3 ? 3 : 1); z++) {
+		quern_row u = p->base, ax = p->along[0] + p->slope[0], ay = p->along[1], sy = p->slope[1];
+		if (dim == 3) {
+			const quern_real v = s->value[2][z][i];
+			u = v * (u + way[2][z] * p->along[2]) + s->slope[2][z][i] * p->slope[2];
+			ax = v * ax;
+			ay = v * ay;
+			sy = v * sy;
+		}
+		for (int y = 0; y < 3; y++) {
+			const quern_real v = s->value[1][y][i];
+			const quern_row e = v * (u + way[1][y] * ay) + s->slope[1][y][i] * sy, t = v * ax;
+			quern_row *row = tile + s->node[i] + (z * span + y) * span;
+			for (int x = 0; x < 3; x++) {
+				const quern_real w = s->value[0][x][i];
+				row[x] += w * e + (w * way[0][x] * rest + s->slope[0][x][i] * split) * t;
+			}
+		}
+	}
+}
+
+/* The weighted sum of a tile's rows at one particle in out[0]; with `slopes`, in out[1 + axis] their sums with the
+ * functions' slopes. */
+QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
+	const bool slopes, quern_row out[4], int32_t span) {
+	quern_row sum = { 0 }, sx = { 0 }, sy = { 0 }, sz = { 0 };
+	for (int z = 0; z < (dim == 3 ? 3 : 1); z++) {
+		quern_row u = { 0 }, ux = { 0 }, uy = { 0 };
+		for (int y = 0; y < 3; y++) {
+			const quern_row *row = tile + s->node[i] + (z * span + y) * span;
+			const quern_row e =
+				s->value[0][0][i] * row[0] + s->value[0][1][i] * row[1] + s->value[0][2][i] * row[2];
+			u += s->value[1][y][i] * e;
+			if (!slopes) continue;
+			const quern_row d =
+				s->slope[0][0][i] * row[0] + s->slope[0][1][i] * row[1] + s->slope[0][2][i] * row[2];
+			ux += s->value[1][y][i] * d;
+			uy += s->slope[1][y][i] * e;
+		}
+		const quern_real v = dim == 3 ? s->value[2][z][i] : 1;
+		sum += v * u;
+		sx += v * ux;
+		sy += v * uy;
+		if (dim == 3) sz += s->slope[2][z][i] * u;
+	}
+	out[0] = sum;
+	if (slopes) out[1] = sx, out[2] = sy, out[3] = sz;
+}

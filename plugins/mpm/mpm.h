@@ -1,0 +1,77 @@
+/* mpm - the continuum solver's own parameters and the rows of its stages, shared by its source files */
+#pragma once
+#include "../bodies/bodies.h"
+#include "../common/tools.h"
+#include <quern/grid.h>
+
+typedef struct mpm {
+	quern_real cell, cut; /* from the scene */
+	int32_t points;
+	quern_list fill;
+	quern_real stiffness, bulk, shear, density; /* of the step limit */
+	quern_real share_wall, share_next;          /* of a wall's nodes */
+	uint32_t dim;
+} mpm;
+
+enum { STRESS_NONE, STRESS_AT_REST };
+
+typedef struct mpm_fill {
+	quern_real lower[3], upper[3], velocity[3], lateral;
+	int32_t stress;
+} mpm_fill;
+
+enum { SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
+
+enum {
+	FILL_POSITION,
+	FILL_VELOCITY,
+	FILL_MASS,
+	FILL_VOLUME,
+	FILL_STRESS,
+	FILL_WEIGHT,
+	FILL_ENERGY,
+	FILL_UNSORTED
+};
+enum { SORT_POSITION, SORT_UNSORTED };
+enum {
+	SCATTER_POSITION,
+	SCATTER_VELOCITY,
+	SCATTER_MASS,
+	SCATTER_VOLUME,
+	SCATTER_STRESS,
+	SCATTER_WEIGHT,
+	SCATTER_GRADIENT,
+	SCATTER_NODE_MASS
+};
+enum { NODES_NODE, NODES_MOTION, NODES_IMPULSE, NODES_FACES, NODES_MIXTURE };
+enum { WALLS_MOTION, WALLS_NODE, WALLS_IMPULSE, WALLS_FACES };
+enum {
+	GATHER_MOTION,
+	GATHER_NODE,
+	GATHER_POSITION,
+	GATHER_VELOCITY,
+	GATHER_MASS,
+	GATHER_VOLUME,
+	GATHER_STRESS,
+	GATHER_WEIGHT,
+	GATHER_GRADIENT,
+	GATHER_PRESSURE,
+	GATHER_ENERGY,
+	GATHER_WAVE,
+	GATHER_UNSORTED
+};
+
+/* Lanes of a node's row (mass, momentum, force) and of its motion (velocity, change, density). */
+QUERN_INLINE uint32_t node_force(uint32_t dim) { return 1 + dim; }
+QUERN_INLINE uint32_t motion_change(uint32_t dim) { return dim; }
+QUERN_INLINE uint32_t motion_density(uint32_t dim) { return 2 * dim; }
+
+quern_status quern_mpm_fill(const void *self, const quern_step *);
+quern_status quern_mpm_sort(const void *self, const quern_step *);
+quern_status quern_mpm_scatter(const void *self, const quern_step *);
+quern_status quern_mpm_nodes(const void *self, const quern_step *);
+quern_status quern_mpm_walls(const void *self, const quern_step *);
+quern_status quern_mpm_gather(const void *self, const quern_step *);
+
+/* Sorts points by block and cell and covers them; `all` blocks that grains need are the hybrid's to add. */
+quern_status quern_mpm_sort_points(const quern_step *, quern_real *const *position);

@@ -1,0 +1,215 @@
+/* nodes - the grid between scatter and gather: velocities from momenta and forces, and what bodies do to them */
+#include "mpm.h"
+#include <math.h>
+#include <string.h>
+
+enum { N = QUERN_BLOCK_CELLS };
+
+typedef struct {
+	const mpm *p;
+	const quern_step *s;
+	const quern_grid_view *g;
+	quern_row *node, *motion;
+	uint32_t n_bodies;
+	quern_real
+		*impulse; /* [block][n_bodies + 1][3]: on the material; the last by faces and for light nodes */
+} grid_work;
+
+typedef struct {
+	_Alignas(64) quern_real position[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
+} near_nodes;
+
+/* Volume of a node over that of one inside: less at and next to a wall. */
+static quern_real node_share(const grid_work *w, const int32_t at[3]) {
+	quern_real share = 1;
+	for (uint32_t k = 0; k < w->g->dim; k++) {
+		if (w->g->periodic[k]) continue;
+		const int32_t from_wall = at[k] < w->g->cells[k] - at[k] ? at[k] : w->g->cells[k] - at[k];
+		if (from_wall == 0) share *= w->p->share_wall;
+		else if (from_wall == 1) share *= w->p->share_next;
+	}
+	return share;
+}
+
+static void node_at(const grid_work *w, uint32_t b, uint32_t k, int32_t at[3]) {
+	const int32_t edge = (int32_t)w->g->edge;
+	const int32_t place[3] = { (int32_t)k % edge, (int32_t)k / edge % edge, (int32_t)k / (edge * edge) };
+	for (uint32_t a = 0; a < 3; a++) at[a] = a < w->g->dim ? w->g->at[b][a] * edge + place[a] : 0;
+}
+
+/* Sets a node's velocity and books the impulse that it takes. */
+QUERN_INLINE void change_velocity(
+	quern_row *motion, uint32_t k, uint32_t dim, quern_real v, quern_real mass, quern_real *impulse) {
+	const quern_real jump = v - (*motion)[k];
+	(*motion)[k] = v;
+	(*motion)[motion_change(dim) + k] += jump;
+	impulse[k] += mass * jump;
+}
+
+static void touch_node(const body_item *item, const near_nodes *n, uint32_t i, uint32_t dim, quern_real mass,
+	quern_row *motion, quern_real *impulse) {
+	quern_real into = 0, along2 = 0, along[3] = { 0 };
+	for (uint32_t k = 0; k < dim; k++) into += ((*motion)[k] - n->velocity[k][i]) * n->normal[k][i];
+	if (item->boundary == BOUNDARY_STICKY && isnan(item->friction)) {
+		for (uint32_t k = 0; k < dim; k++) change_velocity(motion, k, dim, n->velocity[k][i], mass, impulse);
+		return;
+	}
+	if (!(into < 0)) return;
+	for (uint32_t k = 0; k < dim; k++) {
+		along[k] = (*motion)[k] - n->velocity[k][i] - into * n->normal[k][i];
+		along2 += along[k] * along[k];
+	}
+	const quern_real speed = sqrt(along2), rubbed = isnan(item->friction) ? 0 : -item->friction * into;
+	const quern_real kept = rubbed < speed ? 1 - rubbed / speed : rubbed > 0 ? 0 : 1;
+	for (uint32_t k = 0; k < dim; k++)
+		change_velocity(motion, k, dim, n->velocity[k][i] + kept * along[k], mass, impulse);
+}
+
+static bool body_is_far(
+	const quern_bound *body, const near_nodes *n, quern_body_batch batch, quern_real extent) {
+	near_nodes one;
+	for (uint32_t k = 0; k < batch.dim; k++) {
+		one.position[k][0] = n->position[k][0] + 0.5 * extent;
+		for (uint32_t i = 1; i < QUERN_LANES; i++) one.position[k][i] = one.position[k][0];
+		batch.position[k] = one.position[k];
+		batch.normal[k] = one.normal[k];
+		batch.velocity[k] = one.velocity[k];
+	}
+	for (uint32_t i = 0; i < QUERN_LANES; i++) one.radius[i] = 0.9 * extent; /* sqrt(3)/2 and a little */
+	batch.n = 1;
+	batch.cap = QUERN_LANES;
+	batch.radius = one.radius;
+	batch.gap = one.gap;
+	((const quern_body_ops *)body->ops)->closest(body->self, &batch);
+	return one.gap[0] > 0;
+}
+
+static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_real *impulse) {
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	const quern_step *s = w->s;
+	quern_body_batch batch = {
+		.n = N, .cap = N, .dim = s->dim, .pose = &still, .radius = n->radius, .gap = n->gap
+	};
+	for (uint32_t k = 0; k < s->dim; k++) {
+		batch.position[k] = n->position[k];
+		batch.normal[k] = n->normal[k];
+		batch.velocity[k] = n->velocity[k];
+	}
+	for (uint32_t i = 0; i < N; i++) {
+		quern_real x[3];
+		quern_grid_corner(w->g, b, i, x);
+		for (uint32_t k = 0; k < s->dim; k++) n->position[k][i] = x[k];
+		n->radius[i] = 0;
+	}
+	for (uint32_t j = 0; j < w->n_bodies; j++) {
+		const quern_bound *body = &s->slot[SLOT_BODIES][j];
+		const body_item *item = body->item;
+		if (!quern_body_is_there(body, s->settling) ||
+			(item->boundary == BOUNDARY_NONE && isnan(item->friction)))
+			continue;
+		if (body_is_far(body, n, batch, w->g->cell * w->g->edge)) continue;
+		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
+		for (uint32_t i = 0; i < N; i++) {
+			const quern_real mass = w->node[(size_t)b * N + i][0];
+			if (mass > 0 && n->gap[i] <= 1e-9 * w->g->cell)
+				touch_node(item, n, i, s->dim, mass, &w->motion[(size_t)b * N + i], impulse + 3 * j);
+		}
+	}
+}
+
+/* A face of the domain without a body is closed: nothing passes, nothing rubs. */
+static void close_faces(const grid_work *w, uint32_t b, quern_real *impulse) {
+	const quern_grid_view *g = w->g;
+	for (uint32_t k = 0; k < g->dim; k++) {
+		const int32_t first = g->at[b][k] * (int32_t)g->edge;
+		if (g->periodic[k] || (first > 0 && first + (int32_t)g->edge <= g->cells[k])) continue;
+		for (uint32_t i = 0; i < N; i++) {
+			int32_t at[3];
+			quern_row *motion = &w->motion[(size_t)b * N + i];
+			const quern_real mass = w->node[(size_t)b * N + i][0];
+			node_at(w, b, i, at);
+			if (!(mass > 0)) continue;
+			if ((at[k] == 0 && (*motion)[k] < 0) || (at[k] == g->cells[k] && (*motion)[k] > 0))
+				change_velocity(motion, k, g->dim, 0, mass, impulse);
+		}
+	}
+}
+
+static void meet_walls(void *arg, uint32_t b, uint32_t worker) {
+	const grid_work *w = arg;
+	quern_real *impulse = w->impulse + (size_t)b * (w->n_bodies + 1) * 3;
+	near_nodes *n = w->s->host->scratch(w->s->run, worker, sizeof *n);
+	bool any = false;
+	for (uint32_t i = 0; i < N && !any; i++) any = w->node[(size_t)b * N + i][0] > 0;
+	if (!any || !n) return;
+	meet_bodies(w, b, n, impulse);
+	close_faces(w, b, impulse + 3 * w->n_bodies);
+}
+
+/* v = v_0 + dt (f/m + g); a light node's force is limited to what a mass m_cut would feel of it. */
+static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
+	const grid_work *w = arg;
+	const quern_step *s = w->s;
+	const uint32_t dim = s->dim;
+	const quern_real h = w->g->cell, volume = dim == 2 ? h * h : h * h * h,
+					 cut = w->p->cut * w->p->density * volume;
+	quern_real *left = w->impulse + ((size_t)b * (w->n_bodies + 1) + w->n_bodies) * 3;
+	for (uint32_t i = 0; i < N; i++) {
+		const quern_row row = w->node[(size_t)b * N + i];
+		quern_row out = { 0 };
+		const quern_real mass = row[0], one_over = mass > 0 ? 1 / mass : 0,
+						 limited = mass > cut ? one_over : 1 / cut;
+		int32_t at[3];
+		node_at(w, b, i, at);
+		for (uint32_t k = 0; k < dim && mass > 0; k++) {
+			const quern_real force = row[node_force(dim) + k],
+							 change = s->dt * (force * limited + s->gravity[k]);
+			out[k] = row[1 + k] * one_over + change;
+			out[motion_change(dim) + k] = change;
+			left[k] -= mass > cut ? 0 : s->dt * force * (1 - mass * limited);
+		}
+		out[motion_density(dim)] = mass > 0 ? mass / (volume * node_share(w, at)) : 0;
+		w->motion[(size_t)b * N + i] = out;
+	}
+	meet_walls(arg, b, worker);
+}
+
+static bool prepare(grid_work *w, quern_column node, quern_column motion) {
+	const quern_step *s = w->s;
+	w->g = s->host->grid(s->run);
+	w->n_bodies = s->n_slot[SLOT_BODIES];
+	w->node = (quern_row *)(void *)node.real[0];
+	w->motion = (quern_row *)(void *)motion.real[0];
+	w->impulse =
+		s->host->memory(s->run, (size_t)w->g->n_blocks * (w->n_bodies + 1) * 3 * sizeof(quern_real) + 64);
+	return w->impulse != NULL;
+}
+
+/* Block after block, so that the sums do not depend on who did what. */
+static void collect(const grid_work *w, quern_column bodies, quern_column faces) {
+	for (uint32_t b = 0; b < w->g->n_blocks; b++)
+		for (uint32_t k = 0; k < w->s->dim; k++) {
+			const quern_real *impulse = w->impulse + (size_t)b * (w->n_bodies + 1) * 3;
+			for (uint32_t j = 0; j < w->n_bodies && bodies.real[0]; j++)
+				bodies.real[k][j] += impulse[3 * j + k];
+			if (faces.real[0]) faces.real[k][0] += impulse[3 * w->n_bodies + k];
+		}
+}
+
+quern_status quern_mpm_nodes(const void *self, const quern_step *s) {
+	grid_work w = { .p = self, .s = s };
+	if (!prepare(&w, s->use[NODES_NODE], s->use[NODES_MOTION])) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, w.g->n_blocks, move_nodes, &w);
+	collect(&w, s->use[NODES_IMPULSE], s->use[NODES_FACES]);
+	return QUERN_OK;
+}
+
+/* Without a coupling in between, the conditions still hold. */
+quern_status quern_mpm_walls(const void *self, const quern_step *s) {
+	grid_work w = { .p = self, .s = s };
+	if (!s->host->set(s->run, "mixture").n) return QUERN_OK;
+	if (!prepare(&w, s->use[WALLS_NODE], s->use[WALLS_MOTION])) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, w.g->n_blocks, meet_walls, &w);
+	collect(&w, s->use[WALLS_IMPULSE], s->use[WALLS_FACES]);
+	return QUERN_OK;
+}

@@ -1,0 +1,83 @@
+/* scatter - points to nodes: mass, momentum and internal force in one row, block by block in coloured order */
+#include "../common/stencil.h"
+#include "mpm.h"
+#include <string.h>
+
+typedef struct {
+	const quern_step *s;
+	const quern_grid_view *g;
+	const uint32_t *point; /* partition by block */
+	const uint32_t *list;  /* blocks of this colour */
+	quern_row *node;
+} scatter_work;
+
+typedef struct {
+	quern_row tile[QUERN_TILE_MOST];
+	stencil stencil;
+} scatter_memory;
+
+QUERN_INLINE sent send_point(const quern_column *u, uint32_t i, const int dim) {
+	const quern_real weight = u[SCATTER_WEIGHT].real[0] ? u[SCATTER_WEIGHT].real[0][i] : 1;
+	const quern_real m = weight * u[SCATTER_MASS].real[0][i], volume = -weight * u[SCATTER_VOLUME].real[0][i];
+	quern_real *const *v = u[SCATTER_VELOCITY].real, *const *t = u[SCATTER_STRESS].real;
+	sent p = { .base = { 0 } };
+	if (dim == 2) {
+		p.base = (quern_row) { m, m * v[0][i], m * v[1][i], 0, 0, 0, 0, 0 };
+		p.slope[0] = (quern_row) { 0, 0, 0, volume * t[0][i], volume * t[2][i], 0, 0, 0 };
+		p.slope[1] = (quern_row) { 0, 0, 0, volume * t[2][i], volume * t[1][i], 0, 0, 0 };
+	} else {
+		p.base = (quern_row) { m, m * v[0][i], m * v[1][i], m * v[2][i], 0, 0, 0, 0 };
+		p.slope[0] = (quern_row) { 0, 0, 0, 0, volume * t[0][i], volume * t[3][i], volume * t[5][i], 0 };
+		p.slope[1] = (quern_row) { 0, 0, 0, 0, volume * t[3][i], volume * t[1][i], volume * t[4][i], 0 };
+		p.slope[2] = (quern_row) { 0, 0, 0, 0, volume * t[5][i], volume * t[4][i], volume * t[2][i], 0 };
+	}
+	quern_real *const *l = u[SCATTER_GRADIENT].real; /* m (v + L (x_i - x)) */
+	if (l[0])
+		for (int a = 0; a < dim; a++)
+			for (int k = 0; k < dim; k++) p.along[a][1 + k] = m * l[dim * k + a][i];
+	return p;
+}
+
+QUERN_INLINE void scatter_block(const scatter_work *w, scatter_memory *m, uint32_t b, const int dim) {
+	const quern_column *u = w->s->use;
+	const uint32_t begin = w->point[b], end = w->point[b + 1];
+	const quern_row split =
+		dim == 2 ? (quern_row) { 0, 0, 0, 1, 1, 0, 0, 0 } : (quern_row) { 0, 0, 0, 0, 1, 1, 1, 0 };
+	if (begin == end) return;
+	memset(m->tile, 0, w->g->tile_size * sizeof(quern_row));
+	for (uint32_t i = begin; i < end; i += STENCIL) {
+		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
+		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[SCATTER_POSITION].real, i, NULL, n, &m->stencil);
+		for (uint32_t k = 0; k < n; k++) {
+			const sent p = send_point(u, i + k, dim);
+			stencil_scatter(&m->stencil, k, &p, split, m->tile, dim, w->g->cell, (int32_t)w->g->span);
+		}
+	}
+	quern_tile_add(w->g, w->node, b, m->tile);
+}
+
+static void scatter_2d(void *arg, uint32_t i, uint32_t worker) {
+	const scatter_work *w = arg;
+	scatter_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
+	if (m) scatter_block(w, m, w->list[i], 2);
+}
+static void scatter_3d(void *arg, uint32_t i, uint32_t worker) {
+	const scatter_work *w = arg;
+	scatter_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
+	if (m) scatter_block(w, m, w->list[i], 3);
+}
+
+quern_status quern_mpm_scatter(const void *self, const quern_step *s) {
+	const quern_set_view points = s->host->set(s->run, "point");
+	scatter_work w = { .s = s,
+		.g = s->host->grid(s->run),
+		.point = points.block,
+		.node = (quern_row *)(void *)s->use[SCATTER_NODE_MASS].real[0] };
+	(void)self;
+	for (uint32_t c = 0; c < w.g->n_colours && points.n; c++) {
+		w.list = w.g->by_colour + w.g->colour[c];
+		s->host->parallel(
+			s->run, w.g->colour[c + 1] - w.g->colour[c], s->dim == 2 ? scatter_2d : scatter_3d, &w);
+	}
+	return QUERN_OK;
+}

@@ -1,0 +1,253 @@
+/* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
+#include "mpm.h"
+#include <math.h>
+#include <stdio.h>
+
+static const char *const stresses[] = { "none", "at_rest", NULL };
+static const quern_param fill_rows[] = { QUERN_PARAM_AS(mpm_fill, lower, "region.box.lower", "m",
+											 "Lower corner of the material.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM_AS(
+		mpm_fill, upper, "region.box.upper", "m", "Upper corner of the material.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM(mpm_fill, velocity, "m/s", "Velocity at the start."),
+	QUERN_PARAM(mpm_fill, stress, "1", "Stress at the start: none, or that of the weight above.",
+		.choices = stresses),
+	QUERN_PARAM(mpm_fill, lateral, "1", "Horizontal over vertical stress at rest.", .def = 0.5, .max = 10),
+	QUERN_END_PARAMS };
+static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
+										  "Cell of the grid; the domain is a whole number of them.",
+										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(mpm, points, "1", "Points per cell and axis at the start.", .def = 2, .min = 1, .max = 8),
+	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
+		.rows = fill_rows, .item_size = sizeof(mpm_fill)),
+	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
+		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
+	QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+
+static const quern_set sets[] = { { .name = "point",
+									  .doc = "Material points, sorted by grid block and cell." },
+	{ .name = "node", .doc = "What points bring to the nodes.", .rows = 8 },
+	{ .name = "motion", .doc = "How nodes move.", .rows = 8 }, { .name = NULL } };
+
+static const quern_slot slots[] = { { .name = "material",
+										.doc = "the constitutive model",
+										.kind = QUERN_MATERIAL,
+										.stage = { "mpm.gather", "mpm.fill" } },
+	{ .name = "shape",
+		.doc = "the shape functions",
+		.kind = QUERN_SHAPE,
+		.def = "gimp",
+		.stage = { "mpm.gather" } },
+	{ .name = "transfer",
+		.doc = "from grid velocities to points",
+		.kind = QUERN_TRANSFER,
+		.def = "picflip",
+		.stage = { "mpm.gather" },
+		.particle = "point" },
+	{ .name = "bodies", .kind = QUERN_BODY, .list = 1, .stage = { "mpm.nodes" }, .same_as = "bodies" },
+	{ .name = NULL } };
+
+#define UNSORTED                                                                                             \
+	F("total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX,                                                      \
+		.doc = "1: points must be sorted before the next scatter.")
+#define IMPULSES                                                                                             \
+	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL),                           \
+		F("total.faces", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                         \
+			.doc =                                                                                           \
+				"Impulse on the continuum by closed faces of the domain and by the limit on light nodes.")
+static const quern_use fill_uses[] = { F("point.position", "m", QUERN_WRITE, QUERN_VECTOR,
+										   .flags = QUERN_SHOWN, .doc = "Position."),
+	F("point.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."),
+	F("point.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted."),
+	F("point.volume", "m^3", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, .doc = "Volume, unweighted."),
+	F("point.stress", "Pa", QUERN_WRITE, QUERN_SYMMETRIC, .doc = "Cauchy stress, tension positive."),
+	F("point.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1,
+		.doc = "Share of its mass that the point carries."),
+	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "Stored elastic energy."),
+	UNSORTED, QUERN_END_USES };
+static const quern_use sort_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR), UNSORTED,
+	QUERN_END_USES };
+static const quern_use scatter_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR),
+	F("point.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
+	F("point.volume", "m^3", QUERN_READ, QUERN_SCALAR), F("point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC),
+	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
+	F("point.gradient", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL),
+	F("node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass."),
+	F("node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum."),
+	F("node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force."), QUERN_END_USES };
+static const quern_use nodes_uses[] = { F("node.mass", "kg", QUERN_READ, QUERN_SCALAR),
+	F("motion.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."), IMPULSES,
+	F("motion.change", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity gained in this step."),
+	F("motion.density", "kg/m^3", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass of a node over its volume."),
+	F("node.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR), F("node.force", "N", QUERN_READ, QUERN_VECTOR),
+	QUERN_END_USES };
+static const quern_use walls_uses[] = { F("motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
+	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), IMPULSES,
+	F("motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR), QUERN_END_USES };
+static const quern_use gather_uses[] = { F("motion.velocity", "m/s", QUERN_READ, QUERN_VECTOR),
+	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR),
+	F("point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
+	F("point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR),
+	F("point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC),
+	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
+	F("point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL,
+		.doc = "Velocity gradient of the last step."),
+	F("point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "Minus the mean normal stress."),
+	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "Stored elastic energy."),
+	F("point.wave_speed", "m/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "Of pressure waves."),
+	UNSORTED, F("motion.change", "m/s", QUERN_READ, QUERN_VECTOR),
+	F("motion.density", "kg/m^3", QUERN_READ, QUERN_SCALAR), QUERN_END_USES };
+
+static const quern_stage stages[] = { { .name = "mpm.fill",
+										  .doc = "Places the first points.",
+										  .phase = QUERN_SETUP,
+										  .uses = fill_uses,
+										  .run = quern_mpm_fill },
+	{ .name = "mpm.sort",
+		.doc = "Orders points by block and cell, allocates blocks.",
+		.phase = QUERN_TO_GRID,
+		.sometimes = 1,
+		.uses = sort_uses,
+		.run = quern_mpm_sort },
+	{ .name = "mpm.scatter",
+		.doc = "Points to nodes: mass, momentum, force.",
+		.phase = QUERN_TO_GRID,
+		.uses = scatter_uses,
+		.run = quern_mpm_scatter },
+	{ .name = "mpm.nodes",
+		.doc = "Grid velocities; bodies and faces.",
+		.phase = QUERN_TO_GRID,
+		.uses = nodes_uses,
+		.run = quern_mpm_nodes },
+	{ .name = "mpm.walls",
+		.doc = "Bodies and faces again, after a coupling.",
+		.phase = QUERN_FROM_GRID,
+		.uses = walls_uses,
+		.run = quern_mpm_walls },
+	{ .name = "mpm.gather",
+		.doc = "Nodes to points: velocity, position, volume, stress.",
+		.phase = QUERN_FROM_GRID,
+		.uses = gather_uses,
+		.run = quern_mpm_gather },
+	{ .name = NULL } };
+
+static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
+	mpm *p = self;
+	quern_real g2 = 0, height = 0;
+	p->dim = setup->dim;
+	for (uint32_t k = 0; k < p->dim; k++) {
+		const quern_real cells = (setup->upper[k] - setup->lower[k]) / p->cell, whole = floor(cells + 0.5);
+		g2 += setup->gravity[k] * setup->gravity[k];
+		if (whole < 1 || fabs(cells - whole) > 1e-6 * whole)
+			return setup->host->fail(err, QUERN_E_PARAM, "cell",
+				"the domain is %.6g cells wide along axis %u; it must be a whole number: make it %.6g m, or "
+				"the cell %.6g m",
+				cells, k, (whole < 1 ? 1 : whole) * p->cell,
+				(setup->upper[k] - setup->lower[k]) / (whole < 1 ? 1 : whole));
+	}
+	const mpm_fill *fill = p->fill.items;
+	for (uint32_t i = 0; i < p->fill.n; i++)
+		for (uint32_t k = 0; k < p->dim; k++) {
+			const quern_real extent = fill[i].upper[k] - fill[i].lower[k], slack = 1e-9 * p->cell;
+			if (!(extent > 0))
+				return setup->host->fail(err, QUERN_E_PARAM, "fill",
+					"the region's upper corner must be above the lower one; axis %u is not", k);
+			if (fill[i].lower[k] < setup->lower[k] - slack || fill[i].upper[k] > setup->upper[k] + slack)
+				return setup->host->fail(
+					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
+			height = extent > height ? extent : height;
+		}
+	setup->host->publish(setup, "grid.cell", "m", p->cell);
+	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(sqrt(g2) / height) : 0);
+	return QUERN_OK;
+}
+
+static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
+	const uint32_t *n_slot, quern_err *err) {
+	mpm *p = self;
+	(void)n_slot, (void)err;
+	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE];
+	((const quern_material_ops *)material->ops)
+		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
+	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
+	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
+	setup->host->publish(setup, "continuum.density", "kg/m^3", p->density);
+	setup->host->publish(setup, "continuum.bulk_modulus", "Pa", p->bulk);
+	return QUERN_OK;
+}
+
+/* omega^2 = chi max(d K, 2 G)/rho for any arrangement of points; with advection dt (omega/2 + |v|/h) < 1. */
+static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
+	const mpm *p = self;
+	const uint32_t n = s->host->set(s->run, "point").n;
+	quern_real fastest = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		quern_real v2 = 0;
+		for (uint32_t k = 0; k < s->dim; k++)
+			v2 += s->use[FILL_VELOCITY].real[k][i] * s->use[FILL_VELOCITY].real[k][i];
+		fastest = v2 > fastest ? v2 : fastest;
+	}
+	fastest = sqrt(fastest);
+	const quern_real modulus = s->dim * p->bulk > 2 * p->shear ? s->dim * p->bulk : 2 * p->shear;
+	const quern_real omega = sqrt(p->stiffness * modulus / p->density) / p->cell;
+	const quern_real rate = 0.5 * omega + fastest / p->cell;
+	snprintf(reason, 160, "stress waves of %s in cells of %.3g m%s", s->slot[SLOT_MATERIAL][0].id, p->cell,
+		fastest > 0.5 * omega * p->cell ? " and the speed of points" : "");
+	*hard = 1 / rate;
+	return 0.9 / rate;
+}
+
+static void account(const void *self, const quern_step *s, quern_account *out) {
+	const quern_column *u = s->use;
+	const size_t n = s->host->set(s->run, "point").n;
+	quern_real *sum = s->host->memory(s->run, (n + 1) * 7 * sizeof(quern_real));
+	(void)self;
+	if (!sum || !n) return;
+	for (size_t i = 0; i < n; i++) {
+		const quern_real m =
+			(u[FILL_WEIGHT].real[0] ? u[FILL_WEIGHT].real[0][i] : 1) * u[FILL_MASS].real[0][i];
+		quern_real v2 = 0, height = 0;
+		for (uint32_t k = 0; k < s->dim; k++) {
+			const quern_real v = u[FILL_VELOCITY].real[k][i];
+			v2 += v * v;
+			height -= s->gravity[k] * u[FILL_POSITION].real[k][i];
+			sum[(1 + k) * n + i] = m * v;
+		}
+		sum[i] = m;
+		sum[4 * n + i] = 0.5 * m * v2;
+		sum[5 * n + i] = m * height;
+		sum[6 * n + i] = u[FILL_ENERGY].real[0] ? m * u[FILL_ENERGY].real[0][i] : 0;
+	}
+	out->mass += s->host->sum(s->run, n, sum);
+	for (uint32_t k = 0; k < s->dim; k++) out->momentum[k] += s->host->sum(s->run, n, sum + (1 + k) * n);
+	out->kinetic += s->host->sum(s->run, n, sum + 4 * n);
+	out->potential += s->host->sum(s->run, n, sum + 5 * n);
+	out->elastic += s->host->sum(s->run, n, sum + 6 * n);
+}
+
+static const quern_solver_ops ops = { .size = sizeof ops,
+	.sets = sets,
+	.slots = slots,
+	.stages = stages,
+	.ready = ready,
+	.limit = limit,
+	.account = account };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_SOLVER,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "solver.mpm",
+	.brief = "The continuum: material points on a sparse grid.",
+	.doc = "Explicit, stress last; shape functions folded at walls; blocks of 64 cells allocated where there "
+		   "is material.",
+	.cite = "Sulsky et al. 1994; Bardenhagen & Kober 2004",
+	.instance_size = sizeof(mpm),
+	.params = params,
+	.uses = uses,
+	.init = init,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,0 +1,214 @@
+/* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no tension.
+ * docs/theory/materials.md, section 4
+ *
+ * What is kept is small where strains are, J - 1 and dev b of the isochoric strain b, so that the yield stress is met to
+ * round-off at any pressure; b = dev b + t I follows from det b = 1. */
+#include "../mpm_hypo/rotation.h"
+#include <quern/math.h>
+
+typedef struct {
+	quern_real bulk_modulus, poisson, friction, density; /* from the scene */
+	quern_real shear;                                    /* G */
+} drucker_prager;
+
+static const quern_param params[] = { QUERN_PARAM(drucker_prager, bulk_modulus, "Pa",
+										  "Bulk modulus K; in 2-D lambda + G.", .from = "grain.bulk_modulus",
+										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e15),
+	QUERN_PARAM(drucker_prager, poisson, "1", "Poisson's ratio; sets the shear modulus.", .def = 0.3,
+		.min = -0.9, .max = 0.49),
+	QUERN_PARAM(drucker_prager, friction, "1", "mu, largest shear stress over pressure.", .def = 0.3819,
+		.planar = 0.26, .flags = QUERN_PLANAR, .max = 10),
+	QUERN_PARAM(drucker_prager, density, "kg/m^3", "rho_0, below which the material is open.",
+		.from = "grain.critical_density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_END_PARAMS };
+
+enum { VOLUME, DEVIATOR, ASSIGNED_VOLUME, ASSIGNED_DEVIATOR };
+static const quern_use uses[] = { { .field = "point.volume_strain",
+									  .unit = "1",
+									  .doc = "J - 1, elastic; positive while the point is open.",
+									  .access = QUERN_UPDATE,
+									  .shape = QUERN_SCALAR },
+	{ .field = "point.deviator",
+		.unit = "1",
+		.doc = "Deviator of the isochoric elastic left Cauchy-Green strain.",
+		.access = QUERN_UPDATE,
+		.shape = QUERN_SYMMETRIC },
+	{ .field = "point.volume_strain",
+		.unit = "1",
+		.doc = "From stress.",
+		.access = QUERN_WRITE,
+		.shape = QUERN_SCALAR,
+		.hook = QUERN_MATERIAL_ASSIGN },
+	{ .field = "point.deviator",
+		.unit = "1",
+		.doc = "From stress.",
+		.access = QUERN_WRITE,
+		.shape = QUERN_SYMMETRIC,
+		.hook = QUERN_MATERIAL_ASSIGN },
+	QUERN_END_USES };
+
+static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
+	drucker_prager *law = self;
+	(void)err;
+	law->shear = shear_modulus(setup->dim, law->bulk_modulus, law->poisson);
+	return QUERN_OK;
+}
+
+QUERN_INLINE quern_real symmetric_determinant(symmetric s) {
+	return s.xx * (s.yy * s.zz - s.yz * s.yz) - s.xy * (s.xy * s.zz - s.yz * s.xz) +
+		   s.xz * (s.xy * s.yz - s.yy * s.xz);
+}
+
+/* One step of Newton's method on (1 + y)^3 - q (1 + y) + det - 1 = 0, with 1 - 1 taken out */
+QUERN_INLINE quern_real excess_step(quern_real y, quern_real q, quern_real det) {
+	const quern_real t = 1 + y;
+	return y - (y * (3 + y * (3 + y)) - (q * t - det)) / (3 * t * t - q);
+}
+
+/* t - 1 of det(s + t I) = 1 for a deviator s, q = s:s/2. In 3-D it is the largest root that makes s + t I positive: with
+ * r^2 = q/3 it lies between r, beyond which the cubic is convex, and sqrt(1 + 4 r^2). Newton's steps from above are
+ * monotone; five are enough for any r below 1/4, eight up to 4. */
+QUERN_INLINE quern_real isochoric_excess(const int dim, symmetric s) {
+	const quern_real q = symmetric_half_square(dim, s);
+	if (dim == 2) return q / (1 + __builtin_sqrt(1 + q));
+	const quern_real det = symmetric_determinant(s), above = 4.0 / 3 * q;
+	quern_real y = above / (1 + __builtin_sqrt(1 + above));
+	y = excess_step(excess_step(y, q, det), q, det);
+	y = excess_step(excess_step(y, q, det), q, det);
+	y = excess_step(excess_step(y, q, det), q, det);
+	return excess_step(excess_step(y, q, det), q, det);
+}
+
+/* det(1 + A) - 1 */
+QUERN_INLINE quern_real volume_change(const int dim, tensor a) {
+	const quern_real plane = a.xx * a.yy - a.xy * a.yx;
+	if (dim == 2) return (a.xx + a.yy) + plane;
+	const quern_real yz = a.yy * a.zz - a.yz * a.zy, xz = a.xx * a.zz - a.xz * a.zx;
+	const quern_real det =
+		a.xx * yz - a.xy * (a.yx * a.zz - a.yz * a.zx) + a.xz * (a.yx * a.zy - a.yy * a.zx);
+	return (a.xx + a.yy + a.zz) + ((plane + yz + xz) + det);
+}
+
+/* (J^2 - 1)/2 - ln J at J = 1 + e. With s = e/(2 + e), ln J = 2 (s + s^3/3 + s^5/5 + ...) and e - 2 s = e s. */
+QUERN_INLINE quern_real volume_energy(quern_real e) {
+	const quern_real s = e / (2 + e), z = s * s;
+	const quern_real series =
+		quern_horner(z, 1.0 / 3, 1.0 / 5, 1.0 / 7, quern_horner(z, 1.0 / 9, 1.0 / 11, 1.0 / 13, 0));
+	const quern_real near = e * s + 0.5 * e * e - 2 * s * z * series;
+	const quern_real far = e + 0.5 * e * e - quern_log(1 + e);
+	return quern_abs(e) < 0.125 ? near : far;
+}
+
+/* W = K/2 ((J^2 - 1)/2 - ln J) + G/2 (tr b - d), of a unit of volume without stress */
+QUERN_INLINE void put_outputs(const int dim, const drucker_prager *law, quern_real *const *volume,
+	quern_real *const *deviator, const quern_material_batch *b) {
+	put_wave_speeds(dim, law->bulk_modulus, law->shear, law->density, b);
+	const quern_real bulk = 0.5 * law->bulk_modulus / law->density,
+					 shear = 0.5 * dim * law->shear / law->density;
+	const quern_real *restrict strain = volume[0];
+	quern_real *restrict energy = b->energy;
+	if (!energy) return;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < b->n; i++) {
+		const symmetric s = SYMMETRIC_AT(deviator, i, dim);
+		const quern_real e = strain[i] < 0 ? strain[i] : 0;
+		energy[i] = bulk * volume_energy(e) + shear * isochoric_excess(dim, s);
+	}
+}
+
+QUERN_INLINE void update(const int dim, const void *self, const quern_material_batch *b) {
+	const drucker_prager law = *(const drucker_prager *)self;
+	const quern_real dt = b->dt, shear = law.shear, half_bulk = 0.5 * law.bulk_modulus, full = law.density;
+	const quern_real *restrict grid_density = b->grid_density;
+	quern_real *const *volume = b->use[VOLUME].real, *const *deviator = b->use[DEVIATOR].real;
+	quern_real *restrict strain = volume[0], *restrict density = b->density;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < b->n; i++) {
+		/* f = 1 + A; J* = J det f, b* = f b f^T/det(f)^(2/d) */
+		const tensor l = TENSOR_AT(b->gradient, i, dim);
+		const tensor a = { dt * l.xx, dt * l.xy, dt * l.xz, dt * l.yx, dt * l.yy, dt * l.yz, dt * l.zx,
+			dt * l.zy, dt * l.zz };
+		const symmetric was = SYMMETRIC_AT(deviator, i, dim);
+		const quern_real excess = isochoric_excess(dim, was), change = volume_change(dim, a);
+		const symmetric whole = symmetric_scale_shift(dim, 1, was, 1 + excess);
+		const quern_real edge = dim == 2 ? 1 : quern_cbrt(1 + change);
+		const quern_real shrink = dim == 2 ? 1 / (1 + change) : 1 / (edge * edge);
+		const symmetric trial = symmetric_deviator(dim, pushed(dim, was, whole, a));
+		const quern_real e = strain[i] + (1 + strain[i]) * change;
+		/* Kirchhoff: p = K/2 (1 - J^2), tau = G sqrt(s:s/2) <= mu p */
+		const quern_real p = -half_bulk * e * (2 + e), limit = law.friction * p;
+		const quern_real tau = shear * shrink * __builtin_sqrt(symmetric_half_square(dim, trial));
+		const bool open = e > 0;
+		const symmetric back = symmetric_scale_shift(dim, shrink * (tau > limit ? limit / tau : 1), trial, 0);
+		const symmetric now = symmetric_select(open, (symmetric) { 0, 0, 0, 0, 0, 0 }, back);
+		SYMMETRIC_PUT(deviator, i, now, dim);
+		/* an open point's volume is the grid's: J = max(1, rho_0/rho_g) */
+		const quern_real rho = grid_density[i], loose = rho < full ? rho : full;
+		strain[i] = open ? (full - loose) / loose : e;
+		density[i] = open ? loose : density[i];
+		const quern_real one_over_j = open ? 0 : 1 / (1 + e);
+		const symmetric stress = symmetric_scale_shift(dim, shear * one_over_j, now, -p * one_over_j);
+		SYMMETRIC_PUT(b->stress, i, stress, dim);
+	}
+	put_outputs(dim, &law, volume, deviator, b);
+}
+static void update_2d(const void *self, const quern_material_batch *b) { update(2, self, b); }
+static void update_3d(const void *self, const quern_material_batch *b) { update(3, self, b); }
+
+/* tr sigma/d = K/2 (J - 1/J), dev sigma = G/J dev b */
+QUERN_INLINE void assign(const int dim, const void *self, const quern_material_batch *b) {
+	const drucker_prager law = *(const drucker_prager *)self;
+	const quern_real softness = 1 / law.bulk_modulus, shear_softness = 1 / law.shear;
+	quern_real *const *volume = b->use[ASSIGNED_VOLUME].real, *const *deviator =
+																  b->use[ASSIGNED_DEVIATOR].real;
+	quern_real *restrict strain = volume[0], *restrict density = b->density;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < b->n; i++) {
+		const symmetric given = SYMMETRIC_AT(b->stress, i, dim), s = symmetric_deviator(dim, given);
+		const quern_real p = -symmetric_mean(dim, given), limit = law.friction * p;
+		const quern_real tau = __builtin_sqrt(symmetric_half_square(dim, s));
+		const bool pressed = p > 0;
+		const quern_real share = pressed ? tau > limit ? limit / tau : 1 : 0;
+		const quern_real kept = pressed ? p : 0, x = kept * softness;
+		const quern_real e = x * x / (1 + __builtin_sqrt(1 + x * x)) - x; /* J = sqrt(1 + x^2) - x */
+		const symmetric stress = symmetric_scale_shift(dim, share, s, -kept);
+		const symmetric now = symmetric_scale_shift(dim, share * shear_softness * (1 + e), s, 0);
+		SYMMETRIC_PUT(b->stress, i, stress, dim);
+		SYMMETRIC_PUT(deviator, i, now, dim);
+		strain[i] = e;
+		density[i] = law.density / (1 + e);
+	}
+	put_outputs(dim, &law, volume, deviator, b);
+}
+static void assign_2d(const void *self, const quern_material_batch *b) { assign(2, self, b); }
+static void assign_3d(const void *self, const quern_material_batch *b) { assign(3, self, b); }
+
+static void moduli(const void *self, uint32_t dim, quern_real *bulk, quern_real *shear, quern_real *density) {
+	const drucker_prager *law = self;
+	(void)dim;
+	*bulk = law->bulk_modulus;
+	*shear = law->shear;
+	*density = law->density;
+}
+
+static const quern_material_ops ops = { .size = sizeof ops,
+	.update = { update_2d, update_3d },
+	.assign = { assign_2d, assign_3d },
+	.moduli = moduli };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_MATERIAL,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "material.drucker_prager",
+	.brief = "Hyperelastic with Drucker and Prager's yield stress, one friction for every rate.",
+	.doc =
+		"Stress follows from a stored energy, for strains of any size. The yield stress is friction times "
+		"pressure, and flow keeps the volume. Stretched beyond its density without stress a point is open: "
+		"it carries nothing, and takes its volume from the grid until it is dense again.",
+	.cite = "Yue et al. 2018; Simo 1992",
+	.instance_size = sizeof(drucker_prager),
+	.params = params,
+	.uses = uses,
+	.init = init,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,0 +1,172 @@
+/* material.mu_i - hypoelastic up to a yield stress that grows with the inertial number, no tension, and no stress below
+ * the critical density. docs/theory/materials.md, section 3 */
+#include "rotation.h"
+#include <quern/math.h>
+
+typedef struct {
+	quern_real bulk_modulus, poisson, static_friction, limit_friction, inertial_number, diameter,
+		grain_density, critical_density, pressure_rate; /* from the scene */
+	quern_real shear;                                   /* G */
+} mu_i;
+
+static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
+										  "Bulk modulus K; in 2-D lambda + G.", .from = "grain.bulk_modulus",
+										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e15),
+	QUERN_PARAM(
+		mu_i, poisson, "1", "Poisson's ratio; sets the shear modulus.", .def = 0.3, .min = -0.9, .max = 0.49),
+	QUERN_PARAM(mu_i, static_friction, "1", "mu_s, friction of slow flow.", .def = 0.3819, .planar = 0.26,
+		.flags = QUERN_PLANAR, .max = 10),
+	QUERN_PARAM(mu_i, limit_friction, "1", "mu_2, friction of fast flow; mu_s: no dependence on the rate.",
+		.def = 0.6435, .planar = 0.60, .flags = QUERN_PLANAR, .max = 10),
+	QUERN_PARAM(mu_i, inertial_number, "1", "I_0, half-way between the two; 0: friction is mu_2.",
+		.def = 0.279, .planar = 0.36, .flags = QUERN_PLANAR, .max = 100),
+	QUERN_PARAM(mu_i, diameter, "m", "Mean diameter of the grains.", .from = "grain.diameter",
+		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(mu_i, grain_density, "kg/m^3", "Density of a grain.", .from = "grain.density",
+		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(mu_i, critical_density, "kg/m^3", "Below it the material is open and carries no stress.",
+		.from = "grain.critical_density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(mu_i, pressure_rate, "1/s", "beta, pull of the pressure towards K ln(rho/rho_c).", .max = 1e9,
+		.flags = QUERN_ADVANCED),
+	QUERN_END_PARAMS };
+
+enum { SHEAR_RATE };
+static const quern_use uses[] = { { .field = "point.shear_rate",
+									  .unit = "1/s",
+									  .doc = "Equivalent plastic shear rate; of an open point the whole one.",
+									  .access = QUERN_WRITE,
+									  .shape = QUERN_SCALAR,
+									  .flags = QUERN_OPTIONAL },
+	QUERN_END_USES };
+
+static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
+	mu_i *law = self;
+	const quern_host *host = setup->host;
+	if (law->limit_friction < law->static_friction)
+		return host->fail(err, QUERN_E_PARAM, "limit_friction",
+			"%g is below static_friction, %g; friction must not fall with the rate", law->limit_friction,
+			law->static_friction);
+	if (law->critical_density > law->grain_density)
+		return host->fail(err, QUERN_E_PARAM, "critical_density",
+			"%g kg/m^3 is above the density of a grain, %g", law->critical_density, law->grain_density);
+	law->shear = shear_modulus(setup->dim, law->bulk_modulus, law->poisson);
+	return QUERN_OK;
+}
+
+/* The root of (tau - S_0) a = (S_2 - tau) (trial - tau) between S_0 and the smaller of S_2 and `trial`, for trial > S_0.
+ * From S_0 up, with both ends measured from there, nothing cancels: at S_2 = S_0 it is S_0, at a = 0 the smaller end. */
+QUERN_INLINE quern_real flow_stress(quern_real s0, quern_real s2, quern_real trial, quern_real a) {
+	const quern_real u = s2 - s0, v = trial - s0, apart = u - v;
+	const quern_real root = __builtin_sqrt(apart * apart + a * (a + 2 * (u + v)));
+	return s0 + 2 * u * v / (u + v + a + root);
+}
+
+QUERN_INLINE void put_outputs(const int dim, const mu_i *law, const quern_material_batch *b) {
+	put_wave_speeds(dim, law->bulk_modulus, law->shear, law->critical_density, b);
+	put_hypoelastic_energies(dim, law->bulk_modulus, law->shear, b);
+}
+
+/* `dim`, `rated` and `relaxed` are constants in every caller. */
+QUERN_INLINE void kernel(
+	const int dim, const bool rated, const bool relaxed, const mu_i *self, const quern_material_batch *b) {
+	const mu_i law = *self;
+	const quern_real dt = b->dt, shear = law.shear, lambda = law.bulk_modulus - 2 * shear / dim;
+	const quern_real mu_s = law.static_friction, mu_2 = law.limit_friction;
+	const quern_real slowness = shear * law.inertial_number * dt /
+								(law.diameter * __builtin_sqrt(law.grain_density)); /* a over sqrt p */
+	const quern_real per_strain = dt > 0 ? 1 / (shear * dt) : 0;
+	const quern_real critical = law.critical_density, one_over_critical = 1 / critical;
+	const quern_real pull = relaxed ? 1 - quern_exp(-law.pressure_rate * dt) : 0;
+	const quern_real *restrict grid_density = b->grid_density;
+	quern_real *restrict density = b->density, *restrict rate = rated ? b->use[SHEAR_RATE].real[0] : NULL;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < b->n; i++) {
+		const symmetric old = SYMMETRIC_AT(b->stress, i, dim);
+		const tensor l = TENSOR_AT(b->gradient, i, dim);
+		symmetric trial = elastic_trial(dim, old, l, dt, shear, lambda);
+		const quern_real rho = density[i];
+		if (relaxed) { /* p += (1 - e^(-beta dt)) (max(0, K ln(rho/rho_c)) - p) */
+			const quern_real target = law.bulk_modulus * quern_log(rho * one_over_critical);
+			const quern_real more = pull * ((target > 0 ? target : 0) + symmetric_mean(dim, trial));
+			trial = symmetric_scale_shift(dim, 1, trial, -more);
+		}
+		const quern_real p = -symmetric_mean(dim, trial);
+		const symmetric s = symmetric_deviator(dim, trial);
+		const quern_real tau = __builtin_sqrt(symmetric_half_square(dim, s));
+		const bool dilute = rho<critical, open = dilute | (p <= 0), flows = tau> mu_s * p;
+		const quern_real flow = flow_stress(mu_s * p, mu_2 * p, tau, slowness * __builtin_sqrt(p));
+		/* an elastic stress keeps its bits, so that a point at rest stays as it is */
+		const symmetric closed =
+			symmetric_select(flows, symmetric_scale_shift(dim, flow / tau, s, -p), trial);
+		const symmetric stress = symmetric_select(open, (symmetric) { 0, 0, 0, 0, 0, 0 }, closed);
+		SYMMETRIC_PUT(b->stress, i, stress, dim);
+		const quern_real loose = grid_density[i] < critical ? grid_density[i] : critical;
+		density[i] = dilute ? loose : rho;
+		if (rated) rate[i] = (tau - (open ? 0 : flows ? flow : tau)) * per_strain;
+	}
+	put_outputs(dim, &law, b);
+}
+
+QUERN_INLINE void update(const int dim, const void *self, const quern_material_batch *b) {
+	const bool rated = b->use[SHEAR_RATE].real[0] != NULL, relaxed = ((const mu_i *)self)->pressure_rate > 0;
+	if (rated) {
+		if (relaxed) kernel(dim, true, true, self, b);
+		else kernel(dim, true, false, self, b);
+	} else if (relaxed) kernel(dim, false, true, self, b);
+	else kernel(dim, false, false, self, b);
+}
+static void update_2d(const void *self, const quern_material_batch *b) { update(2, self, b); }
+static void update_3d(const void *self, const quern_material_batch *b) { update(3, self, b); }
+
+/* Whatever the rate was, no flow carries more than mu_2 p. */
+QUERN_INLINE void assign(const int dim, const void *self, const quern_material_batch *b) {
+	const mu_i law = *(const mu_i *)self;
+	const quern_real softness = 1 / law.bulk_modulus;
+	quern_real *restrict density = b->density;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < b->n; i++) {
+		const symmetric given = SYMMETRIC_AT(b->stress, i, dim), s = symmetric_deviator(dim, given);
+		const quern_real p = -symmetric_mean(dim, given), limit = law.limit_friction * p;
+		const quern_real tau = __builtin_sqrt(symmetric_half_square(dim, s));
+		const bool pressed = p > 0;
+		const symmetric held =
+			symmetric_select(tau > limit, symmetric_scale_shift(dim, limit / tau, s, -p), given);
+		const symmetric stress = symmetric_select(pressed, held, (symmetric) { 0, 0, 0, 0, 0, 0 });
+		SYMMETRIC_PUT(b->stress, i, stress, dim);
+		density[i] = law.critical_density * quern_exp((pressed ? p : 0) * softness);
+	}
+	put_outputs(dim, &law, b);
+}
+static void assign_2d(const void *self, const quern_material_batch *b) { assign(2, self, b); }
+static void assign_3d(const void *self, const quern_material_batch *b) { assign(3, self, b); }
+
+static void moduli(const void *self, uint32_t dim, quern_real *bulk, quern_real *shear, quern_real *density) {
+	const mu_i *law = self;
+	(void)dim;
+	*bulk = law->bulk_modulus;
+	*shear = law->shear;
+	*density = law->critical_density;
+}
+
+static const quern_material_ops ops = { .size = sizeof ops,
+	.update = { update_2d, update_3d },
+	.assign = { assign_2d, assign_3d },
+	.moduli = moduli };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_MATERIAL,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "material.mu_i",
+	.brief = "Grains as a fluid whose friction grows with the rate of flow: mu(I).",
+	.doc =
+		"Elastic in rates below the yield stress. Above it the shear stress over the pressure is mu(I), "
+		"solved "
+		"implicitly, so that viscosity never limits the step. It resists no tension, and below the critical "
+		"density nothing: such a point takes its volume from the grid until it is dense again.",
+	.cite = "Dunatunga & Kamrin 2015; Jop, Forterre & Pouliquen 2006",
+	.instance_size = sizeof(mu_i),
+	.params = params,
+	.uses = uses,
+	.init = init,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");
