@@ -14,6 +14,51 @@ QUERN_INLINE int32_t quern_grid_cell(const quern_grid_view *g, uint32_t axis, qu
 	return down - (t < (quern_real)down);
 }
 
+/* Cell of a position, wrapped along periodic axes; false outside the domain. */
+QUERN_INLINE bool quern_grid_cell_at(const quern_grid_view *g, const quern_real x[3], int32_t cell[3]) {
+	bool inside = true;
+	for (uint32_t k = 0; k < 3; k++) {
+		cell[k] = 0;
+		if (k >= g->dim) continue;
+		int32_t c = quern_grid_cell(g, k, x[k]);
+		if (g->periodic[k]) {
+			c %= g->cells[k];
+			c = c < 0 ? c + g->cells[k] : c;
+		}
+		cell[k] = c;
+		inside = inside && c >= 0 && c < g->cells[k];
+	}
+	return inside;
+}
+
+/* The block at these block coordinates, or -1 where there is none. */
+static inline int32_t quern_grid_block(const quern_grid_view *g, const int32_t at[3]) {
+	int32_t low = 0, high = (int32_t)g->n_blocks - 1;
+	while (low <= high) {
+		const int32_t middle = (low + high) / 2;
+		int order = 0;
+		for (int k = 2; k >= 0 && !order; k--)
+			order = (g->at[middle][k] > at[k]) - (g->at[middle][k] < at[k]);
+		if (!order) return middle;
+		if (order < 0) low = middle + 1;
+		else high = middle - 1;
+	}
+	return -1;
+}
+
+/* Entry of a cell in the set "cell", or of the node at its lower corner in a row set; -1 where it does not exist. */
+static inline int32_t quern_grid_entry(const quern_grid_view *g, const int32_t cell[3]) {
+	const int32_t edge = (int32_t)g->edge;
+	int32_t at[3], place = 0;
+	for (int k = 2; k >= 0; k--) {
+		at[k] = cell[k] / edge;
+		place = place * edge + cell[k] % edge;
+		if (cell[k] < 0) return -1;
+	}
+	const int32_t b = quern_grid_block(g, at);
+	return b < 0 ? -1 : b * QUERN_BLOCK_CELLS + place;
+}
+
 /* Copies the nodes that block b's tile covers; nodes that do not exist are zero. */
 QUERN_INLINE void quern_tile_load(
 	const quern_grid_view *g, const quern_row *rows, uint32_t b, quern_row *tile) {

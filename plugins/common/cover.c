@@ -54,20 +54,6 @@ static uint32_t list_blocks(const quern_grid_view *g, uint32_t n, const uint64_t
 	return m;
 }
 
-static int32_t find(const quern_grid_view *g, const int32_t at[3]) {
-	int32_t low = 0, high = (int32_t)g->n_blocks - 1;
-	while (low <= high) {
-		const int32_t middle = (low + high) / 2;
-		int order = 0;
-		for (int k = 2; k >= 0 && !order; k--)
-			order = (g->at[middle][k] > at[k]) - (g->at[middle][k] < at[k]);
-		if (!order) return middle;
-		if (order < 0) low = middle + 1;
-		else high = middle - 1;
-	}
-	return -1;
-}
-
 static quern_status cover_material(const quern_step *s, const cover *c, uint32_t n_points) {
 	const quern_grid_view *g = s->host->grid(s->run);
 	const uint32_t n_grains = c->grain.real[0] ? c->n_grains : 0, n = n_points + n_grains;
@@ -88,8 +74,8 @@ static quern_status cover_material(const quern_step *s, const cover *c, uint32_t
 	quern_sort_order(m, key, from, work);
 	for (uint32_t i = 0; i < m; i++) sorted[i] = key[from[i]];
 	uint32_t blocks = list_blocks(g, m, sorted, block);
-	for (uint32_t b = 0; c->keep && b < g->n_blocks; b++)
-		if (g->asked[b]) memcpy(block[blocks++], g->at[b], sizeof *block);
+	for (uint32_t b = 0; c->holds && b < g->n_blocks; b++)
+		if (g->asked[b] && c->holds(c->arg, b)) memcpy(block[blocks++], g->at[b], sizeof *block);
 	return s->host->cover(s->run, blocks, (const int32_t(*)[3])block);
 }
 
@@ -110,7 +96,7 @@ quern_status quern_cover_sort(const quern_step *s, const cover *wanted) {
 		const uint64_t coarse = block_key(g, wanted->point.real, i, &place);
 		const int32_t at[3] = { (int32_t)(coarse & 0xfffff), (int32_t)(coarse >> 20 & 0xfffff),
 			(int32_t)(coarse >> 40) };
-		const int32_t b = find(g, at);
+		const int32_t b = quern_grid_block(g, at);
 		key[i] = (uint64_t)b * QUERN_BLOCK_CELLS + place;
 		block[b + 1]++;
 	}

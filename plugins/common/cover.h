@@ -5,7 +5,9 @@
 typedef struct cover {
 	quern_column point, grain; /* positions; grain.real[0] NULL: points alone count */
 	uint32_t n_grains;
-	bool keep; /* blocks that were asked for before stay: their cells hold state */
+	/* Blocks that were asked for before stay if this says so (their cells hold state); NULL: they go with the material. */
+	bool (*holds)(const void *arg, uint32_t block);
+	const void *arg;
 } cover;
 
 /* Brings points back through periodic faces, makes the grid cover all material, and sorts points by block and cell.

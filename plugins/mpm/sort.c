@@ -2,14 +2,18 @@
 #include "../common/cover.h"
 #include "mpm.h"
 
+/* What a block's cells hold is the hybrid's to give away: between its updates none goes. */
+static bool always(const void *arg, uint32_t block) {
+	(void)arg, (void)block;
+	return true;
+}
+
 quern_status quern_mpm_sort(const void *self, const quern_step *s) {
 	int32_t *unsorted = s->use[SORT_UNSORTED].index;
 	(void)self;
 	if (!*unsorted) return QUERN_OK;
 	*unsorted = 0;
-	/* blocks with cells stay: what their cells hold is the hybrid's to give away */
-	const cover c = { .point = s->use[SORT_POSITION],
-		.grain = { .real = { NULL } },
-		.keep = s->host->set(s->run, "cell").n > 0 };
+	const bool cells = s->host->set(s->run, "cell").n > 0;
+	const cover c = { .point = s->use[SORT_POSITION], .grain = { .real = { NULL } }, .holds = cells ? always : NULL };
 	return quern_cover_sort(s, &c);
 }

@@ -66,14 +66,13 @@ QUERN_INLINE quern_real excess_step(quern_real y, quern_real q, quern_real det) 
 }
 
 /* t - 1 of det(s + t I) = 1 for a deviator s, q = s:s/2. In 3-D it is the largest root that makes s + t I positive: with
- * r^2 = q/3 it lies between r, beyond which the cubic is convex, and sqrt(1 + 4 r^2). Newton's steps from above are
- * monotone; five are enough for any r below 1/4, eight up to 4. */
+ * r^2 = q/3 it lies between r, beyond which the cubic rises, and sqrt(1 + 4 r^2). Newton's steps from above are
+ * monotone; four are enough for any r below 1/4, six up to 1. */
 QUERN_INLINE quern_real isochoric_excess(const int dim, symmetric s) {
 	const quern_real q = symmetric_half_square(dim, s);
 	if (dim == 2) return q / (1 + __builtin_sqrt(1 + q));
 	const quern_real det = symmetric_determinant(s), above = 4.0 / 3 * q;
 	quern_real y = above / (1 + __builtin_sqrt(1 + above));
-	y = excess_step(excess_step(y, q, det), q, det);
 	y = excess_step(excess_step(y, q, det), q, det);
 	y = excess_step(excess_step(y, q, det), q, det);
 	return excess_step(excess_step(y, q, det), q, det);

@@ -93,7 +93,8 @@ QUERN_INLINE void kernel(
 		const quern_real p = -symmetric_mean(dim, trial);
 		const symmetric s = symmetric_deviator(dim, trial);
 		const quern_real tau = __builtin_sqrt(symmetric_half_square(dim, s));
-		const bool dilute = rho<critical, open = dilute | (p <= 0), flows = tau> mu_s * p;
+		const bool dilute = rho<critical, flows = tau> mu_s * p;
+		const bool open = dilute | (p <= 0);
 		const quern_real flow = flow_stress(mu_s * p, mu_2 * p, tau, slowness * __builtin_sqrt(p));
 		/* an elastic stress keeps its bits, so that a point at rest stays as it is */
 		const symmetric closed =

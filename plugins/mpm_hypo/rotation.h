@@ -96,7 +96,7 @@ QUERN_INLINE symmetric rotated(int dim, symmetric s, tensor l, quern_real dt) {
 	const quern_real xx = kx * ax, yy = ky * ay, zz = kz * az;
 	const tensor e = { -(yy + zz), xy - kz, xz + ky, xy + kz, -(xx + zz), yz - kx, xz - ky, yz + kx,
 		-(xx + yy) };
-	return pushed(3, s, s, e);
+	return pushed(3, s, symmetric_deviator(3, s), e); /* R (p I) R^T = p I */
 }
 
 /* The elastic trial R s R^T + dt (2 G D + lambda tr(D) I), D = (L + L^T)/2 */

@@ -1,4 +1,5 @@
-/* packer.two_point_tangent - grains that touch two others, in 3-D three. docs/theory/packers.md, section 3 */
+/* packer.two_point_tangent - grains that touch two others, in 3-D three; a wall counts as one.
+ * docs/theory/packers.md, section 3 */
 #include <quern/math.h>
 #include <quern/vec.h>
 
@@ -7,7 +8,7 @@ typedef struct {
 } two_point_tangent;
 
 static const quern_param params[] = { QUERN_PARAM(two_point_tangent, trials, "1",
-										  "Darts for the first grain of a region that no grain reaches.",
+										  "Darts for the first grain of a region that would stay empty.",
 										  .def = 20, .min = 1, .max = 100000),
 	QUERN_PARAM(two_point_tangent, angles, "1", "Places tried around a grain that has too few neighbours.",
 		.def = 36, .min = 3, .max = 100000),
@@ -133,8 +134,8 @@ static quern_real random_angle(const packing *p) {
 
 typedef struct {
 	quern_vec middle, axis; /* axis: from the seed to the partner, not of unit length */
-	quern_real height2,
-		length2; /* m^2; height: from the axis to the places that touch both; length: of the axis */
+	quern_real height2;     /* m^2, from the axis to the places that touch both, squared */
+	quern_real length2;     /* m^2, of the axis */
 } saddle;
 
 static saddle between(const packing *p, const grain *partner) {
@@ -187,24 +188,28 @@ static bool sweep_ring(packing *p, const ring *r) {
 	return false;
 }
 
-/* The wall's surface is known to the job alone, which says yes or no: hence bisection, which ends on the open side,
- * a step / 2^40 from the wall. */
-static bool lean(packing *p, const ring *r) {
+/* The wall's surface is known to the job alone, which says yes or no. */
+static quern_vec bisect(packing *p, const ring *r, quern_real open, quern_real walled) {
+	for (int k = 0; k < 40; k++) {
+		const quern_real middle = 0.5 * (open + walled);
+		if (probe(p, on_ring(r, middle)) == OPEN) open = middle;
+		else walled = middle;
+	}
+	return on_ring(r, open);
+}
+
+/* A wall counts as one more grain to touch. */
+static bool lean_on_wall(packing *p, const ring *r) {
 	const quern_real start = random_angle(p), step = 6.283185307179586 / p->self->angles;
-	standing last = probe(p, on_ring(r, start));
+	quern_real before = start;
+	standing was = probe(p, on_ring(r, before));
 	for (int32_t i = 1; i <= p->self->angles; i++) {
-		const standing here = probe(p, on_ring(r, start + i * step));
-		const bool edge = here + last == OPEN + WALLED;
-		quern_real open = start + (here == OPEN ? i : i - 1) * step,
-				   walled = start + (here == OPEN ? i - 1 : i) * step;
-		last = here;
-		if (!edge) continue;
-		for (int k = 0; k < 40; k++) {
-			const quern_real middle = 0.5 * (open + walled);
-			if (probe(p, on_ring(r, middle)) == OPEN) open = middle;
-			else walled = middle;
-		}
-		if (offer(p, on_ring(r, open))) return true;
+		const quern_real angle = start + i * step;
+		const standing is = probe(p, on_ring(r, angle));
+		if (was == OPEN && is == WALLED && offer(p, bisect(p, r, before, angle))) return true;
+		if (was == WALLED && is == OPEN && offer(p, bisect(p, r, angle, before))) return true;
+		before = angle;
+		was = is;
 	}
 	return false;
 }
@@ -251,7 +256,7 @@ static bool add_beside_2d(packing *p) {
 	for (uint32_t k = 0; k < p->n_near; k++)
 		if (offer_pair(p, &p->near[k])) return true;
 	if (!p->n_near) return sweep_ring(p, &around);
-	return p->walled && lean(p, &around);
+	return p->walled && lean_on_wall(p, &around);
 }
 
 static bool sweep_rings(packing *p, bool (*sweep)(packing *, const ring *)) {
@@ -274,15 +279,20 @@ static bool add_beside_3d(packing *p) {
 			if (offer_corners(p, &p->near[k], &p->near[m])) return true;
 		}
 	if (!cornered) return sweep_rings(p, sweep_ring);
-	return p->walled && sweep_rings(p, lean);
+	return p->walled && sweep_rings(p, lean_on_wall);
 }
 
-static bool none_reaches(const packing *p) {
-	for (uint32_t i = 0; i < p->job->n_seed; i++) {
-		const grain g = in_queue(p, i);
-		if (reaches_region(p, &g)) return false;
-	}
-	return true;
+/* A seed is done when the grain that waits fits nowhere beside it. The neighbours are gathered anew for every grain,
+ * since the one just placed is among them and the next one has another radius. */
+static void walk(packing *p, uint32_t from, bool (*add_beside)(packing *)) {
+	for (uint32_t i = from; i < queued(p) && !p->stopped; i++)
+		while (!p->stopped && gather(p, i) && add_beside(p)) continue;
+}
+
+static bool empty(const packing *p) {
+	for (uint32_t i = 0; i < p->job->n_seed; i++)
+		if (in_box(p, p->job->seed[i].x)) return false;
+	return !p->n_placed;
 }
 
 static void throw_darts(packing *p) {
@@ -296,19 +306,18 @@ static void throw_darts(packing *p) {
 	}
 }
 
-/* A seed is done when the grain that waits fits nowhere beside it. The neighbours are gathered anew for every grain,
- * since the one just placed is among them and the next one has another radius. */
 static void pack(const void *self, quern_pack_job *job, bool (*add_beside)(packing *)) {
 	packing p; /* not cleared: it is large, and only what is counted is read */
 	p.self = self;
 	p.job = job;
 	p.radius = job->radius(job);
-	p.stopped = false;
-	p.walled = false;
+	p.stopped = p.walled = false;
 	p.n_placed = p.n_near = 0;
-	if (none_reaches(&p)) throw_darts(&p);
-	for (uint32_t i = 0; i < queued(&p) && !p.stopped; i++)
-		while (!p.stopped && gather(&p, i) && add_beside(&p)) continue;
+	walk(&p, 0, add_beside);
+	if (!empty(&p)) return;
+	p.n_near = 0;
+	throw_darts(&p);
+	walk(&p, job->n_seed, add_beside);
 }
 
 static void pack_2d(const void *self, quern_pack_job *job) { pack(self, job, add_beside_2d); }
@@ -321,9 +330,8 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "packer.two_point_tangent",
 	.brief = "Grains that touch two others, in 3-D three: nearly as dense as grains at rest.",
-	.doc = "Grows the region from the grains in and around it. A grain with too few neighbours for that is "
-		   "first "
-		   "given one at `angles` places around it, and darts are thrown only where no grain is in reach.",
+	.doc = "Grows the region from the grains in and around it. A grain with too few neighbours first gets "
+		   "one at `angles` places around it; a dart is thrown only where a region would stay empty.",
 	.cite = "Chantharayukhonthorn 2019, section 6.2.4",
 	.instance_size = sizeof(two_point_tangent),
 	.params = params,

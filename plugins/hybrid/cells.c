@@ -1,0 +1,260 @@
+/* cells - who is in which cell, and what cells hold on average */
+#include "../common/cover.h"
+#include "update.h"
+#include <math.h>
+#include <string.h>
+
+enum { N = QUERN_BLOCK_CELLS };
+
+bool quern_hybrid_cell(const update *d, uint32_t entry, int32_t cell[3]) {
+	const uint32_t edge = d->g->edge, k = entry % N, b = entry / N;
+	const uint32_t place[3] = { k % edge, k / edge % edge, d->g->dim == 3 ? k / (edge * edge) : 0 };
+	bool inside = true;
+	for (uint32_t a = 0; a < 3; a++) {
+		cell[a] = a < d->g->dim ? d->g->at[b][a] * (int32_t)edge + (int32_t)place[a] : 0;
+		inside = inside && cell[a] < d->g->cells[a];
+	}
+	return inside;
+}
+
+void quern_hybrid_centre(const update *d, const int32_t cell[3], quern_real x[3]) {
+	for (uint32_t a = 0; a < 3; a++) x[a] = a < d->g->dim ? d->g->lower[a] + (cell[a] + 0.5) * d->g->cell : 0;
+}
+
+int32_t quern_hybrid_beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]) {
+	memcpy(out, cell, 3 * sizeof(int32_t));
+	out[axis] += step;
+	if (d->g->periodic[axis]) {
+		out[axis] = (out[axis] + d->g->cells[axis]) % d->g->cells[axis];
+	} else if (out[axis] < 0 || out[axis] >= d->g->cells[axis]) return -2;
+	return quern_grid_entry(d->g, out);
+}
+
+/* ---- sorting ---- */
+
+static int32_t cell_of(const update *d, quern_real *const x[3], uint32_t i) {
+	const quern_real at[3] = { x[0][i], x[1][i], d->g->dim == 3 ? x[2][i] : 0 };
+	int32_t cell[3];
+	if (!quern_grid_cell_at(d->g, at, cell)) /* a point on the upper wall belongs to the last cell */
+		for (uint32_t k = 0; k < d->g->dim; k++) {
+			cell[k] = cell[k] < 0 ? 0 : cell[k];
+			cell[k] = cell[k] < d->g->cells[k] ? cell[k] : d->g->cells[k] - 1;
+		}
+	return quern_grid_entry(d->g, cell);
+}
+
+static void bucket(uint32_t n, const int32_t *cell, uint32_t n_cells, uint32_t *begin, int32_t *list) {
+	for (uint32_t i = 0; i < n; i++)
+		if (cell[i] >= 0) begin[cell[i] + 2]++;
+	for (uint32_t c = 0; c < n_cells; c++) begin[c + 1] += begin[c];
+	for (uint32_t i = 0; i < n; i++)
+		if (cell[i] >= 0) list[begin[cell[i] + 1]++] = (int32_t)i;
+}
+
+static void *take(update *d, size_t count, size_t size) {
+	void *memory = d->s->host->memory(d->s->run, (count + 2) * size);
+	d->failed = d->failed || !memory;
+	return memory;
+}
+
+/* Blocks whose cells owe or are owed something stay, wherever the material has gone. */
+static bool holds(const void *arg, uint32_t block) {
+	const quern_column *u = ((const quern_step *)arg)->use;
+	for (uint32_t k = block * N; k < (block + 1) * N; k++)
+		if (u[U_GRAIN_OWED].real[0][k] != 0 || u[U_POINT_OWED].real[0][k] != 0) return true;
+	return false;
+}
+
+quern_status quern_hybrid_sort(update *d) {
+	const quern_step *s = d->s;
+	const cover c = { .point = s->use[U_POINT_POSITION], .grain = s->use[U_GRAIN_POSITION],
+		.n_grains = s->host->set(s->run, "grain").n, .holds = holds, .arg = s };
+	const quern_status status = quern_cover_sort(s, &c);
+	if (status != QUERN_OK) return status;
+	d->g = s->host->grid(s->run);
+	d->u = s->use;
+	d->n_cells = d->g->n_blocks * N;
+	d->n_grains = s->host->set(s->run, "grain").n;
+	d->n_points = s->host->set(s->run, "point").n;
+	d->grain_begin = take(d, d->n_cells, sizeof(uint32_t));
+	d->point_begin = take(d, d->n_cells, sizeof(uint32_t));
+	d->grain = take(d, d->n_grains, sizeof(int32_t));
+	d->point = take(d, d->n_points, sizeof(int32_t));
+	d->grain_cell = take(d, d->n_grains, sizeof(int32_t));
+	d->point_cell = take(d, d->n_points, sizeof(int32_t));
+	d->drop_grain = take(d, d->n_grains, sizeof(bool));
+	d->drop_point = take(d, d->n_points, sizeof(bool));
+	d->mass = take(d, d->n_cells, sizeof(quern_real));
+	d->spread = take(d, d->n_cells, sizeof(quern_real));
+	d->zone = take(d, d->n_cells, sizeof(int32_t));
+	for (uint32_t k = 0; k < s->dim; k++) d->velocity[k] = take(d, d->n_cells, sizeof(quern_real));
+	if (d->failed) return QUERN_E_MEMORY;
+	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
+	for (uint32_t i = 0; i < d->n_grains; i++)
+		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i);
+	for (uint32_t i = 0; i < d->n_points; i++) d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i);
+	bucket(d->n_grains, d->grain_cell, d->n_cells, d->grain_begin, d->grain);
+	bucket(d->n_points, d->point_cell, d->n_cells, d->point_begin, d->point);
+	return QUERN_OK;
+}
+
+/* ---- averages ---- */
+
+static void add_particle(const update *d, uint32_t c, quern_real m, quern_real *const v[3], int32_t i, quern_real *second) {
+	quern_real v2 = 0;
+	for (uint32_t k = 0; k < d->s->dim; k++) {
+		d->velocity[k][c] += m * v[k][i];
+		v2 += v[k][i] * v[k][i];
+	}
+	d->mass[c] += m;
+	*second += m * v2;
+}
+
+/* Mass, mean velocity and its spread of both clouds together, with the weights as they are. */
+void quern_hybrid_averages(update *d) {
+	const quern_column *u = d->u;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		quern_real second = 0, square = 0;
+		d->mass[c] = d->spread[c] = 0;
+		for (uint32_t k = 0; k < d->s->dim; k++) d->velocity[k][c] = 0;
+		for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
+			const int32_t i = d->grain[q];
+			add_particle(d, c, u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i], u[U_GRAIN_VELOCITY].real, i, &second);
+		}
+		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
+			const int32_t i = d->point[q];
+			add_particle(d, c, u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i], u[U_POINT_VELOCITY].real, i, &second);
+		}
+		if (!(d->mass[c] > 0)) continue;
+		for (uint32_t k = 0; k < d->s->dim; k++) {
+			d->velocity[k][c] /= d->mass[c];
+			square += d->velocity[k][c] * d->velocity[k][c];
+		}
+		const quern_real variance = second / d->mass[c] - square;
+		d->spread[c] = variance > 0 ? sqrt(variance) : 0;
+	}
+}
+
+/* A grain counts as the square or cube of its volume: sums are exact, and a cell of a diameter or more hardly sees the
+ * difference. A cell with a tenth of a full cell's mass in points is full: so is what points stand for. */
+void quern_hybrid_fractions(update *d) {
+	const quern_column *u = d->u;
+	quern_real *fraction = u[U_FRACTION].real[0];
+	const uint32_t dim = d->s->dim;
+	const quern_real h = d->g->cell, volume = dim == 2 ? h * h : h * h * h;
+	if (!fraction) return;
+	memset(fraction, 0, d->n_cells * sizeof(quern_real));
+	for (uint32_t i = 0; i < d->n_grains; i++) {
+		const quern_real r = u[U_GRAIN_RADIUS].real[0][i];
+		const quern_real half = (dim == 2 ? 0.886226925452758 : 0.805995977008235) * r; /* of the square, of the cube */
+		int32_t first[3] = { 0 }, last[3] = { 0 };
+		if (d->grain_cell[i] < 0) continue;
+		for (uint32_t k = 0; k < dim; k++) {
+			first[k] = quern_grid_cell(d->g, k, u[U_GRAIN_POSITION].real[k][i] - half);
+			last[k] = quern_grid_cell(d->g, k, u[U_GRAIN_POSITION].real[k][i] + half);
+		}
+		for (int32_t z = first[2]; z <= last[2]; z++)
+			for (int32_t y = first[1]; y <= last[1]; y++)
+				for (int32_t x = first[0]; x <= last[0]; x++) {
+					int32_t cell[3] = { x, y, z };
+					quern_real part = 1;
+					bool inside = true;
+					for (uint32_t k = 0; k < dim; k++) {
+						const quern_real low = d->g->lower[k] + cell[k] * h, at = u[U_GRAIN_POSITION].real[k][i];
+						const quern_real from = at - half > low ? at - half : low, to = at + half < low + h ? at + half : low + h;
+						part *= to > from ? to - from : 0;
+						if (d->g->periodic[k]) cell[k] = (cell[k] + d->g->cells[k]) % d->g->cells[k];
+						inside = inside && cell[k] >= 0 && cell[k] < d->g->cells[k];
+					}
+					const int32_t c = inside ? quern_grid_entry(d->g, cell) : -1;
+					if (c >= 0) fraction[c] += part / volume;
+				}
+	}
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		quern_real mass = 0;
+		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) mass += u[U_POINT_MASS].real[0][d->point[q]];
+		if (mass >= 0.1 * d->full) fraction[c] = 1;
+	}
+}
+
+bool quern_hybrid_contact_stress(const update *d, uint32_t cell, quern_real stress[6]) {
+	const quern_real samples = d->u[U_SAMPLES].real[0][0];
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
+		stress[k] = samples > 0 ? d->u[U_STRESS].real[k][cell] / samples : 0;
+	return samples > 0;
+}
+
+/* Pressure of both clouds in their shares; only the sum is the material's. */
+static quern_real pressure_of(const update *d, uint32_t c) {
+	const uint32_t dim = d->s->dim;
+	quern_real stress[6], grains = 0, points = 0, mass = 0;
+	const quern_real share = grain_share(d->u[U_ZONE].index[c]);
+	quern_hybrid_contact_stress(d, c, stress);
+	for (uint32_t k = 0; k < dim; k++) grains -= stress[k] / dim;
+	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
+		const int32_t i = d->point[q];
+		for (uint32_t k = 0; k < dim; k++) points -= d->u[U_POINT_MASS].real[0][i] * d->u[U_POINT_STRESS].real[k][i] / dim;
+		mass += d->u[U_POINT_MASS].real[0][i];
+	}
+	return share * grains + (1 - share) * (mass > 0 ? points / mass : 0);
+}
+
+/* Shear rate from the mean velocities of neighbouring cells; one-sided where one of them is empty. */
+static quern_real shear_rate(const update *d, const int32_t cell[3]) {
+	const uint32_t dim = d->s->dim;
+	quern_real l[3][3] = { { 0 } }, sum = 0, trace = 0;
+	for (uint32_t b = 0; b < dim; b++) {
+		int32_t other[3];
+		const int32_t up = quern_hybrid_beside(d, cell, b, 1, other), down = quern_hybrid_beside(d, cell, b, -1, other);
+		const int32_t here = quern_grid_entry(d->g, cell);
+		const int32_t high = up >= 0 && d->mass[up] > 0 ? up : here, low = down >= 0 && d->mass[down] > 0 ? down : here;
+		const quern_real way = ((high != here) + (low != here)) * d->g->cell;
+		for (uint32_t a = 0; a < dim && way > 0; a++) l[a][b] = (d->velocity[a][high] - d->velocity[a][low]) / way;
+		trace += l[b][b];
+	}
+	for (uint32_t a = 0; a < dim; a++)
+		for (uint32_t b = 0; b < dim; b++) {
+			const quern_real rate = 0.5 * (l[a][b] + l[b][a]) - (a == b ? trace / dim : 0);
+			sum += rate * rate;
+		}
+	return sqrt(2 * sum);
+}
+
+void quern_hybrid_rates(update *d) {
+	quern_real *rate = d->u[U_SHEAR_RATE].real[0], *inertial = d->u[U_INERTIAL].real[0];
+	if (!rate && !inertial) return;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3];
+		const bool there = quern_hybrid_cell(d, c, cell) && d->mass[c] > 0;
+		const quern_real shear = there ? shear_rate(d, cell) : 0;
+		if (rate) rate[c] = shear;
+		if (!inertial) continue;
+		const quern_real p = there ? pressure_of(d, c) : 0;
+		inertial[c] = p > 0 ? shear * d->h->diameter * sqrt(d->h->density / p) : 0;
+	}
+}
+
+/* The normal of the zone's level set, for transfers that treat it apart: the direction in which the continuum's share
+ * grows, where it does. */
+void quern_hybrid_normals(update *d) {
+	const quern_column *u = d->u;
+	const uint32_t dim = d->s->dim;
+	for (uint32_t c = 0; c < d->n_cells && u[U_NORMAL].real[0]; c++) {
+		int32_t cell[3], other[3];
+		quern_real n[3] = { 0 }, length = 0;
+		if (quern_hybrid_cell(d, c, cell))
+			for (uint32_t k = 0; k < dim; k++) {
+				const int32_t up = quern_hybrid_beside(d, cell, k, 1, other), down = quern_hybrid_beside(d, cell, k, -1, other);
+				n[k] = point_share(up < 0 ? u[U_ZONE].index[c] : u[U_ZONE].index[up]) -
+					point_share(down < 0 ? u[U_ZONE].index[c] : u[U_ZONE].index[down]);
+				length += n[k] * n[k];
+			}
+		for (uint32_t k = 0; k < dim; k++) u[U_NORMAL].real[k][c] = length > 0 ? n[k] / sqrt(length) : 0;
+	}
+	for (uint32_t k = 0; k < dim && u[U_NORMAL].real[0]; k++) {
+		for (uint32_t i = 0; i < d->n_grains && u[U_GRAIN_NORMAL].real[0]; i++)
+			u[U_GRAIN_NORMAL].real[k][i] = d->grain_cell[i] < 0 ? 0 : u[U_NORMAL].real[k][d->grain_cell[i]];
+		for (uint32_t i = 0; i < d->n_points && u[U_POINT_NORMAL].real[0]; i++)
+			u[U_POINT_NORMAL].real[k][i] = d->point_cell[i] < 0 ? 0 : u[U_NORMAL].real[k][d->point_cell[i]];
+	}
+}

@@ -1,0 +1,72 @@
+/* update - what the parts of a zone update share: who is in which cell, what cells hold, and what shall come and go */
+#pragma once
+#include "hybrid.h"
+
+typedef struct new_point {
+	quern_real position[3], velocity[3], stress[6], mass, weight;
+	int32_t cell;
+} new_point;
+
+typedef struct new_grain {
+	quern_real position[3], velocity[3], spin[3], radius, weight;
+	int32_t cell;
+} new_grain;
+
+typedef struct update {
+	const hybrid *h;
+	const quern_step *s;
+	const quern_grid_view *g;
+	const quern_column *u;
+	uint32_t n_cells, n_grains, n_points;
+	/* by cell: the moving grains and the points in it */
+	uint32_t *grain_begin, *point_begin;
+	int32_t *grain, *point;
+	int32_t *grain_cell, *point_cell;   /* by particle: its cell, -1 for none and for fixed grains */
+	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
+	quern_real full, nominal;           /* kg: of a full cell, of one point in it */
+	int32_t *zone;                      /* by cell: the new one; the old one stands in the field until the end */
+	bool *drop_grain, *drop_point;
+	new_point *points;
+	uint32_t n_new_points, cap_points;
+	new_grain *grains;
+	uint32_t n_new_grains, cap_grains;
+	uint32_t changed;                   /* cells that changed zone */
+	bool failed;                        /* memory ran out */
+} update;
+
+/* Global coordinates of a cell of the set "cell"; false for cells beyond the domain's end. */
+bool quern_hybrid_cell(const update *, uint32_t entry, int32_t cell[3]);
+void quern_hybrid_centre(const update *, const int32_t cell[3], quern_real x[3]);
+/* The neighbour one step along an axis: its entry, -1 where there is none in the grid, -2 beyond a face. */
+int32_t quern_hybrid_beside(const update *, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]);
+
+/* ---- cells.c ---- */
+quern_status quern_hybrid_sort(update *);
+void quern_hybrid_averages(update *);
+void quern_hybrid_fractions(update *);
+void quern_hybrid_rates(update *);
+/* Mean over the samples of the contact stress in a cell; false if there is none. */
+bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stress[6]);
+void quern_hybrid_normals(update *);
+
+/* ---- zones.c ---- */
+quern_status quern_hybrid_zones(update *);
+/* By cell: the nearest cell with `source` set, by centres, -1 if there is none. */
+quern_status quern_hybrid_nearest(update *, const bool *source, int32_t *nearest);
+
+/* ---- ledger.c ---- */
+void quern_hybrid_move_entries(update *);
+void quern_hybrid_weigh(update *);
+void quern_hybrid_net(update *);
+quern_status quern_hybrid_hand_over(update *);
+/* The velocity at which mass owed to a cell is given: P/M, or the cell's own where that would be noise. */
+void quern_hybrid_owed_velocity(const update *, uint32_t cell, quern_real mass, const quern_column momentum, quern_real v[3]);
+
+/* ---- points.c ---- */
+void quern_hybrid_points(update *);
+void quern_hybrid_assign(const update *, uint32_t begin, uint32_t n);
+quern_status quern_hybrid_apply_points(update *);
+
+/* ---- enrich.c ---- */
+quern_status quern_hybrid_grains(update *);
+quern_status quern_hybrid_apply_grains(update *);

@@ -1,0 +1,317 @@
+/* zones - oracles mark a surface, the distance inwards from it is made once for each, they wish, and the least continuous
+ * wish becomes a zone, with hysteresis and one step at a time */
+#include "update.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { N = QUERN_BLOCK_CELLS };
+
+/* ---- distances, by spreading from the sources: the nearest first ---- */
+
+typedef struct {
+	quern_real distance;
+	uint32_t cell;
+} heap_entry;
+
+typedef struct {
+	const update *d;
+	heap_entry *heap;
+	size_t n, cap;
+	quern_real *distance;     /* by cell */
+	int16_t (*way)[3];        /* by cell: to its source, in cells */
+	bool boxes;               /* the source is a whole cell, not its centre */
+	bool failed;
+} spreading;
+
+static bool sooner(heap_entry a, heap_entry b) {
+	return a.distance != b.distance ? a.distance < b.distance : a.cell < b.cell;
+}
+
+static void push(spreading *p, heap_entry e) {
+	if (p->n == p->cap) {
+		p->cap = p->cap ? 2 * p->cap : 1024;
+		heap_entry *grown = realloc(p->heap, p->cap * sizeof(heap_entry));
+		if (!grown) {
+			p->failed = true;
+			return;
+		}
+		p->heap = grown;
+	}
+	size_t i = p->n++;
+	for (; i && sooner(e, p->heap[(i - 1) / 2]); i = (i - 1) / 2) p->heap[i] = p->heap[(i - 1) / 2];
+	p->heap[i] = e;
+}
+
+static heap_entry pop(spreading *p) {
+	const heap_entry top = p->heap[0], last = p->heap[--p->n];
+	size_t i = 0;
+	for (size_t k = 1; k < p->n; k = 2 * i + 1) {
+		if (k + 1 < p->n && sooner(p->heap[k + 1], p->heap[k])) k++;
+		if (!sooner(p->heap[k], last)) break;
+		p->heap[i] = p->heap[k];
+		i = k;
+	}
+	if (p->n) p->heap[i] = last;
+	return top;
+}
+
+static quern_real length_of(const spreading *p, const int16_t way[3]) {
+	quern_real sum = 0;
+	for (uint32_t k = 0; k < p->d->g->dim; k++) {
+		quern_real x = abs(way[k]);
+		if (p->boxes) x = x > 0.5 ? x - 0.5 : 0;
+		sum += x * x;
+	}
+	return sqrt(sum) * p->d->g->cell;
+}
+
+static void offer(spreading *p, uint32_t cell, const int16_t way[3]) {
+	const quern_real distance = length_of(p, way);
+	if (!(distance < p->distance[cell])) return;
+	p->distance[cell] = distance;
+	memcpy(p->way[cell], way, sizeof p->way[cell]);
+	push(p, (heap_entry) { distance, cell });
+}
+
+/* `open` NULL: through every cell; otherwise only through those that are set. */
+static void spread(spreading *p, const bool *open) {
+	const int depth = p->d->g->dim == 3 ? 1 : 0;
+	while (p->n && !p->failed) {
+		const heap_entry e = pop(p);
+		int32_t cell[3];
+		if (e.distance > p->distance[e.cell] || !quern_hybrid_cell(p->d, e.cell, cell)) continue;
+		for (int z = -depth; z <= depth; z++)
+			for (int y = -1; y <= 1; y++)
+				for (int x = -1; x <= 1; x++) {
+					const int step[3] = { x, y, z };
+					int32_t to[3];
+					int16_t way[3];
+					bool inside = true;
+					for (uint32_t k = 0; k < 3; k++) {
+						to[k] = cell[k] + step[k];
+						way[k] = (int16_t)(p->way[e.cell][k] - step[k]);
+						if (p->d->g->periodic[k]) to[k] = (to[k] + p->d->g->cells[k]) % p->d->g->cells[k];
+						inside = inside && to[k] >= 0 && to[k] < p->d->g->cells[k];
+					}
+					const int32_t c = inside ? quern_grid_entry(p->d->g, to) : -1;
+					if (c >= 0 && (!open || open[c])) offer(p, (uint32_t)c, way);
+				}
+	}
+}
+
+static bool spreading_init(spreading *p, update *d, bool boxes, quern_real *distance) {
+	*p = (spreading) { .d = d, .distance = distance, .boxes = boxes };
+	p->way = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof *p->way);
+	if (!p->way || !distance) return false;
+	for (uint32_t c = 0; c < d->n_cells; c++) distance[c] = INFINITY;
+	return true;
+}
+
+quern_status quern_hybrid_nearest(update *d, const bool *source, int32_t *nearest) {
+	spreading p;
+	quern_real *distance = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
+	if (!spreading_init(&p, d, false, distance)) return QUERN_E_MEMORY;
+	for (uint32_t c = 0; c < d->n_cells; c++)
+		if (source[c]) offer(&p, c, (const int16_t[3]) { 0, 0, 0 });
+	spread(&p, NULL);
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3];
+		nearest[c] = -1;
+		if (!isfinite(distance[c]) || !quern_hybrid_cell(d, c, cell)) continue;
+		for (uint32_t k = 0; k < d->g->dim; k++) {
+			cell[k] += p.way[c][k];
+			if (d->g->periodic[k]) cell[k] = (cell[k] % d->g->cells[k] + d->g->cells[k]) % d->g->cells[k];
+		}
+		nearest[c] = quern_grid_entry(d->g, cell);
+	}
+	free(p.heap);
+	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
+}
+
+/* ---- the surface of one oracle ---- */
+
+typedef struct {
+	bool *outside, *solid, *inside; /* by cell */
+	uint32_t *queue;
+} surface;
+
+/* A place is behind a body if it lies in one that is there now. */
+static bool in_body(const update *d, const quern_real x[3]) {
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	_Alignas(64) quern_real position[3][QUERN_LANES], radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES], n[3][QUERN_LANES],
+		v[3][QUERN_LANES];
+	for (uint32_t k = 0; k < 3; k++)
+		for (uint32_t i = 0; i < QUERN_LANES; i++) position[k][i] = x[k];
+	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
+		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
+		const quern_body_batch batch = { .n = 1, .cap = QUERN_LANES, .dim = d->s->dim, .pose = &still,
+			.position = { position[0], position[1], position[2] }, .radius = radius, .gap = gap, .normal = { n[0], n[1], n[2] },
+			.velocity = { v[0], v[1], v[2] } };
+		if (!quern_body_is_there(body, d->s->settling)) continue;
+		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
+		if (gap[0] < 0) return true;
+	}
+	return false;
+}
+
+/* What lies one step from a cell: nothing that counts, open space, or a wall. */
+enum { BESIDE_CELL, BESIDE_OPEN, BESIDE_WALL };
+
+static int beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t *entry) {
+	int32_t other[3];
+	quern_real x[3];
+	*entry = quern_hybrid_beside(d, cell, axis, step, other);
+	if (*entry >= 0) return BESIDE_CELL;
+	if (*entry == -1) return BESIDE_OPEN; /* not allocated: nothing is there */
+	quern_hybrid_centre(d, cell, x);
+	x[axis] += step * d->g->cell;
+	return in_body(d, x) ? BESIDE_WALL : BESIDE_OPEN;
+}
+
+/* Outside is what the open boundary reaches through cells that are marked so; a void within does not count. */
+static void flood(const update *d, surface *f, const quern_real *level) {
+	uint32_t n = 0;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3], other;
+		bool open = false;
+		if (!quern_hybrid_cell(d, c, cell) || f->solid[c] || level[c] > 0) continue;
+		for (uint32_t k = 0; k < d->g->dim; k++)
+			for (int step = -1; step <= 1; step += 2) open = open || beside(d, cell, k, step, &other) == BESIDE_OPEN;
+		if (open) f->outside[c] = true, f->queue[n++] = c;
+	}
+	for (uint32_t q = 0; q < n; q++) {
+		int32_t cell[3], other[3];
+		quern_hybrid_cell(d, f->queue[q], cell);
+		for (uint32_t k = 0; k < d->g->dim; k++)
+			for (int step = -1; step <= 1; step += 2) {
+				const int32_t c = quern_hybrid_beside(d, cell, k, step, other);
+				if (c < 0 || f->outside[c] || f->solid[c] || level[c] > 0) continue;
+				f->outside[c] = true;
+				f->queue[n++] = (uint32_t)c;
+			}
+	}
+}
+
+/* Distance of a cell's centre to the nearest cell outside. */
+static quern_status surface_distance(update *d, const quern_real *level, uint32_t flags, quern_real *distance) {
+	const quern_step *s = d->s;
+	surface f = { s->host->memory(s->run, d->n_cells + 1u), s->host->memory(s->run, d->n_cells + 1u),
+		s->host->memory(s->run, d->n_cells + 1u), s->host->memory(s->run, ((size_t)d->n_cells + 1) * sizeof(uint32_t)) };
+	spreading p;
+	if (!f.outside || !f.solid || !f.inside || !f.queue || !spreading_init(&p, d, true, distance)) return QUERN_E_MEMORY;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3];
+		quern_real x[3];
+		if (!quern_hybrid_cell(d, c, cell)) continue;
+		quern_hybrid_centre(d, cell, x);
+		f.solid[c] = in_body(d, x);
+		if (!(flags & QUERN_SURFACE_FLOOD)) f.outside[c] = !f.solid[c] && level[c] <= 0;
+	}
+	if (flags & QUERN_SURFACE_FLOOD) flood(d, &f, level);
+	for (uint32_t c = 0; c < d->n_cells; c++) f.inside[c] = !f.outside[c] && !f.solid[c];
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3], other;
+		if (!f.inside[c] || !quern_hybrid_cell(d, c, cell)) continue;
+		for (uint32_t k = 0; k < d->g->dim; k++)
+			for (int step = -1; step <= 1; step += 2) {
+				const int what = beside(d, cell, k, step, &other);
+				const bool wall = what == BESIDE_WALL || (what == BESIDE_CELL && f.solid[other]);
+				const bool open = what == BESIDE_OPEN || (what == BESIDE_CELL && f.outside[other]);
+				int16_t way[3] = { 0 };
+				way[k] = (int16_t)step;
+				if (open || (wall && flags & QUERN_SURFACE_WALLS)) offer(&p, c, way);
+			}
+	}
+	spread(&p, f.inside);
+	for (uint32_t c = 0; c < d->n_cells; c++)
+		if (!f.inside[c]) distance[c] = 0;
+	free(p.heap);
+	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
+}
+
+/* ---- asking the oracles ---- */
+
+typedef struct {
+	_Alignas(64) quern_real centre[3][N], shifted[N];
+} oracle_memory;
+
+static void ask(const update *d, const quern_bound *oracle, uint32_t b, const quern_real *distance, quern_real shift,
+	oracle_memory *m, quern_real *level, int32_t *wish) {
+	enum { MOST_ROWS = 16 };
+	const quern_oracle_ops *ops = oracle->ops;
+	quern_column own[MOST_ROWS];
+	quern_cell_batch batch = { .n = N, .cap = N, .dim = d->s->dim, .cell = d->g->cell, .zone = d->u[U_ZONE].index + (size_t)b * N,
+		.use = own, .level = level, .wish = wish };
+	for (uint32_t i = 0; i < N; i++) {
+		int32_t cell[3];
+		quern_real x[3];
+		quern_hybrid_cell(d, b * N + i, cell);
+		quern_hybrid_centre(d, cell, x);
+		for (uint32_t k = 0; k < 3; k++) m->centre[k][i] = x[k];
+		if (distance) m->shifted[i] = distance[b * N + i] + shift;
+	}
+	for (uint32_t k = 0; k < d->s->dim; k++) batch.centre[k] = m->centre[k];
+	if (distance) batch.distance = m->shifted;
+	for (uint32_t r = 0; r < oracle->n_uses && r < MOST_ROWS; r++)
+		own[r] = quern_column_from(oracle->column[r], oracle->uses[r].shape, b * N);
+	if (distance) ops->decide(oracle->self, &batch);
+	else ops->mark(oracle->self, &batch);
+}
+
+/* low: the zone wished for half the hysteresis nearer to the surface, high: half of it deeper. A zone within stays. */
+static quern_status wishes(update *d, const quern_bound *oracle, quern_real *level, quern_real *distance, int32_t *low, int32_t *high) {
+	const quern_oracle_ops *ops = oracle->ops;
+	const quern_real half = 0.5 * d->h->hysteresis * d->h->diameter;
+	oracle_memory *m = d->s->host->scratch(d->s->run, 0, sizeof *m);
+	int32_t wish[N];
+	if (!m) return QUERN_E_MEMORY;
+	for (uint32_t b = 0; b < d->g->n_blocks; b++) ask(d, oracle, b, NULL, 0, m, level + (size_t)b * N, NULL);
+	const quern_status status = surface_distance(d, level, ops->surface ? ops->surface(oracle->self) : 0, distance);
+	if (status != QUERN_OK) return status;
+	for (uint32_t b = 0; b < d->g->n_blocks; b++)
+		for (int side = 0; side < 2; side++) {
+			int32_t *out = (side ? high : low) + (size_t)b * N;
+			ask(d, oracle, b, distance, side ? half : -half, m, NULL, wish);
+			for (uint32_t i = 0; i < N; i++) {
+				const int32_t w = distance[b * N + i] > 0 ? wish[i] : QUERN_DISCRETE;
+				out[i] = w < out[i] ? w : out[i];
+			}
+		}
+	return QUERN_OK;
+}
+
+/* Leaving the hybrid zone needs settled books: what is owed to the clouds that stay must be small. */
+static int32_t guarded(const update *d, uint32_t c, int32_t old, int32_t new) {
+	const quern_real limit = d->h->guard * 0.5 * d->mass[c];
+	if (old != QUERN_HYBRID) return new;
+	if (new == QUERN_DISCRETE && d->u[U_GRAIN_OWED].real[0][c] > limit) return old;
+	if (new == QUERN_CONTINUUM && d->u[U_POINT_OWED].real[0][c] > limit) return old;
+	return new;
+}
+
+quern_status quern_hybrid_zones(update *d) {
+	const quern_step *s = d->s;
+	const size_t n = (size_t)d->n_cells + 1;
+	quern_real *level = s->host->memory(s->run, n * sizeof(quern_real)), *distance = s->host->memory(s->run, n * sizeof(quern_real));
+	int32_t *low = s->host->memory(s->run, n * sizeof(int32_t)), *high = s->host->memory(s->run, n * sizeof(int32_t));
+	if (!level || !distance || !low || !high) return QUERN_E_MEMORY;
+	for (uint32_t c = 0; c < d->n_cells; c++) low[c] = high[c] = QUERN_CONTINUUM;
+	for (uint32_t o = 0; o < s->n_slot[SLOT_ORACLE]; o++) {
+		const quern_status status = wishes(d, &s->slot[SLOT_ORACLE][o], level, distance, low, high);
+		if (status != QUERN_OK) return status;
+	}
+	d->changed = 0;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		const int32_t old = d->u[U_ZONE].index[c];
+		int32_t new = old < low[c] ? low[c] : old > high[c] ? high[c] : old;
+		if (!(d->mass[c] > 0)) new = QUERN_DISCRETE;
+		else {
+			if (new - old == 2 || old - new == 2) new = QUERN_HYBRID;
+			new = guarded(d, c, old, new);
+		}
+		d->zone[c] = new;
+		d->changed += new != old;
+	}
+	return QUERN_OK;
+}
