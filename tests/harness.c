@@ -1,0 +1,93 @@
+/* harness - scenes in a test's own process */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include <stdlib.h>
+#include <string.h>
+
+static quern_run *make_ready(quern_scene *scene, uint32_t workers) {
+	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, workers);
+	if (!run || quern_report_errors(scene->report)) {
+		quern_report_print(scene->report, stderr);
+		fail_msg("the scene cannot be used");
+		return NULL;
+	}
+	if (quern_run_setup(run) != QUERN_OK) fail_msg("%s", run->message);
+	run->mass_initial = quern_run_account(run).mass;
+	return run;
+}
+
+static void find_plugins(void) {
+	const char *folder = getenv("QUERN_PLUGINS_DIR");
+	if (folder) setenv("QUERN_PLUGIN_PATH", folder, 1);
+}
+
+quern_run *harness_open(uint32_t workers, const char *fmt, ...) {
+	va_list list;
+	char *text = NULL;
+	find_plugins();
+	va_start(list, fmt);
+	const int length = vasprintf(&text, fmt, list);
+	va_end(list);
+	assert_true(length >= 0);
+	quern_scene *scene = quern_scene_parse("test.yaml", text, (size_t)length, &quern_host_table);
+	free(text);
+	return make_ready(scene, workers);
+}
+
+quern_run *harness_open_file(uint32_t workers, const char *path, const char *const *sets) {
+	find_plugins();
+	return make_ready(quern_scene_read(path, sets, &quern_host_table), workers);
+}
+
+void harness_close(quern_run *run) { quern_run_destroy(run); }
+
+void harness_settle(quern_run *run) {
+	while (!run->clock.settled && run->status == QUERN_OK) quern_run_settle(run);
+	if (run->status != QUERN_OK) fail_msg("%s", run->message);
+}
+
+quern_status harness_try(quern_run *run, int64_t n) {
+	quern_clock *c = &run->clock;
+	harness_settle(run);
+	if (c->frame < 0) c->frame = 0;
+	for (int64_t i = 0; i < n && run->status == QUERN_OK; i++) {
+		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
+		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) {
+			c->frame++;
+			c->at = c->steps_in = 0;
+		}
+	}
+	quern_plan_refresh(run->plan);
+	return run->status;
+}
+
+void harness_steps(quern_run *run, int64_t n) {
+	if (harness_try(run, n) != QUERN_OK) fail_msg("%s", run->message);
+}
+
+void harness_until(quern_run *run, double time) {
+	do harness_steps(run, 1);
+	while (quern_run_time(run) < time);
+}
+
+uint32_t harness_count(quern_run *run, const char *set) {
+	const int i = quern_store_set(&run->plan->store, set);
+	return i < 0 ? 0 : run->plan->store.sets[i].n;
+}
+
+bool harness_has(quern_run *run, const char *field) {
+	return quern_store_field(&run->plan->store, field) >= 0;
+}
+
+quern_column harness_field(quern_run *run, const char *name) {
+	const int i = quern_store_field(&run->plan->store, name);
+	if (i < 0) fail_msg("there is no field %s", name);
+	const quern_field *field = &run->plan->store.fields[i];
+	return quern_field_column(&run->plan->store, field, field->now);
+}
