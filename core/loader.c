@@ -281,8 +281,8 @@ static void unknown(
 		if (dot && !strcmp(dot + 1, name)) elsewhere = ids[i];
 	}
 	if (elsewhere)
-		quern_report_add(report, mark, "'%s' is %s, a plugin of another kind; a %s is wanted: %s", name,
-			elsewhere, kind, quern_text_string(&list));
+		quern_report_add(report, mark, "'%s' is %s; here a plugin of kind %s is wanted: %s", name, elsewhere,
+			kind, n ? quern_text_string(&list) : "none is installed");
 	else if (near) quern_report_add(report, mark, "unknown %s '%s'; did you mean '%s'?", kind, name, near);
 	else if (n)
 		quern_report_add(

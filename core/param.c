@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 const quern_param *quern_param_find(const quern_param *rows, const char *name) {
@@ -41,12 +42,28 @@ double quern_param_default(const quern_param *row, uint32_t dim) {
 	return dim == 2 && row->flags & QUERN_PLANAR ? row->planar : row->def;
 }
 
+/* 1e12 rather than 1000000000000 */
+static void short_number(double value, char out[32]) {
+	char text[32];
+	quern_number(value, out);
+	if (!(fabs(value) >= 1e6)) return;
+	snprintf(text, sizeof text, "%.3g", value);
+	if (strtod(text, NULL) != value) return;
+	const size_t n = strcspn(text, "+"); /* 1e+06 */
+	const char *power = text + n + strspn(text + n, "+0");
+	snprintf(out, 32, "%.*s%.8s", (int)n, text, power);
+}
+
 void quern_param_range(const quern_param *row, char out[96]) {
 	char low[32], high[32];
 	*out = 0;
 	if (row->min == row->max) return;
-	quern_number(row->min, low);
-	quern_number(row->max, high);
+	short_number(row->min, low);
+	short_number(row->max, high);
+	if (row->type == QUERN_T_INT && row->max == row->min + 1) {
+		snprintf(out, 96, "%s or %s", low, high);
+		return;
+	}
 	const bool below = row->flags & QUERN_MAX_OPEN, above = row->flags & QUERN_MIN_OPEN;
 	if (isinf(row->max)) snprintf(out, 96, above ? "above %s" : "at least %s", low);
 	else if (above) snprintf(out, 96, "above %s and %s %s", low, below ? "below" : "at most", high);
@@ -214,9 +231,8 @@ static void read_vector(const quern_reading *r, const char *owner, const quern_p
 	char say[64];
 	if (node->kind != QUERN_NODE_LIST || node->n != r->dim) {
 		quern_report_add(r->report, node->mark,
-			"%s: %s must be a list of %u numbers, one per dimension, not %s%s", owner, row->name, r->dim,
-			quern_node_say(node, say),
-			node->kind == QUERN_NODE_LIST ? (node->n > r->dim ? " of more" : " of fewer") : "");
+			"%s: %s must be a list of %u numbers, one per dimension, not %s", owner, row->name, r->dim,
+			quern_node_say(node, say));
 		return;
 	}
 	for (uint32_t k = 0; k < r->dim; k++) read_number(r, owner, row, node->entries[k].value, &member[k]);
@@ -231,9 +247,13 @@ static const char *read_text(
 	const bool relative = node->text[0] != '/' && slash && node->mark.line;
 	char *path =
 		relative ? quern_format("%.*s/%s", (int)(slash - scene), scene, node->text) : quern_copy(node->text);
-	if (access(path, R_OK))
+	struct stat is;
+	if (access(path, R_OK) || stat(path, &is))
 		quern_report_add(
 			r->report, node->mark, "%s: %s: cannot read '%s': %s", owner, row->name, path, strerror(errno));
+	else if (S_ISDIR(is.st_mode))
+		quern_report_add(
+			r->report, node->mark, "%s: %s: '%s' is a folder; a file is wanted", owner, row->name, path);
 	const char *kept = quern_tree_keep(r->tree, path);
 	free(path);
 	return kept;
@@ -258,8 +278,11 @@ static void read_list(const quern_reading *r, const char *owner, const quern_par
 	free(name);
 }
 
+/* A number that must be given is NaN until it is. */
 static void set_default(const quern_reading *r, const quern_param *row, void *member) {
-	const double def = quern_param_default(row, r->dim);
+	const bool number = row->type == QUERN_T_REAL || row->type == QUERN_T_VECTOR;
+	const bool required = number && row->flags & QUERN_REQUIRED;
+	const double def = required ? NAN : quern_param_default(row, r->dim);
 	const bool maybe = row->flags & QUERN_MAYBE;
 	switch (row->type) {
 	case QUERN_T_REAL: *(quern_real *)member = maybe ? NAN : def; break;
@@ -273,28 +296,66 @@ static void set_default(const quern_reading *r, const quern_param *row, void *me
 	}
 }
 
-/* The value of a row that the scene leaves out. */
-static void left_out(
-	const quern_reading *r, const char *owner, const quern_param *row, quern_mark mark, void *member) {
+static bool is_a_part(const quern_param *rows, const char *key, const char *const *also) {
+	const size_t n = strlen(key);
+	for (; rows && rows->name; rows++)
+		for (const char *part = rows->name; part; part = strchr(part, '.') ? strchr(part, '.') + 1 : NULL)
+			if (!strncmp(part, key, n) && (!part[n] || part[n] == '.')) return true;
+	return in_list(also, key);
+}
+
+/* What is missing may have been found already: on the way to it stands something else than a map, or in its place a
+ * misspelt name. */
+static bool is_known_fault(
+	const quern_param *rows, const quern_node *map, const char *name, const char *const *also) {
+	char part[64], above[64] = "";
+	const char *rest = name;
+	for (;;) {
+		const size_t n = strcspn(rest, ".");
+		snprintf(part, sizeof part, "%.*s", (int)n, rest);
+		if (quern_node_is_null(map)) return false;
+		if (map->kind != QUERN_NODE_MAP) return !quern_param_find(rows, above);
+		if (!rest[n]) break;
+		rest += n + 1;
+		snprintf(above, sizeof above, "%.*s", (int)(rest - 1 - name), name);
+		const quern_entry *entry = quern_node_entry(map, part);
+		if (!entry) break;
+		map = entry->value;
+	}
+	for (size_t i = 0; i < map->n; i++)
+		if (!is_a_part(rows, map->entries[i].key, also) &&
+			quern_nearest(map->entries[i].key, (const char *const[]) { part, NULL }))
+			return true;
+	return false;
+}
+
+static void missing(const quern_reading *r, const char *owner, const quern_param *row, quern_mark mark) {
+	const char *doc = row->doc ? row->doc : "";
+	const size_t n = strlen(doc);
+	const bool stop = n && doc[n - 1] == '.', unit = row->unit && strcmp(row->unit, "1") != 0;
+	quern_report_add(r->report, mark, "%s: '%s' is missing: %.*s%s%s%s%s%s", owner, row->name,
+		(int)(n - stop), doc, unit ? " [" : "", unit ? row->unit : "", unit ? "]" : "",
+		row->from ? "; nothing in this scene gives " : "", row->from ? row->from : "");
+}
+
+/* The value of a row that the scene leaves out; false if it must not. */
+/* The value of a row that the scene leaves out; false if it must not be. */
+static bool left_out(const quern_reading *r, const quern_param *row, void *member) {
 	set_default(r, row, member);
 	if (row->from && row->type == QUERN_T_REAL) {
 		for (size_t i = 0; i < r->n_published; i++)
 			if (!strcmp(r->published[i].name, row->from)) {
 				*(quern_real *)member = r->published[i].value;
-				return;
+				return true;
 			}
-		if (row->flags & QUERN_REQUIRED)
-			quern_report_add(r->report, mark,
-				"%s: '%s' is missing (%s, in %s), and nothing in the scene gives %s", owner, row->name,
-				row->doc, row->unit, row->from);
-	} else if (row->flags & QUERN_REQUIRED)
-		quern_report_add(r->report, mark, "%s: '%s' is missing: %s%s%s%s", owner, row->name, row->doc,
-			row->unit ? " [" : "", row->unit ? row->unit : "", row->unit ? "]" : "");
+	}
+	return !(row->flags & QUERN_REQUIRED);
 }
 
 void quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,
 	const quern_node *map, quern_mark mark, const char *const *also, void *instance) {
 	char say[64];
+	const quern_node *given = map;
 	if (map && !quern_node_is_null(map)) {
 		if (map->kind == QUERN_NODE_MAP) check_keys(r, owner, rows, map, "", also);
 		else {
@@ -311,15 +372,13 @@ void quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 		for (const quern_param *other = rows; other->name; other++)
 			opens = opens || is_prefix(row->name, other->name);
 		if (node && opens && node->kind == QUERN_NODE_MAP) node = NULL;
+		if (!node && !left_out(r, row, member) && !is_known_fault(rows, given, row->name, also))
+			missing(r, owner, row, mark);
 		if (row->type == QUERN_T_LIST) {
-			if (!node && row->flags & QUERN_REQUIRED) left_out(r, owner, row, mark, member);
 			read_list(r, owner, row, node, also, member);
 			continue;
 		}
-		if (!node) {
-			left_out(r, owner, row, mark, member);
-			continue;
-		}
+		if (!node) continue;
 		set_default(r, row, member); /* so that a faulty value leaves something sane behind */
 		switch (row->type) {
 		case QUERN_T_REAL: read_number(r, owner, row, node, member); break;

@@ -211,6 +211,15 @@ static quern_field *add_field(quern_plan *p, const quern_plan_use *u) {
 	return field;
 }
 
+/* A field of a section that this scene goes without, as its twins of pure grains or pure continuum do. */
+static bool section_left_out(const quern_plan *p, const char *field) {
+	static const char *const usual[] = { "grain.", "contact.", "touch.", "point.", "cell.", NULL };
+	const bool here = set_of(p, field) >= 0 && p->scene->general.model == 0;
+	for (size_t k = 0; usual[k]; k++)
+		if (!strncmp(field, usual[k], strlen(usual[k]))) return !here;
+	return false;
+}
+
 static void make_fields(quern_plan *p) {
 	const quern_scene *s = p->scene;
 	for (size_t i = 0; i < p->n_uses; i++) {
@@ -249,7 +258,11 @@ static void make_fields(quern_plan *p) {
 			if (!made && u->counts && changes(u->row) && !strcmp(u->field, s->fields[k]))
 				made = add_field(p, u);
 		}
-		if (!made) {
+		if (!made && section_left_out(p, s->fields[k])) {
+			if (s->general.model == 0)
+				quern_report_warn(s->report, s->field_marks[k],
+					"scene: output.fields: '%s' is left out: the section that makes it is not in this scene", s->fields[k]);
+		} else if (!made) {
 			const char *near = quern_nearest(s->fields[k], known);
 			quern_report_add(s->report, s->field_marks[k],
 				"scene: output.fields: nothing in this scene makes '%s'%s%s%s", s->fields[k],

@@ -39,17 +39,34 @@ static ut_unit *parse(ut_system *system, const char *unit) {
 	return ut_parse(system, unit, UT_UTF8);
 }
 
+/* To UDUNITS-2 an angle is a pure number; a friction of "30 deg" is none. */
+static bool is_angle(const ut_unit *unit) {
+	char text[64];
+	return ut_format(unit, text, sizeof text, UT_ASCII | UT_DEFINITION) > 0 && strstr(text, "rad");
+}
+
+/* "2 3" would be twice three; "2 1/s" is meant. */
+static bool names_a_unit(const char *text) {
+	return strchr("+-.,", *text) == NULL && (!isdigit((unsigned char)*text) || !strncmp(text, "1/", 2));
+}
+
+static bool convertible(const ut_unit *a, const ut_unit *b) {
+	if (!ut_are_convertible(a, b) || ut_is_dimensionless(a) != ut_is_dimensionless(b)) return false;
+	return !ut_is_dimensionless(b) || is_angle(a) == is_angle(b);
+}
+
 static bool convert(quern_units *units, const char *from, const char *to, double *value, char why[160]) {
 	ut_system *system = load(units);
 	if (!system) {
 		snprintf(why, 160, "the unit database of UDUNITS-2 cannot be read; is libudunits2-data installed?");
 		return false;
 	}
-	ut_unit *a = parse(system, from), *b = parse(system, to);
+	ut_unit *a = names_a_unit(from) ? parse(system, from) : NULL, *b = parse(system, to);
 	bool good = false;
-	if (!a)
+	if (*from == ',') snprintf(why, 160, "a decimal comma: write a point");
+	else if (!a)
 		snprintf(why, 160, "'%.40s' is no unit; %s is wanted", from, strcmp(to, "1") ? to : "a pure number");
-	else if (!b || !ut_are_convertible(a, b) || (strcmp(to, "1") != 0) != !ut_is_dimensionless(a))
+	else if (!b || !convertible(a, b))
 		snprintf(why, 160, "'%.40s' cannot be turned into %s", from, strcmp(to, "1") ? to : "a pure number");
 	else {
 		cv_converter *converter = ut_get_converter(a, b);

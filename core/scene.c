@@ -166,18 +166,22 @@ static void read_step(quern_scene *s, const quern_node *root) {
 	const quern_mark mark = quern_param_mark(root, "time.step", root->mark);
 	if (!g->step_text || !strcmp(g->step_text, "auto")) return;
 	if (!quern_quantity_read(s->units, g->step_text, "s", &g->step, why))
-		quern_report_add(s->report, mark, "scene: time.step: %s, or auto", why);
-	else if (!(g->step > 0)) quern_report_add(s->report, mark, "scene: time.step must be above 0 s, or auto");
+		quern_report_add(s->report, mark, "scene: time.step: %s; it must be a time or auto", why);
+	else if (!(g->step > 0))
+		quern_report_add(s->report, mark, "scene: time.step is %s, must be above 0 s, or auto", g->step_text);
 }
 
-static void check_domain(quern_scene *s, const quern_node *root) {
+static void check_domain(quern_scene *s, const quern_node *root, bool sound) {
 	quern_general *g = &s->general;
+	for (int k = 0; k < g->dimension; k++)
+		if (!isfinite(g->gravity[k]) || !isfinite(g->lower[k]) || !isfinite(g->upper[k])) return;
 	for (int k = 0; k < g->dimension; k++)
 		if (!(g->upper[k] > g->lower[k])) {
 			quern_report_add(s->report, quern_param_mark(root, "domain.upper", root->mark),
 				"scene: domain.upper must be above domain.lower in every direction; axis %d is empty", k);
 			return;
 		}
+	s->sound = sound;
 	for (int k = 0; k < g->dimension; k++)
 		if (g->periodic[k] && g->gravity[k] != 0 && fabs(g->gravity[k]) > 0.999 * gravity_of(g))
 			quern_report_warn(s->report, quern_param_mark(root, "gravity", root->mark),
@@ -197,12 +201,12 @@ static void read_general(quern_scene *s, quern_node *root) {
 	s->general.dimension = (int32_t)r.dim;
 	if (s->general.version > 1)
 		quern_report_add(s->report, quern_param_mark(root, "quern", root->mark),
-			"scene: quern: format %d is newer than this program, which reads 1", s->general.version);
+			"scene: quern is %d, must be 1: a newer program is needed", s->general.version);
 	if (isnan(s->general.every)) s->general.every = s->general.end > 0 ? s->general.end / 50 : 1;
 	read_periodic(s, quern_node_find(root, "domain"));
 	read_fields(s, quern_node_find(root, "output"));
 	read_step(s, root);
-	if (!quern_report_errors(s->report)) check_domain(s, root);
+	check_domain(s, root, dimension == 2 || dimension == 3);
 	quern_loader_limit(s->loader, (const int[]) { 4, 1, 3, 4 }[s->general.instructions]);
 }
 
@@ -217,8 +221,11 @@ static void check_sections(quern_scene *s, quern_mark mark) {
 	const quern_section *grains = quern_scene_section(s, "grains"),
 						*hybrid = quern_scene_section(s, "hybrid"),
 						*continuum = quern_scene_section(s, "continuum");
-	if (!grains && !continuum)
+	if (!grains && !continuum && s->general.model == MODEL_ALL)
 		quern_report_add(s->report, mark, "scene: nothing to simulate: add a section grains or continuum");
+	else if (!grains && !continuum)
+		quern_report_add(s->report, quern_param_mark(s->tree->root, "model", mark),
+			"scene: model keeps %s alone, and there is no such section", models[s->general.model]);
 	else if (grains && continuum && !hybrid)
 		quern_report_add(s->report, continuum->mark,
 			"scene: grains and continuum do not feel each other without a section hybrid; add it, or keep "

@@ -52,6 +52,7 @@ typedef struct quern_general {
 
 typedef struct quern_scene {
 	quern_general general;
+	bool sound; /* dimension, gravity and domain may be relied on */
 	quern_report *report;
 	quern_units *units;
 	quern_loader *loader;

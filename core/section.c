@@ -29,9 +29,9 @@ static void instance_read(quern_scene *s, quern_instance *it, const char *const 
 	quern_params_read(&r, it->file->plugin.id, it->file->params, it->map, it->mark, also, it->self);
 }
 
-/* A faulty parameter must not reach init, which may rely on the ranges of its rows. */
+/* A faulty parameter must not reach init, which may rely on the ranges of its rows; nor must a faulty domain. */
 static void instance_init(quern_scene *s, quern_instance *it, size_t errors_before) {
-	if (quern_report_errors(s->report) != errors_before) return;
+	if (quern_report_errors(s->report) != errors_before || !s->sound) return;
 	if (it->file->plugin.init) {
 		quern_err err = { s->report, it->map, it->mark, it->file->plugin.id };
 		const quern_setup setup = quern_scene_setup(s, it->path);
@@ -220,7 +220,7 @@ static void fill_variants(quern_scene *s, quern_slot_use *use) {
 		if (!given) continue;
 		if (given->kind != QUERN_NODE_MAP) {
 			quern_report_add(s->report, given->mark,
-				"%s here must be a map of parameters to override, not %s", key + 1,
+				"%s: '%s' must be a map of parameters to override, not %s", other->path, key + 1,
 				quern_node_say(given, say));
 			continue;
 		}
@@ -337,9 +337,14 @@ void quern_section_read(quern_scene *s, const quern_section_name *names, const q
 		is_list = is_list || !*use->slot->name;
 	}
 	char say[64];
-	if (!map && !is_list)
+	if (!map && !is_list) {
 		quern_report_add(
 			s->report, node->mark, "%s must be a map, not %s", names->section, quern_node_say(node, say));
+		for (size_t k = 0; k < section->n_slots; k++) free(section->slots[k].path);
+		free(section->slots);
+		s->n_sections--;
+		return;
+	}
 	size_t n;
 	const char **also = section_also(section->ops, &n);
 	const size_t before = quern_report_errors(s->report);

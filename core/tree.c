@@ -19,6 +19,8 @@ typedef struct {
 	quern_report *report;
 	const char *file;
 	bool option; /* text of the command line: marks carry no line */
+	const char *data;
+	size_t length;
 	anchor *anchors;
 	size_t n_anchors, anchors_capacity, n_nodes;
 	bool failed;
@@ -55,13 +57,15 @@ static quern_node *take_node(reader *r, quern_node_kind kind, quern_mark mark) {
 	return node;
 }
 
-static quern_node *copy(reader *r, const quern_node *old) {
-	quern_node *node = take_node(r, old->kind, old->mark);
+/* Faults stand at the alias, everything else where the anchor has it. */
+static quern_node *copy(reader *r, const quern_node *old, quern_mark alias) {
+	quern_node *node = take_node(r, old->kind, alias);
 	if (!node) return NULL;
+	node->mark = old->mark;
 	node->quoted = old->quoted;
 	if (old->text) node->text = quern_copy(old->text);
 	for (size_t i = 0; i < old->n; i++) {
-		quern_node *value = copy(r, old->entries[i].value);
+		quern_node *value = copy(r, old->entries[i].value, alias);
 		if (!value) return quern_node_destroy(node), NULL;
 		node->entries = quern_grow(node->entries, node->n, &node->capacity, sizeof(quern_entry));
 		node->entries[node->n++] = (quern_entry) {
@@ -73,14 +77,56 @@ static quern_node *copy(reader *r, const quern_node *old) {
 	return node;
 }
 
+/* What libyaml says, and what helps; `begin`: the fault shows best where its context begins. */
+static const struct {
+	const char *problem, *context, *cure;
+	bool begin;
+} cures[] = {
+	{ "could not find expected ':'", "while scanning a simple key",
+		"a ':' with a blank after it is missing behind this key", true },
+	{ "found unexpected end of stream", "while scanning a quoted scalar", "this quote is never closed",
+		true },
+	{ "did not find expected ',' or ']'", NULL, "a ',' is missing here, or a ']' that closes the list",
+		false },
+	{ "did not find expected ',' or '}'", NULL, "a ',' is missing here, or a '}' that closes the map",
+		false },
+	{ "did not find expected key", NULL, "this line does not stand below the keys of its map", false },
+	{ "did not find expected '-' indicator", NULL, "this line does not stand below the items of its list",
+		false },
+	{ "mapping values are not allowed in this context", NULL,
+		"a ':' after what is a value already: begin a new line, or put the text in quotes", false },
+};
+
+/* libyaml gives a byte that is no text by its offset alone. */
+static yaml_mark_t mark_of_byte(const reader *r, size_t offset) {
+	yaml_mark_t mark = { 0 };
+	for (size_t i = 0; i < offset && i < r->length; i++) {
+		const unsigned char c = (unsigned char)r->data[i];
+		if (c == '\n') mark.line++, mark.column = 0;
+		else mark.column += (c & 0xc0u) != 0x80u;
+	}
+	return mark;
+}
+
+static void explain(reader *r) {
+	const yaml_parser_t *y = &r->yaml;
+	const char *problem = y->problem ? y->problem : "it cannot be read", *cure = problem;
+	yaml_mark_t at = y->problem ? y->problem_mark : y->context_mark;
+	if (y->error == YAML_READER_ERROR) at = mark_of_byte(r, y->problem_offset);
+	else if (y->error == YAML_SCANNER_ERROR && at.index < r->length && r->data[at.index] == '\t')
+		cure = "a tab: lines are indented with blanks";
+	for (size_t i = 0; i < sizeof cures / sizeof *cures; i++) {
+		if (strcmp(problem, cures[i].problem) != 0) continue;
+		if (cures[i].context && (!y->context || strcmp(y->context, cures[i].context) != 0)) continue;
+		cure = cures[i].cure;
+		if (cures[i].begin) at = y->context_mark;
+	}
+	quern_report_add(r->report, mark_of(r, at), "not valid YAML: %s", cure);
+}
+
 static bool next(reader *r, yaml_event_t *event) {
 	if (yaml_parser_parse(&r->yaml, event)) return true;
-	if (!r->failed) {
-		const yaml_mark_t at = r->yaml.problem ? r->yaml.problem_mark : r->yaml.context_mark;
-		quern_report_add(r->report, mark_of(r, at), "not valid YAML: %s%s%s",
-			r->yaml.problem ? r->yaml.problem : "unreadable", r->yaml.context ? ", " : "",
-			r->yaml.context ? r->yaml.context : "");
-	}
+	if (!r->failed) explain(r);
 	r->failed = true;
 	return false;
 }
@@ -136,7 +182,7 @@ static void remember(reader *r, const yaml_char_t *name, quern_node *node) {
 
 static quern_node *alias(reader *r, const char *name, quern_mark mark) {
 	for (size_t i = r->n_anchors; i-- > 0;)
-		if (!strcmp(r->anchors[i].name, name)) return copy(r, r->anchors[i].node);
+		if (!strcmp(r->anchors[i].name, name)) return copy(r, r->anchors[i].node, mark);
 	if (!r->failed) quern_report_add(r->report, mark, "'*%s' names no anchor that stands before it", name);
 	r->failed = true;
 	return NULL;
@@ -195,7 +241,7 @@ static quern_node *document(reader *r) {
 		case YAML_STREAM_START_EVENT:
 		case YAML_DOCUMENT_START_EVENT:
 			if (root && event.type == YAML_DOCUMENT_START_EVENT)
-				fail(r, mark, "a second document: a scene is one document");
+				fail(r, mark, "a second document begins here: a scene is one");
 			yaml_event_delete(&event);
 			break;
 		case YAML_DOCUMENT_END_EVENT: yaml_event_delete(&event); break;
@@ -218,7 +264,11 @@ const char *quern_tree_keep(quern_tree *tree, const char *name) {
 
 static quern_node *parse(
 	quern_tree *tree, const char *name, const char *data, size_t length, bool option, quern_report *report) {
-	reader r = { .report = report, .file = quern_tree_keep(tree, name), .option = option };
+	reader r = { .report = report,
+		.file = quern_tree_keep(tree, name),
+		.option = option,
+		.data = data,
+		.length = length };
 	if (!yaml_parser_initialize(&r.yaml)) return NULL;
 	yaml_parser_set_input_string(&r.yaml, (const unsigned char *)data, length);
 	quern_node *root = document(&r);
@@ -289,7 +339,10 @@ quern_node *quern_node_find(const quern_node *map, const char *key) {
 const char *quern_node_say(const quern_node *node, char buffer[64]) {
 	if (quern_node_is_null(node)) return "nothing";
 	if (node->kind == QUERN_NODE_MAP) return "a map";
-	if (node->kind == QUERN_NODE_LIST) return "a list";
+	if (node->kind == QUERN_NODE_LIST) {
+		snprintf(buffer, 64, "a list of %zu", node->n);
+		return buffer;
+	}
 	snprintf(buffer, 64, "'%.40s%s'", node->text, strlen(node->text) > 40 ? "..." : "");
 	return buffer;
 }

@@ -59,5 +59,5 @@ void quern_node_merge_entry(quern_node *map, const quern_entry *);
 struct quern_text;
 void quern_node_print(const quern_node *, int indent, struct quern_text *);
 
-/* "a map", "a list", "'text'": for messages; valid until the next call with the same buffer */
+/* "a map", "a list of 3", "'text'": for messages; valid until the next call with the same buffer */
 const char *quern_node_say(const quern_node *, char buffer[64]);

@@ -234,27 +234,51 @@ void quern_hybrid_rates(update *d) {
 	}
 }
 
-/* The normal of the zone's level set, for transfers that treat it apart: the direction in which the continuum's share
- * grows, where it does. */
-void quern_hybrid_normals(update *d) {
+/* The unit vector along which the continuum's share grows at a cell, zero where it does not. */
+static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
+	const int32_t *zone = d->u[U_ZONE].index;
+	int32_t cell[3], other[3];
+	quern_real length = 0;
+	n[0] = n[1] = n[2] = 0;
+	if (!quern_hybrid_cell(d, c, cell)) return;
+	for (uint32_t k = 0; k < d->s->dim; k++) {
+		const int32_t up = quern_hybrid_beside(d, cell, k, 1, other), down = quern_hybrid_beside(d, cell, k, -1, other);
+		n[k] = point_share(zone[up < 0 ? (int32_t)c : up]) - point_share(zone[down < 0 ? (int32_t)c : down]);
+		length += n[k] * n[k];
+	}
+	for (uint32_t k = 0; k < d->s->dim && length > 0; k++) n[k] /= sqrt(length);
+}
+
+static void put_normals(const update *d, uint32_t n, const quern_column *x, const quern_column *out, quern_real (*normal)[3]) {
+	for (uint32_t i = 0; i < n && out->real[0]; i++) {
+		const int32_t c = cell_of(d, x->real, i);
+		for (uint32_t k = 0; k < d->s->dim; k++) out->real[k][i] = c < 0 ? 0 : normal[c][k];
+	}
+}
+
+quern_status quern_hybrid_normals(update *d) {
 	const quern_column *u = d->u;
-	const uint32_t dim = d->s->dim;
-	for (uint32_t c = 0; c < d->n_cells && u[U_NORMAL].real[0]; c++) {
-		int32_t cell[3], other[3];
-		quern_real n[3] = { 0 }, length = 0;
-		if (quern_hybrid_cell(d, c, cell))
-			for (uint32_t k = 0; k < dim; k++) {
-				const int32_t up = quern_hybrid_beside(d, cell, k, 1, other), down = quern_hybrid_beside(d, cell, k, -1, other);
-				n[k] = point_share(up < 0 ? u[U_ZONE].index[c] : u[U_ZONE].index[up]) -
-					point_share(down < 0 ? u[U_ZONE].index[c] : u[U_ZONE].index[down]);
-				length += n[k] * n[k];
-			}
-		for (uint32_t k = 0; k < dim; k++) u[U_NORMAL].real[k][c] = length > 0 ? n[k] / sqrt(length) : 0;
+	if (!u[U_GRAIN_NORMAL].real[0] && !u[U_POINT_NORMAL].real[0]) return QUERN_OK;
+	quern_real(*normal)[3] = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof *normal);
+	if (!normal) return QUERN_E_MEMORY;
+	for (uint32_t c = 0; c < d->n_cells; c++) normal_of(d, c, normal[c]);
+	put_normals(d, d->s->host->set(d->s->run, "grain").n, &u[U_GRAIN_POSITION], &u[U_GRAIN_NORMAL], normal);
+	put_normals(d, d->s->host->set(d->s->run, "point").n, &u[U_POINT_POSITION], &u[U_POINT_NORMAL], normal);
+	return QUERN_OK;
+}
+
+static void put_homes(const update *d, uint32_t n, const quern_column *x, const int32_t *fixed, int32_t *home) {
+	for (uint32_t i = 0; i < n; i++) {
+		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i);
+		int32_t cell[3];
+		home[i] = -1;
+		if (c >= 0 && quern_hybrid_cell(d, (uint32_t)c, cell))
+			home[i] = (cell[2] * d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0];
 	}
-	for (uint32_t k = 0; k < dim && u[U_NORMAL].real[0]; k++) {
-		for (uint32_t i = 0; i < d->n_grains && u[U_GRAIN_NORMAL].real[0]; i++)
-			u[U_GRAIN_NORMAL].real[k][i] = d->grain_cell[i] < 0 ? 0 : u[U_NORMAL].real[k][d->grain_cell[i]];
-		for (uint32_t i = 0; i < d->n_points && u[U_POINT_NORMAL].real[0]; i++)
-			u[U_POINT_NORMAL].real[k][i] = d->point_cell[i] < 0 ? 0 : u[U_NORMAL].real[k][d->point_cell[i]];
-	}
+}
+
+void quern_hybrid_homes(update *d) {
+	const quern_column *u = d->u;
+	put_homes(d, d->s->host->set(d->s->run, "grain").n, &u[U_GRAIN_POSITION], u[U_GRAIN_FIXED].index, u[U_GRAIN_HOME].index);
+	put_homes(d, d->s->host->set(d->s->run, "point").n, &u[U_POINT_POSITION], NULL, u[U_POINT_HOME].index);
 }

@@ -153,7 +153,7 @@ typedef struct {
 	const quern_step *s;
 	const quern_row *node;
 	quern_row *motion, *mixture;
-	quern_real *energy; /* by block: of the inelastic exchange */
+	quern_real *energy, *defect; /* by block: of the inelastic exchange; of its momentum, relative */
 } couple_work;
 
 typedef struct {
@@ -194,6 +194,10 @@ static void couple_block(void *arg, uint32_t b, uint32_t worker) {
 		const quern_real sum = m->mass[q] + m->other_mass[q];
 		quern_real gap2 = 0;
 		for (uint32_t a = 0; a < dim; a++) {
+			const quern_real made = m->mass[q] * (m->velocity[a][q] - m->before[a][q]) +
+				m->other_mass[q] * (m->other[a][q] - m->was[a][q]);
+			const quern_real there = m->mass[q] * fabs(m->before[a][q]) + m->other_mass[q] * fabs(m->was[a][q]);
+			if (fabs(made) > w->defect[b] * there) w->defect[b] = fabs(made) / there;
 			const quern_real gap = m->before[a][q] - m->was[a][q];
 			w->motion[k][a] = m->velocity[a][q];
 			w->motion[k][dim + a] += m->velocity[a][q] - m->before[a][q];
@@ -213,8 +217,12 @@ quern_status quern_hybrid_couple(const void *self, const quern_step *s) {
 		.mixture = (quern_row *)(void *)s->use[C_MIXTURE].real[0] };
 	(void)self;
 	w.energy = s->host->memory(s->run, ((size_t)g->n_blocks + 1) * sizeof(quern_real));
-	if (!w.energy) return QUERN_E_MEMORY;
+	w.defect = s->host->memory(s->run, ((size_t)g->n_blocks + 1) * sizeof(quern_real));
+	if (!w.energy || !w.defect) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, g->n_blocks, couple_block, &w);
+	quern_real *worst = s->use[C_EXCHANGE].real[0];
+	*worst = 0;
+	for (uint32_t b = 0; b < g->n_blocks; b++) *worst = w.defect[b] > *worst ? w.defect[b] : *worst;
 	if (s->use[C_ENERGY].real[0]) s->use[C_ENERGY].real[0][0] += s->host->sum(s->run, g->n_blocks, w.energy);
 	return QUERN_OK;
 }

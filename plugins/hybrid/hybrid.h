@@ -7,9 +7,9 @@
 
 typedef struct hybrid {
 	int32_t substeps, update, samples; /* from the scene */
-	quern_real hysteresis, guard, surplus;
+	quern_real hysteresis, guard;
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
-	radius_law radii;
+	radius_law radii; /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every; /* steps */
 	quern_real cell;
 	bool affine;
@@ -35,14 +35,12 @@ enum {
 	U_POINT_VOLUME,
 	U_POINT_STRESS,
 	U_POINT_WEIGHT,
-	U_POINT_GRADIENT,
 	U_POINT_HOME,
 	U_POINT_NORMAL,
 	U_ZONE,
 	U_FRACTION,
 	U_SHEAR_RATE,
 	U_INERTIAL,
-	U_NORMAL,
 	U_GRAIN_OWED,
 	U_POINT_OWED,
 	U_GRAIN_OWED_MOMENTUM,
@@ -54,8 +52,8 @@ enum {
 	U_MASS,
 	U_DISPLACEMENT,
 	U_UNSORTED,
-	U_CONVERTED,
-	U_CHATTER
+	U_MASS_DEFECT,
+	U_MOMENTUM_DEFECT
 };
 /* rows of hybrid.sample */
 enum {
@@ -73,7 +71,7 @@ enum {
 };
 /* rows of hybrid.raster, hybrid.couple and hybrid.back */
 enum { R_POSITION, R_VELOCITY, R_MASS, R_WEIGHT, R_FIXED, R_NODE, R_MOTION, R_MIXTURE };
-enum { C_NODE, C_MOTION, C_MIXTURE, C_ENERGY };
+enum { C_NODE, C_MOTION, C_MIXTURE, C_EXCHANGE, C_ENERGY };
 enum { B_POSITION, B_VELOCITY, B_MASS, B_WEIGHT, B_FIXED, B_ANCHOR, B_NODE, B_MIXTURE, B_DISPLACEMENT };
 /* rows of hybrid.audit */
 enum {
@@ -91,13 +89,14 @@ enum {
 	A_BODY,
 	A_FACES,
 	A_SUPPORT,
+	A_EXCHANGE,
 	A_GRAVITY,
 	A_MASS,
 	A_MOMENTUM,
 	A_SCALE,
+	A_AUDITS,
 	A_MASS_DEFECT,
-	A_MOMENTUM_DEFECT,
-	A_COUPLING
+	A_MOMENTUM_DEFECT
 };
 
 /* Lanes of a mixture row: mass, momentum, change of velocity. */

@@ -33,10 +33,6 @@ typedef struct {
 	uint32_t n;
 } movers;
 
-static int32_t linear(const update *d, const int32_t cell[3]) {
-	return (cell[2] * d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0];
-}
-
 static int32_t home_entry(const update *d, int32_t home) {
 	if (home < 0) return -1;
 	const int32_t nx = d->g->cells[0], ny = d->g->cells[1];
@@ -93,15 +89,6 @@ void quern_hybrid_move_entries(update *d) {
 			give_share(d, grains, old_grains, (uint32_t)home, (uint32_t)now, share);
 			give_share(d, points, old_points, (uint32_t)home, (uint32_t)now, share);
 		}
-	/* for the next time */
-	for (uint32_t i = 0; i < d->n_grains; i++) {
-		int32_t cell[3];
-		u[U_GRAIN_HOME].index[i] = d->grain_cell[i] >= 0 && quern_hybrid_cell(d, (uint32_t)d->grain_cell[i], cell) ? linear(d, cell) : -1;
-	}
-	for (uint32_t i = 0; i < d->n_points; i++) {
-		int32_t cell[3];
-		u[U_POINT_HOME].index[i] = d->point_cell[i] >= 0 && quern_hybrid_cell(d, (uint32_t)d->point_cell[i], cell) ? linear(d, cell) : -1;
-	}
 }
 
 /* ---- weights ---- */

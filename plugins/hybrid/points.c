@@ -236,7 +236,6 @@ quern_status quern_hybrid_apply_points(update *d) {
 		u[U_POINT_MASS].real[0][to] = p->mass;
 		u[U_POINT_VOLUME].real[0][to] = p->mass / d->h->packed;
 		u[U_POINT_WEIGHT].real[0][to] = p->weight;
-		u[U_POINT_HOME].index[to] = -1;
 	}
 	quern_hybrid_assign(d, kept, d->n_new_points);
 	u[U_UNSORTED].index[0] = 1;

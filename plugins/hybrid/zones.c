@@ -217,7 +217,8 @@ static quern_status surface_distance(update *d, const quern_real *level, uint32_
 			for (int step = -1; step <= 1; step += 2) {
 				const int what = beside(d, cell, k, step, &other);
 				const bool wall = what == BESIDE_WALL || (what == BESIDE_CELL && f.solid[other]);
-				const bool open = what == BESIDE_OPEN || (what == BESIDE_CELL && f.outside[other]);
+				const bool nothing = what == BESIDE_OPEN && flags & QUERN_SURFACE_FLOOD;
+				const bool open = nothing || (what == BESIDE_CELL && f.outside[other]);
 				int16_t way[3] = { 0 };
 				way[k] = (int16_t)step;
 				if (open || (wall && flags & QUERN_SURFACE_WALLS)) offer(&p, c, way);

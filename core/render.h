@@ -1,0 +1,97 @@
+/* render - a frame as a picture: what is read from it, how numbers become colours, and who paints what */
+#pragma once
+#include "scene.h"
+#include "text.h"
+#include <cairo.h>
+
+/* ---- render_frame.c: what a picture needs of a frame ---- */
+
+enum { RENDER_WHOLE, RENDER_SHARED, RENDER_FIXED }; /* a grain; one in a hybrid zone; one that never moves */
+
+/* Grains, points or cells. */
+typedef struct render_cloud {
+	size_t n;
+	double (*position)[3]; /* m */
+	double *size;          /* m, radius of a grain, edge of a point or cell */
+	double *value;         /* what colours it; NULL: nothing does */
+	uint8_t *sort;         /* RENDER_*, or a cell's zone; NULL: all zero */
+} render_cloud;
+
+typedef struct render_frame {
+	int dimension;
+	int64_t number;
+	double time; /* s */
+	char name[128];
+	render_cloud grains, points, cells;
+	char field[64], unit[32]; /* of the values; "" if there are none */
+	bool signs;               /* a component, not a magnitude */
+	double cell;              /* m, edge of a cell */
+	quern_scene
+		*scene; /* of scene.yaml in the run's folder, or NULL: then no domain and no bodies are drawn */
+} render_frame;
+
+/* Reads frame `number` (negative: the last one) of a run. `field`: "point.pressure", "grain.velocity.x", a bare "velocity"
+ * of all that have it, or NULL for the speed where it is known. On a fault returns an exit status and one sentence. */
+int render_frame_read(render_frame *, const char *folder, int64_t number, const char *field, quern_text *why);
+void render_frame_finish(render_frame *);
+
+/* ---- render_colour.c: numbers to colours, and numbers to read ---- */
+
+typedef struct render_colour {
+	double r, g, b;
+} render_colour;
+
+/* From dark violet at 0 to yellow at 1, in steps that look equal. */
+render_colour render_map(double t);
+render_colour render_mix(render_colour a, render_colour b, double t);
+
+typedef struct render_range {
+	double low, high, step; /* ends of the colour bar, and a round distance between its marks */
+	double factor;          /* from SI to the unit shown */
+	bool below, above;      /* some values lie beyond: stray ones must not take all the colours */
+	char label[128];        /* "|velocity| (mm/s)" */
+} render_range;
+
+render_range render_range_of(const render_frame *);
+double render_share(const render_range *, double value); /* into [0, 1] */
+double render_round_step(double wanted); /* 1, 2 or 5 times a power of ten, at most `wanted` */
+
+/* ---- render_view.c: where things lie in the picture ---- */
+
+/* Orthographic. In 2-D along -z; in 3-D from the front, the right and above, with the last axis upright. */
+typedef struct render_view {
+	double right[3], up[3], away[3];
+	double low[3], high[3];  /* m, what is shown */
+	double left, top, scale; /* m of screen at the upper left corner, pixels per m */
+	double width, height;    /* pixels */
+} render_view;
+
+render_view render_view_of(const render_frame *);
+void render_view_fit(render_view *, double most_width, double most_height);
+void render_project(
+	const render_view *, const double x[3], double out[3]); /* pixels, and m away from the eye */
+/* The level of the floor, if the scene or its domain says so. */
+bool render_floor(const render_frame *, double *level);
+
+/* ---- render_plane.c, render_space.c: what lies in the picture, with its upper left corner at the origin ---- */
+
+typedef struct render_style {
+	const render_frame *frame;
+	const render_view *view;
+	const render_range *range;
+	double line; /* pixels, a hairline of the page */
+} render_style;
+
+extern const render_colour render_sand, render_sky, render_grey, render_rose, render_ink;
+render_colour render_colour_of(const render_style *, const render_cloud *, size_t i);
+bool render_has(const render_cloud *, int sort);
+void render_plane(cairo_t *, const render_style *);
+void render_space(cairo_t *, const render_style *);
+/* Signs of the legend, also used for what they stand for. */
+void render_disc(cairo_t *, double x, double y, double radius, render_colour, int sort, double line);
+void render_hatch(cairo_t *, double line);
+void render_set(cairo_t *, render_colour, double alpha);
+
+/* ---- render_page.c: the picture with its heading, colour bar, scale and legend ---- */
+
+cairo_surface_t *render_page(const render_frame *, int width);

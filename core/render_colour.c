@@ -1,0 +1,137 @@
+#include "render.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+const render_colour render_sand = { 0.87, 0.72, 0.48 }, render_sky = { 0.52, 0.68, 0.85 },
+					render_grey = { 0.72, 0.72, 0.72 }, render_rose = { 0.80, 0.24, 0.38 },
+					render_ink = { 0.13, 0.13, 0.15 };
+
+render_colour render_mix(render_colour a, render_colour b, double t) {
+	return (render_colour) { a.r + t * (b.r - a.r), a.g + t * (b.g - a.g), a.b + t * (b.b - a.b) };
+}
+
+static double to_screen(double linear) {
+	const double x = linear < 0 ? 0 : linear > 1 ? 1 : linear;
+	return x < 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1 / 2.4) - 0.055;
+}
+
+/* Oklab (Ottosson 2020): equal steps of L, a and b look equal. */
+static render_colour from_oklab(double lightness, double a, double b) {
+	const double l = pow(lightness + 0.3963377774 * a + 0.2158037573 * b, 3);
+	const double m = pow(lightness - 0.1055613458 * a - 0.0638541728 * b, 3);
+	const double s = pow(lightness - 0.0894841775 * a - 1.2914855480 * b, 3);
+	return (render_colour) { to_screen(4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s),
+		to_screen(-1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s),
+		to_screen(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s) };
+}
+
+/* Lightness rises evenly while the hue turns from violet over blue and green to yellow: it reads in print, and for those
+ * who do not see all colours. */
+render_colour render_map(double t) {
+	const double x = t < 0 ? 0 : t > 1 ? 1 : t;
+	const double hue = (300 - 195 * x) * 0.017453292519943295, chroma = 0.115 + 0.05 * x;
+	return from_oklab(0.30 + 0.61 * x, chroma * cos(hue), chroma * sin(hue));
+}
+
+/* ---- the range of the values ---- */
+
+double render_round_step(double wanted) {
+	const double power = pow(10, floor(log10(wanted))), lead = wanted / power;
+	return (lead >= 5 ? 5 : lead >= 2 ? 2 : 1) * power;
+}
+
+static int by_value(const void *a, const void *b) {
+	const double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+/* All finite values but those of fixed grains, which are not coloured; sorted. */
+static double *gather(const render_frame *f, size_t *n) {
+	const render_cloud *clouds[3] = { &f->grains, &f->points, &f->cells };
+	double *all = quern_take(f->grains.n + f->points.n + f->cells.n + 1, sizeof(double));
+	*n = 0;
+	for (int k = 0; k < 3; k++)
+		for (size_t i = 0; clouds[k]->value && i < clouds[k]->n; i++) {
+			const bool shown = k != 0 || clouds[k]->sort[i] != RENDER_FIXED;
+			if (shown && isfinite(clouds[k]->value[i])) all[(*n)++] = clouds[k]->value[i];
+		}
+	qsort(all, *n, sizeof(double), by_value);
+	return all;
+}
+
+/* A few stray values must not take all the colours: beyond twice the spread of the rest they are cut, and marked. */
+static void set_ends(render_range *range, const double *all, size_t n, bool signs) {
+	double low = all[0], high = all[n - 1];
+	const double least = all[n / 200], most = all[n - 1 - n / 200], middle = all[n / 2];
+	if (high - middle > 2 * (most - middle) && most > middle) high = most, range->above = true;
+	if (middle - low > 2 * (middle - least) && middle > least) low = least, range->below = true;
+	if (!signs || (low > 0 && low < 0.5 * high)) low = 0, range->below = false;
+	if (!(high > low)) { /* one value: some range around it */
+		const double some = fabs(high) > 0 ? fabs(high) : 1;
+		if (low < 0) low -= 0.5 * some;
+		high = low + some;
+	}
+	range->low = low;
+	range->high = high;
+}
+
+/* ---- units ---- */
+
+static void add_exponents(char *out, size_t size, const char *unit) {
+	size_t n = strlen(out);
+	for (; *unit && n + 3 < size; unit++) {
+		const char *sign = unit[0] == '^' && unit[1] == '2'   ? "²"
+						   : unit[0] == '^' && unit[1] == '3' ? "³"
+															  : NULL;
+		if (sign) n += (size_t)snprintf(out + n, size - n, "%s", sign), unit++;
+		else out[n++] = *unit;
+		out[n] = 0;
+	}
+}
+
+/* A prefix stands before the first unit, unless that has a power of its own or is one already. */
+static bool takes_prefix(const char *unit) {
+	static const char *const plain[] = { "Pa", "m", "N", "J", "s", "W", "Hz" };
+	const size_t n = strcspn(unit, "/ *");
+	for (size_t k = 0; k < sizeof plain / sizeof *plain; k++)
+		if (strlen(plain[k]) == n && !strncmp(plain[k], unit, n)) return true;
+	return false;
+}
+
+static void set_label(render_range *range, const render_frame *f) {
+	static const char *const prefixes[] = { "n", "µ", "m", "", "k", "M", "G" };
+	const double size = fmax(fabs(range->low), fabs(range->high));
+	const int third = (int)floor(log10(size * 1.0001) / 3);
+	const bool prefix = takes_prefix(f->unit) && third >= -3 && third <= 3;
+	char unit[64] = "";
+	const char *name = f->field;
+	range->factor = 1;
+	if (prefix) snprintf(unit, sizeof unit, "%s", prefixes[third + 3]), range->factor = pow(1000, -third);
+	else if (size >= 1e4 || size < 1e-3) {
+		const int power = (int)floor(log10(size * 1.0001));
+		snprintf(unit, sizeof unit, "10^%d ", power);
+		range->factor = pow(10, -power);
+	}
+	if (strcmp(f->unit, "1") != 0) add_exponents(unit, sizeof unit, f->unit);
+	size_t n = (size_t)snprintf(range->label, sizeof range->label, f->signs ? "%s" : "|%s|", name);
+	for (size_t i = 0; i < n; i++)
+		if (range->label[i] == '.' || range->label[i] == '_') range->label[i] = ' ';
+	if (*unit) snprintf(range->label + n, sizeof range->label - n, " (%s)", unit);
+}
+
+render_range render_range_of(const render_frame *f) {
+	render_range range = { .low = 0, .high = 1, .factor = 1 };
+	size_t n;
+	double *all = gather(f, &n);
+	if (n) set_ends(&range, all, n, f->signs);
+	if (*f->field) set_label(&range, f);
+	range.step = render_round_step((range.high - range.low) / 3);
+	free(all);
+	return range;
+}
+
+double render_share(const render_range *range, double value) {
+	const double t = (value - range->low) / (range->high - range->low);
+	return t > 0 ? (t < 1 ? t : 1) : 0;
+}

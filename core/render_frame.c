@@ -1,0 +1,265 @@
+#include "command.h"
+#include "h5.h"
+#include "render.h"
+#include "run.h"
+#include "text.h"
+#include <dirent.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- which frame ---- */
+
+/* The numbers of the first and last frame; false if there is none. */
+static bool frames_of(const char *folder, int64_t *first, int64_t *last) {
+	char *path = quern_format("%s/frames", folder);
+	DIR *list = opendir(path);
+	struct dirent *entry;
+	bool any = false;
+	while (list && (entry = readdir(list))) {
+		char *end;
+		const long long number = strtoll(entry->d_name, &end, 10);
+		if (end == entry->d_name || strcmp(end, ".h5") != 0 || number < 0) continue;
+		if (!any || number < *first) *first = number;
+		if (!any || number > *last) *last = number;
+		any = true;
+	}
+	if (list) closedir(list);
+	free(path);
+	return any;
+}
+
+/* ---- columns ---- */
+
+/* Any numbers become doubles; NULL if the dataset is missing, of another length, or not of numbers. */
+static double *read_table(hid_t group, const char *name, size_t rows, size_t *columns) {
+	size_t n;
+	if (!quern_h5_read_size(group, name, &n, columns) || n != rows) return NULL;
+	const hid_t set = H5Dopen2(group, name, H5P_DEFAULT);
+	double *table = quern_take(n * *columns + 1, sizeof(double));
+	if (n && H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, table) < 0) {
+		free(table);
+		table = NULL;
+	}
+	H5Dclose(set);
+	return table;
+}
+
+/* Positions, and nothing else yet; an empty cloud if the group is missing or cannot be read. */
+static void read_positions(hid_t group, render_cloud *cloud) {
+	size_t rows, columns;
+	if (group < 0 || !quern_h5_read_size(group, "position", &rows, &columns) || columns != 3) return;
+	double *table = read_table(group, "position", rows, &columns);
+	if (!table) return;
+	cloud->n = rows;
+	cloud->position = (double(*)[3])(void *)table;
+	cloud->size = quern_take(rows + 1, sizeof(double));
+}
+
+static void read_grains(hid_t group, render_cloud *cloud) {
+	size_t columns;
+	read_positions(group, cloud);
+	double *radius = cloud->n ? read_table(group, "radius", cloud->n, &columns) : NULL;
+	double *weight = cloud->n ? read_table(group, "weight", cloud->n, &columns) : NULL;
+	double *fixed = cloud->n ? read_table(group, "fixed", cloud->n, &columns) : NULL;
+	cloud->sort = quern_take(cloud->n + 1, 1);
+	for (size_t i = 0; i < cloud->n; i++) {
+		cloud->size[i] = radius ? radius[i] : 0;
+		if (weight && weight[i] < 1) cloud->sort[i] = RENDER_SHARED;
+		if (fixed && fixed[i] != 0) cloud->sort[i] = RENDER_FIXED;
+	}
+	free(radius);
+	free(weight);
+	free(fixed);
+}
+
+static void read_points(hid_t group, render_cloud *cloud, int dimension) {
+	size_t columns;
+	read_positions(group, cloud);
+	double *volume = cloud->n ? read_table(group, "volume", cloud->n, &columns) : NULL;
+	for (size_t i = 0; i < cloud->n; i++)
+		cloud->size[i] = volume ? (dimension == 2 ? sqrt(volume[i]) : cbrt(volume[i])) : 0;
+	free(volume);
+}
+
+/* Cells follow each other along x inside a block: the smallest step is a cell's edge. */
+static double read_cells(hid_t group, render_cloud *cloud) {
+	size_t columns;
+	double edge = INFINITY;
+	read_positions(group, cloud);
+	double *zone = cloud->n ? read_table(group, "zone", cloud->n, &columns) : NULL;
+	if (zone) cloud->sort = quern_take(cloud->n + 1, 1);
+	for (size_t i = 0; i + 1 < cloud->n; i++) {
+		const double step = cloud->position[i + 1][0] - cloud->position[i][0];
+		if (step > 0 && step < edge) edge = step;
+	}
+	for (size_t i = 0; i < cloud->n; i++) {
+		cloud->size[i] = isfinite(edge) ? edge : 0;
+		if (zone) cloud->sort[i] = (uint8_t)(zone[i] > 0 && zone[i] < 3 ? zone[i] : 0);
+	}
+	free(zone);
+	return isfinite(edge) ? edge : 0;
+}
+
+/* ---- the field that colours ---- */
+
+typedef struct {
+	char set[24], name[64];
+	int component; /* -1: the magnitude */
+} wanted_field;
+
+/* "SET.NAME.COMPONENT", with the first and the last part left out if one wishes. */
+static wanted_field parse_field(const char *text) {
+	static const char *const sets[] = { "grain.", "point.", "cell." };
+	static const char *const components[] = { "x", "y", "z", "xx", "yy", "zz", "xy", "yz", "xz" };
+	wanted_field w = { .component = -1 };
+	for (int k = 0; k < 3; k++)
+		if (!strncmp(text, sets[k], strlen(sets[k]))) {
+			snprintf(w.set, sizeof w.set, "%.*s", (int)strcspn(text, "."), text);
+			text += strlen(sets[k]);
+		}
+	snprintf(w.name, sizeof w.name, "%s", text);
+	char *dot = strrchr(w.name, '.');
+	for (int k = 0; dot && k < 9; k++)
+		if (!strcmp(dot + 1, components[k])) w.component = k < 3 ? k : k - 3;
+	if (dot && w.component >= 0) *dot = 0;
+	return w;
+}
+
+/* True if the group has the field and its values were taken. */
+static bool take_values(hid_t group, const wanted_field *w, render_cloud *cloud, render_frame *f) {
+	size_t columns;
+	double *table = cloud->n ? read_table(group, w->name, cloud->n, &columns) : NULL;
+	if (!table || w->component >= (int)columns || !strcmp(w->name, "position")) {
+		free(table);
+		return false;
+	}
+	cloud->value = quern_take(cloud->n, sizeof(double));
+	for (size_t i = 0; i < cloud->n; i++) {
+		const double *row = table + i * columns;
+		double square = 0;
+		for (size_t c = 0; c < columns; c++) /* what stands off a tensor's diagonal stands for two */
+			square += (columns == 6 && c > 2 ? 2 : 1) * row[c] * row[c];
+		cloud->value[i] = columns == 1 ? row[0] : w->component >= 0 ? row[w->component] : sqrt(square);
+	}
+	f->signs = columns == 1 || w->component >= 0;
+	const hid_t set = H5Dopen2(group, w->name, H5P_DEFAULT);
+	if (!quern_h5_read_text(set, "unit", f->unit, sizeof f->unit)) snprintf(f->unit, sizeof f->unit, "1");
+	H5Dclose(set);
+	free(table);
+	return true;
+}
+
+static herr_t note_field(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
+	quern_text *list = arg;
+	char path[128] = "";
+	size_t rows, columns;
+	(void)info;
+	H5Iget_name(group, path, sizeof path);
+	if (!strcmp(name, "position") || !quern_h5_read_size(group, name, &rows, &columns)) return 0;
+	quern_text_add(list, "%s%.*s.%s", list->length ? ", " : "", (int)strlen(path) - 2, path + 1, name);
+	return 0;
+}
+
+static int no_such_field(const hid_t group[3], const char *field, const char *path, quern_text *why) {
+	quern_text list = { 0 };
+	for (int k = 0; k < 3; k++)
+		if (group[k] >= 0) H5Literate(group[k], H5_INDEX_NAME, H5_ITER_INC, NULL, note_field, &list);
+	quern_text_add(
+		why, "%s has no field '%s' that could be drawn; it has %s", path, field, quern_text_string(&list));
+	quern_text_finish(&list);
+	return QUERN_EXIT_USAGE;
+}
+
+static bool colour_by(render_frame *f, const hid_t group[3], const char *field) {
+	render_cloud *cloud[3] = { &f->grains, &f->points, &f->cells };
+	static const char *const sets[3] = { "grain", "point", "cell" };
+	const wanted_field w = parse_field(field);
+	bool any = false;
+	for (int k = 0; k < 3; k++) {
+		/* cells hide what is in them: only where they are asked for */
+		const bool wanted = *w.set ? !strcmp(w.set, sets[k]) : k < 2;
+		if (wanted && group[k] >= 0) any = take_values(group[k], &w, cloud[k], f) || any;
+	}
+	if (any) snprintf(f->field, sizeof f->field, "%.63s", field);
+	return any;
+}
+
+/* ---- all of it ---- */
+
+static bool read_head(hid_t file, render_frame *f) {
+	char format[32] = "";
+	int64_t dimension = 0;
+	const bool good = quern_h5_read_text(file, "format", format, sizeof format) &&
+					  !strncmp(format, "quern-frame ", 12) && quern_h5_read_number(file, "time", &f->time) &&
+					  quern_h5_read_integer(file, "dimension", &dimension) && dimension >= 2 &&
+					  dimension <= 3;
+	f->dimension = (int)dimension;
+	quern_h5_read_text(file, "name", f->name, sizeof f->name);
+	return good;
+}
+
+static int read_clouds(render_frame *f, hid_t file, const char *path, const char *field, quern_text *why) {
+	const hid_t group[3] = { quern_h5_find(file, "grains"), quern_h5_find(file, "points"),
+		quern_h5_find(file, "cells") };
+	int status = QUERN_EXIT_DONE;
+	read_grains(group[0], &f->grains);
+	read_points(group[1], &f->points, f->dimension);
+	f->cell = read_cells(group[2], &f->cells);
+	if (!f->grains.n && !f->points.n) {
+		quern_text_add(why, "%s holds neither grains nor points", path);
+		status = QUERN_EXIT_SCENE;
+	} else if (!colour_by(f, group, field ? field : "velocity") && field)
+		status = no_such_field(group, field, path, why);
+	for (int k = 0; k < 3; k++)
+		if (group[k] >= 0) H5Gclose(group[k]);
+	return status;
+}
+
+/* Bodies and the domain stand in the run's own scene. A picture can do without. */
+static quern_scene *scene_of(const char *folder) {
+	char *path = quern_format("%s/scene.yaml", folder);
+	quern_scene *scene = quern_scene_read(path, (const char *const[]) { NULL }, &quern_host_table);
+	free(path);
+	if (!quern_report_errors(scene->report)) return scene;
+	quern_scene_destroy(scene);
+	return NULL;
+}
+
+int render_frame_read(
+	render_frame *f, const char *folder, int64_t number, const char *field, quern_text *why) {
+	int64_t first = 0, last = 0;
+	*f = (render_frame) { .number = number };
+	if (!frames_of(folder, &first, &last)) {
+		quern_text_add(why, "%s/frames holds no frames: name the folder of a run", folder);
+		return QUERN_EXIT_SCENE;
+	}
+	if (number < 0) f->number = last;
+	char *path = quern_format("%s/frames/%06lld.h5", folder, (long long)f->number);
+	const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+	int status = QUERN_EXIT_SCENE;
+	if (file < 0 && (f->number < first || f->number > last))
+		quern_text_add(why, "%s has no frame %lld; its frames are %lld to %lld", folder, (long long)f->number,
+			(long long)first, (long long)last);
+	else if (file < 0) quern_text_add(why, "%s cannot be read: it is missing or damaged", path);
+	else if (!read_head(file, f)) quern_text_add(why, "%s is no frame of this program", path);
+	else status = read_clouds(f, file, path, field, why);
+	if (file >= 0) H5Fclose(file);
+	if (status == QUERN_EXIT_DONE) f->scene = scene_of(folder);
+	free(path);
+	return status;
+}
+
+static void finish_cloud(render_cloud *cloud) {
+	free(cloud->position);
+	free(cloud->size);
+	free(cloud->value);
+	free(cloud->sort);
+}
+
+void render_frame_finish(render_frame *f) {
+	finish_cloud(&f->grains);
+	finish_cloud(&f->points);
+	finish_cloud(&f->cells);
+	if (f->scene) quern_scene_destroy(f->scene);
+}

@@ -1,0 +1,72 @@
+#include "render.h"
+#include <math.h>
+
+static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+bool render_floor(const render_frame *f, double *level) {
+	if (f->scene) *level = f->scene->general.lower[f->dimension - 1];
+	return f->scene != NULL;
+}
+
+static void add_cloud(render_view *v, const render_cloud *cloud, double half) {
+	for (size_t i = 0; i < cloud->n; i++)
+		for (int k = 0; k < 3; k++) {
+			const double x = cloud->position[i][k], r = half * cloud->size[i];
+			if (!isfinite(x)) continue;
+			v->low[k] = fmin(v->low[k], x - r);
+			v->high[k] = fmax(v->high[k], x + r);
+		}
+}
+
+/* What is occupied, down to the floor unless that is far below. */
+static void crop(render_view *v, const render_frame *f) {
+	const int up = f->dimension - 1;
+	double level, most = 0;
+	for (int k = 0; k < 3; k++) v->low[k] = INFINITY, v->high[k] = -INFINITY;
+	add_cloud(v, &f->grains, 1);
+	add_cloud(v, &f->points, 0.5);
+	for (int k = 0; k < f->dimension; k++) most = fmax(most, v->high[k] - v->low[k]);
+	if (render_floor(f, &level) && level < v->low[up] && level > v->low[up] - 0.5 * most) v->low[up] = level;
+	if (f->dimension == 2) v->low[2] = v->high[2] = 0;
+	if (!(most > 0)) most = 1;
+	const double margin = (f->dimension == 2 ? 0.03 : 0.02) * most;
+	for (int k = 0; k < f->dimension; k++) {
+		if (f->dimension == 3 && k == up) continue;
+		v->low[k] -= margin;
+		v->high[k] += margin;
+	}
+}
+
+render_view render_view_of(const render_frame *f) {
+	render_view v = { .right = { 1, 0, 0 }, .up = { 0, 1, 0 }, .away = { 0, 0, -1 } };
+	if (f->dimension == 3) {
+		const double turn = -0.45, lift = 0.40;
+		const double away[3] = { -sin(turn), cos(turn), 0 };
+		v.right[0] = cos(turn), v.right[1] = sin(turn);
+		v.up[0] = sin(lift) * away[0], v.up[1] = sin(lift) * away[1], v.up[2] = cos(lift);
+		v.away[0] = cos(lift) * away[0], v.away[1] = cos(lift) * away[1], v.away[2] = -sin(lift);
+	}
+	crop(&v, f);
+	return v;
+}
+
+void render_view_fit(render_view *v, double most_width, double most_height) {
+	double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
+	for (int corner = 0; corner < 8; corner++) {
+		double x[3];
+		for (int k = 0; k < 3; k++) x[k] = corner >> k & 1 ? v->high[k] : v->low[k];
+		const double at[2] = { dot(v->right, x), dot(v->up, x) };
+		for (int k = 0; k < 2; k++) low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
+	}
+	v->scale = fmin(most_width / (high[0] - low[0]), most_height / (high[1] - low[1]));
+	v->left = low[0];
+	v->top = high[1];
+	v->width = v->scale * (high[0] - low[0]);
+	v->height = v->scale * (high[1] - low[1]);
+}
+
+void render_project(const render_view *v, const double x[3], double out[3]) {
+	out[0] = (dot(v->right, x) - v->left) * v->scale;
+	out[1] = (v->top - dot(v->up, x)) * v->scale;
+	out[2] = dot(v->away, x);
+}

@@ -1,0 +1,102 @@
+/* audit - the ledger's two invariants, asserted after every step: docs/theory/hybrid.md, section 5 */
+#include "hybrid.h"
+#include <math.h>
+
+static const quern_real tolerance = 1e-12;
+
+typedef struct {
+	quern_real mass, carried, momentum[3], owed_momentum[3], speed; /* speed: sum of w m |v| */
+} sums;
+
+typedef struct {
+	const quern_column *velocity, *mass, *weight;
+	const int32_t *fixed;
+	uint32_t n;
+} cloud;
+
+static bool add_cloud(const quern_step *s, const cloud *c, sums *out) {
+	const uint32_t dim = s->dim;
+	const size_t n = c->n;
+	quern_real *work = s->host->memory(s->run, (n + 1) * 5 * sizeof(quern_real));
+	if (!work) return false;
+	for (size_t i = 0; i < n; i++) {
+		const quern_real m = (c->fixed && c->fixed[i] ? 0 : 1) * c->weight->real[0][i] * c->mass->real[0][i];
+		quern_real v2 = 0;
+		for (uint32_t k = 0; k < dim; k++) {
+			const quern_real v = c->velocity->real[k][i];
+			work[(1 + k) * n + i] = m * v;
+			v2 += v * v;
+		}
+		work[i] = m;
+		work[4 * n + i] = m * sqrt(v2);
+	}
+	out->carried += s->host->sum(s->run, n, work);
+	for (uint32_t k = 0; k < dim; k++) out->momentum[k] += s->host->sum(s->run, n, work + (1 + k) * n);
+	out->speed += s->host->sum(s->run, n, work + 4 * n);
+	return true;
+}
+
+/* Impulses that came from outside since the start: whatever body, face or fixed grain gave them. */
+static quern_real impulse(const quern_step *s, uint32_t axis) {
+	const quern_column *u = s->use;
+	quern_real sum = u[A_GRAVITY].real[axis][0] + u[A_FACES].real[axis][0] + u[A_SUPPORT].real[axis][0];
+	const uint32_t bodies = u[A_BODY].real[axis] ? s->host->set(s->run, "body").n : 0;
+	for (uint32_t b = 0; b < bodies; b++) sum += u[A_BODY].real[axis][b];
+	return sum;
+}
+
+static bool take_sums(const quern_step *s, sums *out) {
+	const quern_column *u = s->use;
+	const size_t cells = s->host->set(s->run, "cell").n;
+	const cloud clouds[2] = { { &u[A_GRAIN_VELOCITY], &u[A_GRAIN_MASS], &u[A_GRAIN_WEIGHT], u[A_GRAIN_FIXED].index,
+								  s->host->set(s->run, "grain").n },
+		{ &u[A_POINT_VELOCITY], &u[A_POINT_MASS], &u[A_POINT_WEIGHT], NULL, s->host->set(s->run, "point").n } };
+	for (int c = 0; c < 2; c++)
+		if (!add_cloud(s, &clouds[c], out)) return false;
+	out->mass = out->carried + s->host->sum(s->run, cells, u[A_GRAIN_OWED].real[0]) +
+		s->host->sum(s->run, cells, u[A_POINT_OWED].real[0]);
+	for (uint32_t k = 0; k < s->dim; k++)
+		out->owed_momentum[k] = s->host->sum(s->run, cells, u[A_GRAIN_OWED_MOMENTUM].real[k]) +
+			s->host->sum(s->run, cells, u[A_POINT_OWED_MOMENTUM].real[k]);
+	return true;
+}
+
+static quern_status judge(const quern_step *s, const sums *now) {
+	const quern_column *u = s->use;
+	quern_real off = 0, pull = 0;
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real left = now->momentum[k] + now->owed_momentum[k] - impulse(s, k) - u[A_MOMENTUM].real[k][0];
+		off = fabs(left) > off ? fabs(left) : off;
+		pull = fabs(u[A_GRAVITY].real[k][0]) > pull ? fabs(u[A_GRAVITY].real[k][0]) : pull;
+	}
+	quern_real *scale = u[A_SCALE].real[0], *worst = u[A_MASS_DEFECT].real[0], *worst_momentum = u[A_MOMENTUM_DEFECT].real[0];
+	*scale = now->speed > *scale ? now->speed : *scale;
+	const quern_real mass_defect = fabs(now->mass / u[A_MASS].real[0][0] - 1), size = *scale + pull;
+	const quern_real momentum_defect = size > 0 ? off / size : 0;
+	*worst = mass_defect > *worst ? mass_defect : *worst;
+	*worst_momentum = momentum_defect > *worst_momentum ? momentum_defect : *worst_momentum;
+	if (!(mass_defect <= tolerance))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+			"the ledger of mass is off by %.3g of the mass: what grains, points and entries hold is no longer constant", mass_defect);
+	if (!(momentum_defect <= tolerance))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1, "the ledger of momentum is off by %.3g of it", momentum_defect);
+	if (!(u[A_EXCHANGE].real[0][0] <= tolerance))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+			"the coupling does not keep momentum: a node is off by %.3g of its own", u[A_EXCHANGE].real[0][0]);
+	return QUERN_OK;
+}
+
+quern_status quern_hybrid_audit(const void *self, const quern_step *s) {
+	const quern_column *u = s->use;
+	sums now = { .mass = 0 };
+	(void)self;
+	if (!take_sums(s, &now)) return QUERN_E_MEMORY;
+	if (!u[A_AUDITS].index[0]) {
+		u[A_AUDITS].index[0] = 1;
+		u[A_MASS].real[0][0] = now.mass;
+		for (uint32_t k = 0; k < s->dim; k++)
+			u[A_MOMENTUM].real[k][0] = now.momentum[k] + now.owed_momentum[k] - impulse(s, k);
+	} else
+		for (uint32_t k = 0; k < s->dim; k++) u[A_GRAVITY].real[k][0] += now.carried * s->gravity[k] * s->dt;
+	return judge(s, &now);
+}

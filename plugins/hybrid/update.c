@@ -1,0 +1,94 @@
+/* update - the order of a zone update. docs/theory/hybrid.md, section 6, says why it is this one */
+#include "update.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static quern_real full_cell(const update *d) {
+	const quern_real h = d->g->cell;
+	return d->h->packed * (d->s->dim == 2 ? h * h : h * h * h);
+}
+
+/* Zones from the state as it is, then weights, then books, then material that comes and goes. */
+static quern_status reckon(update *d) {
+	quern_hybrid_move_entries(d);
+	quern_hybrid_averages(d);
+	quern_hybrid_fractions(d);
+	quern_hybrid_rates(d);
+	if (d->failed) return QUERN_E_MEMORY;
+	quern_status status = quern_hybrid_zones(d);
+	if (status != QUERN_OK) return status;
+	quern_hybrid_weigh(d);
+	quern_hybrid_net(d);
+	status = quern_hybrid_hand_over(d);
+	if (status != QUERN_OK) return status;
+	quern_hybrid_points(d);
+	if (d->failed) return QUERN_E_MEMORY;
+	return quern_hybrid_grains(d);
+}
+
+static quern_status apply(update *d) {
+	memcpy(d->u[U_ZONE].index, d->zone, d->n_cells * sizeof(int32_t));
+	quern_status status = quern_hybrid_apply_grains(d);
+	if (status == QUERN_OK) status = quern_hybrid_apply_points(d);
+	if (status == QUERN_OK) status = quern_hybrid_normals(d);
+	if (status == QUERN_OK) quern_hybrid_homes(d);
+	return status;
+}
+
+static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed) {
+	update d = { .h = h, .s = s };
+	quern_status status = quern_hybrid_sort(&d);
+	if (status == QUERN_OK) {
+		d.full = full_cell(&d);
+		d.nominal = d.full / (s->dim == 2 ? 4 : 8);
+		status = reckon(&d);
+	}
+	if (status == QUERN_OK) status = apply(&d);
+	free(d.points);
+	free(d.grains);
+	*changed += d.changed;
+	s->use[U_UPDATES].index[0]++;
+	return status;
+}
+
+/* ---- what the log says ---- */
+
+static quern_real carried_mass(const quern_step *s) {
+	const quern_column *u = s->use;
+	const uint32_t grains = s->host->set(s->run, "grain").n, points = s->host->set(s->run, "point").n;
+	const int32_t *fixed = u[U_GRAIN_FIXED].index;
+	quern_real sum = 0;
+	for (uint32_t i = 0; i < grains; i++)
+		if (!fixed || !fixed[i]) sum += u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i];
+	for (uint32_t i = 0; i < points; i++) sum += u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i];
+	return sum;
+}
+
+static void say(const quern_step *s, uint32_t changed) {
+	const quern_column *u = s->use;
+	const quern_real whole = u[U_MASS].real[0][0];
+	quern_real entries = 0;
+	for (uint32_t c = 0; c < s->host->set(s->run, "cell").n; c++)
+		entries += fabs(u[U_GRAIN_OWED].real[0][c]) + fabs(u[U_POINT_OWED].real[0][c]);
+	s->host->log(s->run, 0, "update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",
+		u[U_UPDATES].index[0], (long long)s->step, changed, entries / whole, carried_mass(s) / whole - 1);
+}
+
+/* The first step only gathers contact stresses: without them new points would start unloaded. The first update then
+ * runs twice, since no cell passes from grains to continuum in one. */
+quern_status quern_hybrid_update(const void *self, const quern_step *s) {
+	const hybrid *h = self;
+	const quern_column *u = s->use;
+	uint32_t changed = 0;
+	if (s->step == 0) u[U_MASS].real[0][0] = carried_mass(s);
+	if (s->step < 1 || (s->step - 1) % h->every) return QUERN_OK;
+	quern_status status = once(h, s, &changed);
+	if (status == QUERN_OK && s->step == 1) status = once(h, s, &changed);
+	if (status != QUERN_OK) return status;
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, s->dim); k++)
+		memset(u[U_STRESS].real[k], 0, s->host->set(s->run, "cell").n * sizeof(quern_real));
+	u[U_SAMPLES].real[0][0] = 0;
+	say(s, changed);
+	return QUERN_OK;
+}

@@ -1,0 +1,84 @@
+/* oracle.strain_rate - grains where the flow shears fast. docs/theory/hybrid.md, section 3 */
+#include <math.h>
+#include <quern/abi.h>
+
+typedef struct {
+	quern_real shear_rate, inertial_number, release, depth, half_width;
+	bool by_rate, by_number;
+} shear;
+
+static const quern_param params[] = { QUERN_PARAM(shear, shear_rate, "1/s", "Shear rate from which on grains are wanted.",
+										  .flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
+	QUERN_PARAM(shear, inertial_number, "1", "Inertial number from which on grains are wanted.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(shear, release, "1", "Grains stay until the flow is slower than this share of the threshold.", .def = 0.6,
+		.min = 0, .max = 1, .flags = QUERN_MIN_OPEN),
+	QUERN_PARAM(shear, depth, "m", "Distance from the fast region to the middle of the hybrid zone.",
+		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(shear, half_width, "m", "Half the width of the hybrid zone; a cell at least.",
+		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(shear, by_rate, NULL, "Keep the shear rate; set by itself.", .flags = QUERN_ADVANCED),
+	QUERN_PARAM(shear, by_number, NULL, "Keep the inertial number; set by itself.", .flags = QUERN_ADVANCED),
+	QUERN_END_PARAMS };
+enum { RATE, NUMBER };
+static const quern_use uses[] = { { .field = "cell.shear_rate",
+									  .unit = "1/s",
+									  .doc = "Of the mean velocity of both.",
+									  .when = "by_rate",
+									  .access = QUERN_READ,
+									  .shape = QUERN_SCALAR },
+	{ .field = "cell.inertial_number",
+		.unit = "1",
+		.doc = "Shear rate times d sqrt(rho/p).",
+		.when = "by_number",
+		.access = QUERN_READ,
+		.shape = QUERN_SCALAR },
+	QUERN_END_USES };
+
+static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
+	shear *p = self;
+	p->by_rate = !isnan(p->shear_rate);
+	p->by_number = !isnan(p->inertial_number);
+	if (!p->by_rate && !p->by_number)
+		return setup->host->fail(err, QUERN_E_PARAM, NULL, "give shear_rate, inertial_number or both");
+	if (p->depth > p->half_width) return QUERN_OK;
+	return setup->host->fail(err, QUERN_E_PARAM, "half_width",
+		"must be less than the depth, %.4g m: grains must be left where the flow is fast", p->depth);
+}
+
+/* Above the threshold: outside. A cell that has grains keeps them down to a lower one, so that it does not flicker. */
+static void mark(const void *self, const quern_cell_batch *b) {
+	const shear *p = self;
+	for (uint32_t i = 0; i < b->n; i++) {
+		const quern_real share = b->zone[i] == QUERN_CONTINUUM ? 1 : p->release;
+		quern_real level = 1;
+		if (p->by_rate) level = fmin(level, share - b->use[RATE].real[0][i] / p->shear_rate);
+		if (p->by_number) level = fmin(level, share - b->use[NUMBER].real[0][i] / p->inertial_number);
+		b->level[i] = level;
+	}
+}
+
+static void decide(const void *self, const quern_cell_batch *b) {
+	const shear *p = self;
+	for (uint32_t i = 0; i < b->n; i++) {
+		const quern_real d = b->distance[i] - p->depth;
+		b->wish[i] = d < -p->half_width ? QUERN_DISCRETE : d <= p->half_width ? QUERN_HYBRID : QUERN_CONTINUUM;
+	}
+}
+
+static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_ORACLE,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "oracle.strain_rate",
+	.brief = "Grains where the flow shears fast.",
+	.doc = "Cells whose shear rate or inertial number is above a threshold count as surface: shear bands and jets are "
+		   "made of grains before they matter. Combine it with packing_fraction by a list.",
+	.cite = "Yue et al. 2018, 8 (as future work); GDR MiDi 2004",
+	.instance_size = sizeof(shear),
+	.params = params,
+	.uses = uses,
+	.init = init,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,0 +1,220 @@
+/* The continuum solver against closed forms: waves at their speed, weight carried at rest, and no ghost of a volume left in
+ * a body that flew apart and fell back. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <stdlib.h>
+
+static const double pi = 3.14159265358979312, gravity = 9.81, density = 1500;
+
+/* Mass-weighted mean of one component. */
+static double mean(quern_run *run, const char *field, int k) {
+	const uint32_t n = harness_count(run, "point");
+	const quern_column x = harness_field(run, field), m = harness_field(run, "point.mass");
+	double sum = 0, mass = 0;
+	for (uint32_t i = 0; i < n; i++) sum += m.real[0][i] * x.real[k][i], mass += m.real[0][i];
+	return sum / mass;
+}
+
+/* ==== a bar, fixed at one end, in its longest mode ==== */
+
+enum { BAR_LENGTH = 25 }; /* m; waves of 10 m/s, a period of 10 s */
+
+typedef struct bar {
+	double period, kept; /* kept: the fastest of the mean velocity after two periods, over the first */
+} bar;
+
+static bar ring(int cells, const char *shape, double speed) {
+	const double h = (double)BAR_LENGTH / cells;
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [%.17g, %.17g]},\n"
+		"time: {end: 1000, step: %.17g, force: true}, output: {every: 100},\n"
+		"bodies: [{plane: {point: [0, 0], normal: [1, 0], boundary: sticky}}],\n"
+		"continuum: {cell: %.17g, material: {elastic: {bulk_modulus: 50, poisson: 0, density: 1}},\n"
+		"  shape: %s, transfer: {picflip: {rate: 0}},\n"
+		"  fill: [{region: {box: {lower: [0, 0], upper: [%d, %.17g]}}}]}}\n",
+		(cells + 2) * h, 2 * h, 1.0 / cells, h, shape, BAR_LENGTH, 2 * h);
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		v.real[0][i] = speed * sin(pi * x.real[0][i] / (2 * BAR_LENGTH));
+	const double first = mean(run, "point.velocity", 0);
+	double crossing[5] = { 0 }, last = first;
+	bar out = { 0 };
+	for (int k = 0; k < 5;) {
+		harness_steps(run, 1);
+		const double now = mean(run, "point.velocity", 0);
+		if (k == 4) out.kept = fmax(out.kept, now / first);
+		if ((now > 0) != (last > 0)) crossing[k++] = quern_run_time(run) - run->clock.dt * now / (now - last);
+		last = now;
+	}
+	out.period = (crossing[4] - crossing[0]) / 2;
+	harness_close(run);
+	return out;
+}
+
+/* The wave speed is sqrt(E/rho) and the method is of second order. */
+static void vibrating_bar(void **unused) {
+	(void)unused;
+	static const int cells[] = { 13, 26, 52, 104 };
+	bool good = true;
+	for (int linear = 0; linear <= 1; linear++) {
+		double errors[4];
+		char what[80];
+		table_head(linear ? "bar of 25 m, linear: period, s" : "bar of 25 m, gimp: period, s");
+		for (int k = 0; k < 4; k++) {
+			const bar b = ring(cells[k], linear ? "linear" : "gimp", 0.01);
+			errors[k] = b.period - 10;
+			snprintf(what, sizeof what, "%d cells of two points", cells[k]);
+			good &= table_row(what, b.period, 10, 0.1);
+			good &= table_row("  share of the amplitude after two periods", b.kept, 1, 0.01);
+			if (!k) continue;
+			good &= table_row("  observed order", log(errors[k - 1] / errors[k]) / log(2), 2, 0.15);
+		}
+	}
+	table_head("the same, at ten times the speed");
+	good &= table_row("13 cells of two points", ring(13, "gimp", 0.1).period, 10, 0.1);
+	assert_true(good);
+}
+
+/* ==== weight ==== */
+
+typedef struct material {
+	const char *name, *parameters;
+} material;
+static const material materials[] = { { "elastic", "density: 1500" }, { "drucker_prager", "density: 1500" },
+	{ "mu_i", "diameter: 5e-3, grain_density: 2450, critical_density: 1500" } };
+enum { ELASTIC, DRUCKER_PRAGER, MU_I, MATERIALS };
+
+enum { COLUMN_CELLS = 20 };
+
+/* A column of one metre between slip walls. */
+static quern_run *column(int which, const char *boundary, const char *stress, double rate) {
+	const double h = 1.0 / COLUMN_CELLS;
+	return harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [%.17g, %.17g]},\n"
+		"time: {end: 1000}, output: {every: 0.1},\n"
+		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: %s}}],\n"
+		"continuum: {cell: %.17g, material: {%s: {bulk_modulus: 1e7, %s}}, transfer: {picflip: {rate: %g}},\n"
+		"  fill: [{region: {box: {lower: [0, 0], upper: [%.17g, 1]}}, stress: %s, lateral: 0.7}]}}\n",
+		4 * h, 1 + 2 * h, boundary, h, materials[which].name, materials[which].parameters, rate, 4 * h,
+		stress);
+}
+
+/* Worst relative gap between a cell's mean vertical stress and rho g times its depth, from the floor up to the cell that
+ * is `top` below the surface's. */
+static double weight_gap(quern_run *run, int top) {
+	double sum[COLUMN_CELLS + 2] = { 0 }, height[COLUMN_CELLS + 2] = { 0 }, worst = 0;
+	int n[COLUMN_CELLS + 2] = { 0 };
+	const quern_column x = harness_field(run, "point.position"), s = harness_field(run, "point.stress");
+	const double surface = 2 * mean(run, "point.position", 1);
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		const int cell = (int)(x.real[1][i] * COLUMN_CELLS);
+		sum[cell] += s.real[1][i], height[cell] += x.real[1][i], n[cell]++;
+	}
+	for (int k = 0; k < COLUMN_CELLS - top; k++)
+		worst = fmax(worst, fabs(sum[k] / n[k] / (density * gravity * (surface - height[k] / n[k])) + 1));
+	return worst;
+}
+
+/* A column under its own weight stays at rest and carries it, every cell its own. */
+static void weight_at_rest(void **unused) {
+	(void)unused;
+	bool good = true;
+	char what[80];
+	table_head("at rest from the start, 1 s: gap over rho g depth");
+	for (int which = 0; which < MATERIALS; which++)
+		for (int sticky = 0; sticky <= 1; sticky++) {
+			quern_run *run = column(which, sticky ? "sticky" : "slip", "at_rest", 0);
+			harness_until(run, 1);
+			snprintf(
+				what, sizeof what, "%s on a %s floor", materials[which].name, sticky ? "sticky" : "slip");
+			good &= table_row(what, weight_gap(run, 0), 0, 0.01);
+			harness_close(run);
+		}
+	assert_true(good);
+}
+
+/* Gravity switched on at once makes the column ring; where that has died down it carries the same stress. */
+static void weight_after_ringing(void **unused) {
+	(void)unused;
+	bool good = true;
+	char what[80];
+	table_head("gravity switched on, PIC, 4 s: gap over rho g depth");
+	for (int which = 0; which < MATERIALS; which++) {
+		/* a rebound opens the top of what yields, and half a cell of it then lies loose */
+		const int top = which == DRUCKER_PRAGER ? 3 : 0;
+		quern_run *run = column(which, "sticky", "none", 1e300);
+		harness_until(run, 4);
+		snprintf(what, sizeof what, "%s, all but %d cells at the top", materials[which].name, top);
+		good &= table_row(what, weight_gap(run, top), 0, 0.01);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+/* ==== thrown up ==== */
+
+typedef struct toss {
+	double base, spread; /* m/s, 1/s: v = base + spread * height */
+	double rate;         /* of the transfer, 1/s */
+	const char *what;
+} toss;
+
+/* A block of one metre between slip walls goes up and comes down; asked is the height it had. */
+static bool throw_block(int which, int cells, uint32_t dim, const toss *t) {
+	const double h = 1.0 / cells, wide = 4 * h;
+	const char *zero = dim == 3 ? ", 0" : "";
+	char depth[32] = "", what[80];
+	if (dim == 3) snprintf(depth, sizeof depth, ", %.17g", wide);
+	quern_run *run = harness_open(2,
+		"{quern: 1, dimension: %u, gravity: [0, -9.81%s],\n"
+		"domain: {lower: [0, 0%s], upper: [%.17g, 3%s]}, time: {end: 1000}, output: {every: 0.02},\n"
+		"bodies: [{plane: {point: [0, 0%s], normal: [0, 1%s], boundary: sticky}}],\n"
+		"continuum: {cell: %.17g, material: {%s: {bulk_modulus: 1e6, %s}}, transfer: {picflip: {rate: %g}},\n"
+		"  fill: [{region: {box: {lower: [0, 0%s], upper: [%.17g, 1%s]}}}]}}\n",
+		dim, zero, zero, wide, depth, zero, zero, h, materials[which].name, materials[which].parameters,
+		t->rate, zero, wide, depth);
+	const uint32_t n = harness_count(run, "point");
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+	for (uint32_t i = 0; i < n; i++) v.real[1][i] = t->base + t->spread * x.real[1][i];
+	double most = 0;
+	for (int k = 1; k <= 200; k++) {
+		double volume = 0;
+		harness_until(run, 0.02 * k);
+		const quern_column now = harness_field(run, "point.volume");
+		for (uint32_t i = 0; i < n; i++) volume += now.real[0][i];
+		most = fmax(most, volume / (wide * (dim == 3 ? wide : 1)));
+	}
+	snprintf(
+		what, sizeof what, "%s, %uD, %d cells, %s, x%.2f", materials[which].name, dim, cells, t->what, most);
+	const bool good = table_row(what, 2 * mean(run, "point.position", 1), 1, 0.05);
+	harness_close(run);
+	return good;
+}
+
+/* What was pulled apart in flight is as dense as before once it lies on the floor again. */
+static void thrown_and_fallen(void **unused) {
+	(void)unused;
+	static const toss tosses[] = { { 3, 0, 3, "whole, 3/s" }, { 0, 4.4, 3, "apart, 3/s" },
+		{ 0, 4.4, 0, "apart, FLIP" }, { 2, 2, 3, "both, 3/s" } };
+	bool good = true;
+	table_head("thrown up; xN: largest volume in flight. Height, m");
+	for (int which = DRUCKER_PRAGER; which <= MU_I; which++) {
+		for (int cells = 10; cells <= 20; cells += 10)
+			for (int k = 0; k < 4; k++) good &= throw_block(which, cells, 2, &tosses[k]);
+		good &= throw_block(which, 10, 3, &tosses[1]);
+	}
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(weight_at_rest),
+		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

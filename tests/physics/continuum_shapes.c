@@ -1,0 +1,224 @@
+/* The shape functions alone. Whatever the place of a point, up to the walls and into the corners, its weights sum to one
+ * and reproduce positions, their slopes sum to zero and reproduce a unit gradient: without that neither momentum nor a
+ * uniform strain rate survives the way to the grid and back. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "plugin_alone.h"
+#include "table.h"
+#include <stdlib.h>
+
+enum { CELLS = 6, BATCH = 512 };
+static const double cell = 0.1;
+
+typedef struct batch {
+	double position[3][BATCH], value[3][3][BATCH], slope[3][3][BATCH];
+	int32_t first[3][BATCH];
+	quern_shape_batch b;
+} batch;
+
+static void weigh(const alone *shape, batch *m, uint32_t n, uint32_t dim, bool walls) {
+	m->b = (quern_shape_batch) { .n = n, .cap = BATCH, .dim = dim, .inverse_cell = 1 / cell };
+	for (uint32_t a = 0; a < dim; a++) {
+		m->b.position[a] = m->position[a];
+		m->b.wall[a][0] = walls ? 0 : INT32_MIN;
+		m->b.wall[a][1] = walls ? CELLS : INT32_MAX;
+		m->b.first[a] = m->first[a];
+		for (int k = 0; k < 3; k++) m->b.value[a][k] = m->value[a][k], m->b.slope[a][k] = m->slope[a][k];
+	}
+	((const quern_shape_ops *)shape->plugin->ops)->weights(shape->self, &m->b);
+}
+
+static uint64_t state = 88172645463325252u;
+static double uniform(void) {
+	state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+	return (double)(state >> 11) * 0x1p-53;
+}
+
+/* Cell faces, the edges where a particle of half-width l leaves a cell, one step of rounding beside both, and anywhere. */
+static double place(uint32_t i, double l) {
+	const double face = (double)(i / 7 % (CELLS + 1)), edge = i % 2 ? 0 : l;
+	double t = i % 7 < 2   ? face + edge
+			   : i % 7 < 4 ? face - edge
+			   : i % 7 < 5 ? nextafter(face + edge, CELLS)
+			   : i % 7 < 6 ? nextafter(face - edge, 0)
+						   : CELLS * uniform();
+	t = t < 0 ? 0 : t > CELLS ? CELLS : t;
+	return fmin(t * cell, CELLS * cell);
+}
+
+typedef struct misses {
+	double unity, place, still, gradient, negative;
+	int outside;
+} misses;
+
+/* All sums over the tensor product's nodes, worst over axes. */
+static void add_point(const batch *m, uint32_t i, uint32_t dim, bool walls, misses *worst) {
+	double unity = 0, at[3] = { 0 }, still[3] = { 0 }, gradient[3][3] = { { 0 } };
+	for (int node = 0; node < (dim == 3 ? 27 : 9); node++) {
+		const int k[3] = { node % 3, node / 3 % 3, node / 9 };
+		double s = 1, way[3] = { 0 };
+		for (uint32_t a = 0; a < dim; a++) {
+			const int32_t index = m->first[a][i] + k[a];
+			s *= m->value[a][k[a]][i];
+			way[a] = index - m->position[a][i] / cell;
+			if (walls && (index < 0 || index > CELLS) &&
+				(m->value[a][k[a]][i] != 0 || m->slope[a][k[a]][i] != 0))
+				worst->outside++;
+		}
+		unity += s;
+		worst->negative = fmin(worst->negative, s);
+		for (uint32_t a = 0; a < dim; a++) {
+			double g = m->slope[a][k[a]][i] * cell;
+			for (uint32_t c = 0; c < dim; c++) g *= c == a ? 1 : m->value[c][k[c]][i];
+			at[a] += s * way[a];
+			still[a] += g;
+			for (uint32_t c = 0; c < dim; c++) gradient[a][c] += g * way[c];
+		}
+	}
+	worst->unity = fmax(worst->unity, fabs(unity - 1));
+	for (uint32_t a = 0; a < dim; a++) {
+		worst->place = fmax(worst->place, fabs(at[a]));
+		worst->still = fmax(worst->still, fabs(still[a]));
+		for (uint32_t c = 0; c < dim; c++)
+			worst->gradient = fmax(worst->gradient, fabs(gradient[a][c] - (a == c)));
+	}
+}
+
+static const struct {
+	const char *id, *name;
+	double half_width; /* 0: the plugin has none */
+} shapes[] = { { "shape.gimp", "gimp, l = h/4", 0.25 }, { "shape.gimp", "gimp, l = h/2", 0.5 },
+	{ "shape.gimp", "gimp, l = h/10", 0.1 }, { "shape.linear", "linear", 0 } };
+enum { SHAPES = sizeof shapes / sizeof *shapes };
+
+static alone make_shape(int k) {
+	const alone_value gimp[] = { { "half_width", shapes[k].half_width }, { NULL, 0 } };
+	return alone_make(shapes[k].id, 3, shapes[k].half_width > 0 ? gimp : gimp + 1);
+}
+
+/* Partition of unity and linear completeness, the same in the middle, at walls and in corners. */
+static void completeness(void **unused) {
+	(void)unused;
+	batch *m = calloc(1, sizeof *m);
+	bool good = m != NULL;
+	for (int k = 0; k < SHAPES; k++)
+		for (uint32_t dim = 2; dim <= 3; dim++)
+			for (int walls = 0; walls <= 1; walls++) {
+				const alone shape = make_shape(k);
+				misses worst = { 0 };
+				char title[80];
+				for (uint32_t round = 0; round < 40; round++) {
+					for (uint32_t i = 0; i < BATCH; i++)
+						for (uint32_t a = 0; a < dim; a++)
+							m->position[a][i] =
+								place((uint32_t)(uniform() * 1e6), fmin(shapes[k].half_width, 0.5));
+					weigh(&shape, m, BATCH, dim, walls);
+					for (uint32_t i = 0; i < BATCH; i++) add_point(m, i, dim, walls, &worst);
+				}
+				snprintf(
+					title, sizeof title, "%s, %uD, %s", shapes[k].name, dim, walls ? "walls" : "periodic");
+				table_head(title);
+				good &= table_row("sum S - 1", worst.unity, 0, 1e-13);
+				good &= table_row("(sum S x_i - x)/h", worst.place, 0, 1e-13);
+				good &= table_row("h sum grad S", worst.still, 0, 1e-13);
+				good &= table_row("sum grad S x_i - 1", worst.gradient, 0, 1e-13);
+				good &= table_row("most negative S", worst.negative, 0, 1e-15);
+				good &= table_row("weights beyond a wall", worst.outside, 0, 0);
+				free(shape.self);
+			}
+	free(m);
+	assert_true(good);
+}
+
+/* The published function of the distance to a node, and its slope, in cells. */
+static double gimp(double x, double l, double *slope) {
+	const double d = fabs(x), sign = x > 0 ? 1 : -1;
+	*slope = d < l ? -x / l : d < 1 - l ? -sign : d < 1 + l ? -sign * (1 + l - d) / (2 * l) : 0;
+	return d < l       ? 1 - (d * d + l * l) / (2 * l)
+		   : d < 1 - l ? 1 - d
+		   : d < 1 + l ? (1 + l - d) * (1 + l - d) / (4 * l)
+					   : 0;
+}
+
+/* Every weight is the published function with the node outside a wall folded in: S_0 += 2 S_-1, S_1 -= S_-1. */
+static void formula(void **unused) {
+	(void)unused;
+	batch *m = calloc(1, sizeof *m);
+	bool good = m != NULL;
+	table_head("gimp against its formula");
+	for (int k = 0; shapes[k].half_width > 0; k++) {
+		const alone shape = make_shape(k);
+		const double l = shapes[k].half_width;
+		double value = 0, slope = 0;
+		for (uint32_t round = 0; round < 40; round++) {
+			for (uint32_t i = 0; i < BATCH; i++)
+				for (uint32_t a = 0; a < 2; a++)
+					m->position[a][i] = a ? CELLS * cell * uniform() : place(i + BATCH * round, l);
+			weigh(&shape, m, BATCH, 2, true);
+			for (uint32_t i = 0; i < BATCH; i++)
+				for (uint32_t a = 0; a < 2; a++) {
+					const double t = m->position[a][i] / cell;
+					double w[CELLS + 3] = { 0 }, g[CELLS + 3] = { 0 };
+					for (int n = -1; n <= CELLS + 1; n++) w[n + 1] = gimp(t - n, l, &g[n + 1]);
+					w[1] += 2 * w[0], w[2] -= w[0], w[CELLS + 1] += 2 * w[CELLS + 2],
+						w[CELLS] -= w[CELLS + 2];
+					g[1] += 2 * g[0], g[2] -= g[0], g[CELLS + 1] += 2 * g[CELLS + 2],
+						g[CELLS] -= g[CELLS + 2];
+					for (int n = 0; n <= CELLS; n++) {
+						const int at = n - m->first[a][i];
+						value = fmax(value, fabs(w[n + 1] - (at < 0 || at > 2 ? 0 : m->value[a][at][i])));
+						slope =
+							fmax(slope, fabs(g[n + 1] - (at < 0 || at > 2 ? 0 : m->slope[a][at][i] * cell)));
+					}
+				}
+		}
+		good &= table_row(shapes[k].name, value, 0, 1e-13);
+		good &= table_row("  its slope", slope, 0, 1e-13);
+		free(shape.self);
+	}
+	free(m);
+	assert_true(good);
+}
+
+/* The volumes that the solver divides nodal masses by are the integrals of the functions: else a body at rest would be
+ * denser or thinner at a wall. Simpson's rule between the places where the pieces meet is exact. */
+static void shares(void **unused) {
+	(void)unused;
+	enum { PARTS = 20 * CELLS };
+	batch *m = calloc(1, sizeof *m);
+	bool good = m != NULL;
+	for (int k = 0; k < SHAPES; k++) {
+		const alone shape = make_shape(k);
+		double integral[CELLS + 1] = { 0 }, wall, next;
+		table_head(shapes[k].name);
+		for (uint32_t i = 0; i < 2 * PARTS + 1; i++)
+			m->position[0][i] = m->position[1][i] = fmin(i * cell / 40, CELLS * cell);
+		weigh(&shape, m, 2 * PARTS + 1, 2, true);
+		for (uint32_t i = 0; i < 2 * PARTS + 1; i++)
+			for (int n = 0; n < 3; n++) {
+				const int32_t at = m->first[0][i] + n;
+				const double simpson = (i == 0 || i == 2 * PARTS ? 1 : i % 2 ? 4 : 2) / 120.0;
+				if (at >= 0 && at <= CELLS) integral[at] += simpson * m->value[0][n][i];
+			}
+		((const quern_shape_ops *)shape.plugin->ops)->shares(shape.self, &wall, &next);
+		good &= table_row("volume of a wall's node over h", wall, integral[0], 1e-13);
+		good &= table_row("of the next one", next, integral[1], 1e-13);
+		good &= table_row("of the upper wall's", wall, integral[CELLS], 1e-13);
+		good &= table_row("of the one before", next, integral[CELLS - 1], 1e-13);
+		good &= table_row("inside", 1, integral[CELLS / 2], 1e-13);
+		free(shape.self);
+	}
+	free(m);
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(completeness), cmocka_unit_test(formula),
+		cmocka_unit_test(shares) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

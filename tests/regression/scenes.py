@@ -1,0 +1,86 @@
+"""Malformed scenes: every one is refused with exit status 2 and the very message that lies beside it.
+
+malformed/NAME.yaml goes with malformed/NAME.err, what the program prints. `--update` rewrites the .err files; read
+them before they are kept: a message names the place, what was found and what is allowed.
+"""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+QUERN = os.environ["QUERN"]
+SCENES = pathlib.Path(os.environ["QUERN_SOURCE"]) / "tests/regression/malformed"
+ONLY_A_RUN_TELLS = {"step_too_long"}  # what the state at the start decides
+# Faults of the file as a whole, or found by a plugin when it looks at another file or places its first entities.
+WITHOUT_A_PLACE = {"empty", "comment_only", "bodies_fill_solid", "continuum_empty", "continuum_stress_askew",
+                   "file_header", "file_number", "points_too_many", "step_too_long"}
+SEVERAL = {"three_errors": 3}
+
+
+def refuse(name, folder):
+    command = ["run", "--quiet", "-o", folder] if name in ONLY_A_RUN_TELLS else ["plan"]
+    done = subprocess.run([QUERN, *command, name + ".yaml"], cwd=SCENES, capture_output=True, timeout=60)
+    assert done.returncode == 2, f"{name}: exit status {done.returncode}, not 2\n{done.stderr.decode(errors='replace')}"
+    assert not done.stdout, f"{name}: it printed a plan"
+    return done.stderr.replace(os.fsencode(folder), b"DIR")
+
+
+def check_form(name, text):
+    place = re.compile(rb"^%b\.yaml:(\d+):(\d+): error: \S" % re.escape(name.encode()), re.M)
+    found = place.findall(text)
+    if name not in WITHOUT_A_PLACE:
+        assert found, f"{name}: no line and column in\n{text.decode(errors='replace')}"
+    if name in SEVERAL:
+        assert len(found) == SEVERAL[name], f"{name}: {len(found)} faults are reported, not {SEVERAL[name]}"
+    lines = (SCENES / (name + ".yaml")).read_bytes().split(b"\n")
+    for line, _ in found:
+        assert int(line) <= len(lines), f"{name}: line {line} is beyond the file"
+
+
+def check_scenes(update):
+    names = sorted(path.stem for path in SCENES.glob("*.yaml"))
+    assert len(names) >= 60, f"only {len(names)} malformed scenes"
+    wrong = []
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            text = refuse(name, folder)
+        check_form(name, text)
+        path = SCENES / (name + ".err")
+        if update:
+            path.write_bytes(text)
+        elif not path.exists() or path.read_bytes() != text:
+            wrong.append(f"{name}.yaml prints\n{text.decode(errors='replace')}")
+    extra = {path.stem for path in SCENES.glob("*.err")} - set(names)
+    assert not extra, f"messages without a scene: {sorted(extra)}"
+    assert not wrong, "\n".join(wrong) + f"\n{len(wrong)} messages differ; scenes.py --update rewrites them"
+    print(f"{len(names)} malformed scenes are refused with their messages")
+
+
+def refused(arguments, *expected, status=2):
+    done = subprocess.run([QUERN, *arguments], cwd=SCENES.parents[2], capture_output=True, text=True, timeout=60)
+    assert done.returncode == status, f"{arguments}: exit status {done.returncode}\n{done.stderr}"
+    for text in expected:
+        assert text in done.stderr, f"{arguments}: '{text}' is not in\n{done.stderr}"
+
+
+def check_options():
+    scene = "configs/two_grains.yaml"
+    refused(["plan", "nowhere.yaml"], "nowhere.yaml: error: cannot be opened: No such file or directory")
+    refused(["plan", "configs"], "configs: error: cannot be read: Is a directory")
+    refused(["plan", scene, "--set", "time.end=5 kg"], "--set time.end=5 kg: error: scene: time.end: 'kg'")
+    refused(["plan", scene, "--set", "time.edn=5 s"], "unknown key 'edn'; did you mean 'end'?")
+    refused(["plan", scene, "--set", "time.end"], "is not of the form path.to.key=value")
+    refused(["plan", scene, "--set", "=3"], "is not of the form path.to.key=value")
+    refused(["plan", scene, "--set", "time.end.late=3"], "'late' cannot be reached: above it stands '20 ms'")
+    refused(["plan", scene, "--set", "grains.place.7.radius=1 mm"], "name its items by number, from 0")
+    refused(["plan", scene, "--set", "time={end: [}"], "--set time={end: [}: error: not valid YAML")
+    refused(["plan"], "a scene is missing", status=1)
+    refused(["plan", scene, "--sett", "a=1"], "unknown option '--sett'", status=1)
+    print("missing files and faulty options are refused by name")
+
+
+if __name__ == "__main__":
+    check_scenes("--update" in sys.argv[1:])
+    check_options()
