@@ -366,6 +366,7 @@ static void order_stages(quern_plan *p) {
 typedef struct {
 	const quern_plan_use *last;
 	bool read, first_seen, begins, fresh, written;
+	bool whole; /* a stage itself looks at the column, not only the plugins that it calls */
 	int stages, previous;
 } history;
 
@@ -401,6 +402,7 @@ static void follow_field(quern_plan *p, int k) {
 				const bool fills = u->row->access == QUERN_WRITE || u->row->access == QUERN_ADD;
 				h.read = h.read || u->row->access == QUERN_READ || u->row->access == QUERN_UPDATE;
 				h.written = h.written || changes(u->row);
+				h.whole = h.whole || (i >= p->stages[s].first_use && i < p->stages[s].first_use + p->stages[s].n_uses);
 				others = others || u->row->flags & QUERN_OTHERS;
 				changed = changed || u->row->access == QUERN_UPDATE || u->row->access == QUERN_WRITE;
 				if (s != h.previous) h.stages++, h.previous = s;
@@ -420,7 +422,7 @@ static void follow_field(quern_plan *p, int k) {
 					"%s needs %s, and nothing in this scene makes it", p->uses[i].owner, field->name);
 				break;
 			}
-	field->local = !field->shown && ((h.stages <= 1 && h.begins) || !h.read);
+	field->local = !field->shown && ((h.stages <= 1 && h.begins && !h.whole) || !h.read);
 	field->state = field->state && !field->local;
 }
 

@@ -67,7 +67,7 @@ typedef struct render_view {
 } render_view;
 
 render_view render_view_of(const render_frame *);
-void render_view_fit(render_view *, double most_width, double most_height);
+void render_view_fit(render_view *, const render_frame *, double most_width, double most_height);
 void render_project(
 	const render_view *, const double x[3], double out[3]); /* pixels, and m away from the eye */
 /* The level of the floor, if the scene or its domain says so. */

@@ -27,11 +27,11 @@ static render_colour from_oklab(double lightness, double a, double b) {
 }
 
 /* Lightness rises evenly while the hue turns from violet over blue and green to yellow: it reads in print, and for those
- * who do not see all colours. */
+ * who do not see all colours. The chroma is what a screen can show all along the way. */
 render_colour render_map(double t) {
-	const double x = t < 0 ? 0 : t > 1 ? 1 : t;
-	const double hue = (300 - 195 * x) * 0.017453292519943295, chroma = 0.115 + 0.05 * x;
-	return from_oklab(0.30 + 0.61 * x, chroma * cos(hue), chroma * sin(hue));
+	const double x = t < 0 ? 0 : t > 1 ? 1 : t, off = x - 0.45;
+	const double hue = (300 - 195 * x) * 0.017453292519943295, chroma = 0.10 + 0.28 * off * off;
+	return from_oklab(0.33 + 0.58 * x, chroma * cos(hue), chroma * sin(hue));
 }
 
 /* ---- the range of the values ---- */
@@ -72,19 +72,24 @@ static void set_ends(render_range *range, const double *all, size_t n, bool sign
 		if (low < 0) low -= 0.5 * some;
 		high = low + some;
 	}
-	range->low = low;
-	range->high = high;
+	range->step = render_round_step((high - low) / 3);
+	const double half = 0.5 * range->step;
+	range->low = range->below ? low : half * floor(low / half + 1e-9);
+	range->high = range->above ? high : half * ceil(high / half - 1e-9);
 }
 
 /* ---- units ---- */
 
-static void add_exponents(char *out, size_t size, const char *unit) {
+/* Appends a unit, with raised figures for "^2" and the like. */
+static void add_unit(char *out, size_t size, const char *unit) {
+	static const char *const raised[] = { "⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹" };
 	size_t n = strlen(out);
-	for (; *unit && n + 3 < size; unit++) {
-		const char *sign = unit[0] == '^' && unit[1] == '2'   ? "²"
-						   : unit[0] == '^' && unit[1] == '3' ? "³"
-															  : NULL;
-		if (sign) n += (size_t)snprintf(out + n, size - n, "%s", sign), unit++;
+	bool high = false;
+	for (; *unit && n + 4 < size; unit++) {
+		const bool digit = *unit >= '0' && *unit <= '9';
+		high = *unit == '^' || (high && (digit || *unit == '-'));
+		if (*unit == '^') continue;
+		if (high) n += (size_t)snprintf(out + n, size - n, "%s", digit ? raised[*unit - '0'] : "⁻");
 		else out[n++] = *unit;
 		out[n] = 0;
 	}
@@ -110,10 +115,12 @@ static void set_label(render_range *range, const render_frame *f) {
 	if (prefix) snprintf(unit, sizeof unit, "%s", prefixes[third + 3]), range->factor = pow(1000, -third);
 	else if (size >= 1e4 || size < 1e-3) {
 		const int power = (int)floor(log10(size * 1.0001));
-		snprintf(unit, sizeof unit, "10^%d ", power);
+		char factor[16];
+		snprintf(factor, sizeof factor, "10^%d ", power);
+		add_unit(unit, sizeof unit, factor);
 		range->factor = pow(10, -power);
 	}
-	if (strcmp(f->unit, "1") != 0) add_exponents(unit, sizeof unit, f->unit);
+	if (strcmp(f->unit, "1") != 0) add_unit(unit, sizeof unit, f->unit);
 	size_t n = (size_t)snprintf(range->label, sizeof range->label, f->signs ? "%s" : "|%s|", name);
 	for (size_t i = 0; i < n; i++)
 		if (range->label[i] == '.' || range->label[i] == '_') range->label[i] = ' ';
@@ -121,12 +128,11 @@ static void set_label(render_range *range, const render_frame *f) {
 }
 
 render_range render_range_of(const render_frame *f) {
-	render_range range = { .low = 0, .high = 1, .factor = 1 };
+	render_range range = { .high = 1, .step = 0.2, .factor = 1 };
 	size_t n;
 	double *all = gather(f, &n);
 	if (n) set_ends(&range, all, n, f->signs);
 	if (*f->field) set_label(&range, f);
-	range.step = render_round_step((range.high - range.low) / 3);
 	free(all);
 	return range;
 }

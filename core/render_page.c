@@ -209,7 +209,7 @@ cairo_surface_t *render_page(const render_frame *f, int width) {
 	const render_range range = render_range_of(f);
 	render_view view = render_view_of(f);
 	page p = { .frame = f, .range = &range, .view = &view, .unit = unit, .width = width, .margin = margin };
-	render_view_fit(&view, width - 2 * margin, 0.8 * width);
+	render_view_fit(&view, f, width - 2 * margin, 0.8 * width);
 	const double foot = fmax(draw_legend(&p, 0, 0, true), 100 * unit) + 24 * unit;
 	const int height = (int)ceil(head + view.height + 28 * unit + foot);
 	cairo_surface_t *surface = cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height);

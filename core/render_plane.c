@@ -24,15 +24,10 @@ bool render_has(const render_cloud *cloud, int sort) {
 
 /* ---- grains and points ---- */
 
-/* A grain that shares its mass with the continuum is a ring: what it overlaps shows through. */
+/* A grain that shares its mass with the continuum has a white face. */
 void render_disc(cairo_t *c, double x, double y, double radius, render_colour colour, int sort, double line) {
-	const double hole = sort == RENDER_SHARED ? 0.5 * radius : 0;
 	cairo_new_path(c);
 	cairo_arc(c, x, y, radius, 0, 2 * M_PI);
-	if (hole > 0) {
-		cairo_new_sub_path(c);
-		cairo_arc_negative(c, x, y, hole, 2 * M_PI, 0);
-	}
 	render_set(c, colour, 1);
 	cairo_fill_preserve(c);
 	if (radius > 2.5 * line) {
@@ -41,6 +36,10 @@ void render_disc(cairo_t *c, double x, double y, double radius, render_colour co
 		cairo_stroke(c);
 	}
 	cairo_new_path(c);
+	if (sort != RENDER_SHARED) return;
+	cairo_arc(c, x, y, 0.5 * radius, 0, 2 * M_PI);
+	cairo_set_source_rgb(c, 0.97, 0.97, 0.97);
+	cairo_fill(c);
 }
 
 static void draw_grains(cairo_t *c, const render_style *s) {

@@ -18,11 +18,11 @@ typedef struct {
 /* Light from the upper left, in front; what is far away is paler. */
 static render_colour lit(const raster *r, render_colour colour, const double normal[3], double depth) {
 	const double facing = fmax(0, -0.38 * normal[0] + 0.70 * normal[1] - 0.60 * normal[2]);
-	const double light = 0.50 + 0.56 * facing,
-				 haze = 0.30 * (depth - r->near) / fmax(r->far - r->near, 1e-300);
+	const double light = 0.58 + 0.56 * facing,
+				 haze = 0.20 * (depth - r->near) / fmax(r->far - r->near, 1e-300);
 	const render_colour shaded = { fmin(colour.r * light, 1), fmin(colour.g * light, 1),
 		fmin(colour.b * light, 1) };
-	return render_mix(shaded, (render_colour) { 1, 1, 1 }, fmin(fmax(haze, 0), 0.30));
+	return render_mix(shaded, (render_colour) { 1, 1, 1 }, fmin(fmax(haze, 0), 0.20));
 }
 
 static void put(raster *r, int x, int y, double depth, render_colour colour) {
@@ -54,7 +54,7 @@ static void put_sphere(raster *r, const double at[3], double radius, render_colo
 			const double normal[3] = { u, v, -sqrt(rest) };
 			const bool face = sort == RENDER_SHARED && rest > 0.75;
 			const render_colour own = face ? (render_colour) { 0.97, 0.97, 0.97 } : colour;
-			const render_colour rim = render_mix(own, render_ink, rest < 0.16 ? 0.35 : 0);
+			const render_colour rim = render_mix(own, render_ink, rest < 0.12 ? 0.30 : 0);
 			const double depth = at[2] + radius * normal[2];
 			put(r, x, y, depth, lit(r, rim, normal, depth));
 		}
@@ -96,21 +96,20 @@ static void put_cloud(raster *r, const render_style *s, const render_cloud *clou
 	}
 }
 
-/* What lies in a hollow sees less of the sky: eight looks around, each at what stands nearer to the eye. */
+/* What lies in a hollow sees less of the sky: looks around, each at what stands nearer to the eye. What stands very much
+ * nearer is something else in front, and casts nothing. */
 static double openness(const raster *r, int x, int y, double reach) {
-	static const double way[8][2] = { { 1, 0 }, { 0.7, 0.7 }, { 0, 1 }, { -0.7, 0.7 }, { -1, 0 },
-		{ -0.7, -0.7 }, { 0, -1 }, { 0.7, -0.7 } };
 	const double here = (double)r->depth[(size_t)y * (size_t)r->width + (size_t)x];
 	double hidden = 0;
-	for (int k = 0; k < 8; k++)
-		for (int ring = 1; ring <= 2; ring++) {
-			const int u = x + (int)(way[k][0] * reach * ring), v = y + (int)(way[k][1] * reach * ring);
-			if (u < 0 || v < 0 || u >= r->width || v >= r->height) continue;
-			const double above =
-				(here - (double)r->depth[(size_t)v * (size_t)r->width + (size_t)u]) * r->scale;
-			if (above > 0) hidden += fmin(above / (reach * ring), 1) / ring;
-		}
-	return 1 - 0.055 * hidden;
+	for (int k = 0; k < 18; k++) {
+		const double way = reach * (0.35 + 0.1 * k), angle = 2.399963 * k; /* a sunflower */
+		const int u = x + (int)lround(way * cos(angle)), v = y + (int)lround(way * sin(angle));
+		if (u < 0 || v < 0 || u >= r->width || v >= r->height) continue;
+		const double above =
+			(here - (double)r->depth[(size_t)v * (size_t)r->width + (size_t)u]) * r->scale / way;
+		if (above > 0 && isfinite(above)) hidden += above / (1 + above * above);
+	}
+	return 1 - 0.075 * hidden;
 }
 
 /* Averages FINE x FINE pixels into one; cairo wants colours multiplied by alpha. */

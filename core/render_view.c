@@ -50,14 +50,25 @@ render_view render_view_of(const render_frame *f) {
 	return v;
 }
 
-void render_view_fit(render_view *v, double most_width, double most_height) {
+/* Of something round at x that reaches `half` far. */
+static void widen(const render_view *v, const double x[3], double half, double low[2], double high[2]) {
+	const double at[2] = { dot(v->right, x), dot(v->up, x) };
+	for (int k = 0; k < 2 && isfinite(at[k]); k++) {
+		low[k] = fmin(low[k], at[k] - half);
+		high[k] = fmax(high[k], at[k] + half);
+	}
+}
+
+void render_view_fit(render_view *v, const render_frame *f, double most_width, double most_height) {
 	double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
-	for (int corner = 0; corner < 8; corner++) {
+	const int corners = f->dimension == 3 ? 4 : 8; /* in 3-D of the ground alone: the upper ones are empty */
+	for (int corner = 0; corner < corners; corner++) {
 		double x[3];
 		for (int k = 0; k < 3; k++) x[k] = corner >> k & 1 ? v->high[k] : v->low[k];
-		const double at[2] = { dot(v->right, x), dot(v->up, x) };
-		for (int k = 0; k < 2; k++) low[k] = fmin(low[k], at[k]), high[k] = fmax(high[k], at[k]);
+		widen(v, x, 0, low, high);
 	}
+	for (size_t i = 0; i < f->grains.n; i++) widen(v, f->grains.position[i], f->grains.size[i], low, high);
+	for (size_t i = 0; i < f->points.n; i++) widen(v, f->points.position[i], f->points.size[i], low, high);
 	v->scale = fmin(most_width / (high[0] - low[0]), most_height / (high[1] - low[1]));
 	v->left = low[0];
 	v->top = high[1];

@@ -62,7 +62,11 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 				"the domain has more than 2^30 cells along an axis: make it smaller or the cells larger");
 	}
 	const int total = quern_store_set(&run->plan->store, "total");
-	if (quern_store_fill(&run->plan->store, total, 1) != QUERN_OK) {
+	bool reserved = quern_store_fill(&run->plan->store, total, 1) == QUERN_OK;
+	for (int i = 0; i < (int)run->plan->store.n_sets; i++) /* from now on a NULL column says: there is no such field */
+		if (i != total && !run->plan->store.sets[i].rows)
+			reserved = reserved && quern_store_fill(&run->plan->store, i, 0) == QUERN_OK;
+	if (!reserved) {
 		quern_run_destroy(run);
 		return NULL;
 	}

@@ -172,7 +172,7 @@ static bool throw_block(int which, int cells, uint32_t dim, const toss *t) {
 	const char *zero = dim == 3 ? ", 0" : "";
 	char depth[32] = "", what[80];
 	if (dim == 3) snprintf(depth, sizeof depth, ", %.17g", wide);
-	quern_run *run = harness_open(2,
+	quern_run *run = harness_open(1,
 		"{quern: 1, dimension: %u, gravity: [0, -9.81%s],\n"
 		"domain: {lower: [0, 0%s], upper: [%.17g, 3%s]}, time: {end: 1000}, output: {every: 0.02},\n"
 		"bodies: [{plane: {point: [0, 0%s], normal: [0, 1%s], boundary: sticky}}],\n"

@@ -2,6 +2,7 @@
  * states that are the same everywhere */
 #pragma once
 #include "plugin_alone.h"
+#include "table.h"
 
 enum { POINTS = 10000, COLUMNS = 19, FIELDS = 4 };
 enum { MU_I, DRUCKER_PRAGER, ELASTIC, MATERIALS };

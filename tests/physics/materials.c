@@ -43,14 +43,16 @@ static void vectors(void **unused) {
 		}
 		free_cloud(&c), free_law(&m);
 	}
-	printf("  worst %.2Le\n", worst);
-	assert_true(worst < 1e-11);
+	table_head("mu(I) against published numbers");
+	assert_true(table_row("worst relative gap, of twelve digits", (double)worst, 0, 1e-11));
 }
 
 /* From any state the stress is R s R^T + elastic increment, returned along its deviator to p mu(I), p untouched. */
 static void mu_i_states(void **unused) {
 	(void)unused;
 	const double dt = 1e-4;
+	char what[80];
+	table_head("return to the yield stress: worst relative gap");
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		law m = usual_law(ids[MU_I], dim);
 		cloud c = make_cloud(&m, POINTS), was = make_cloud(&m, POINTS);
@@ -97,10 +99,11 @@ static void mu_i_states(void **unused) {
 			pressure = largest(pressure, fabsl(now_p - p) / scale);
 			stress = largest(stress, norm(plus(dim, now, -1, expected)) / scale);
 		}
-		printf("  %uD %d flow, %d open: yield %.2Le, pressure %.2Le, stress %.2Le\n", dim, flowing, open,
-			yield, pressure, stress);
-		assert_true(flowing > POINTS / 10 && open > POINTS / 10);
-		assert_true(yield < 1e-12 && pressure < 1e-14 && stress < 1e-14);
+		snprintf(what, sizeof what, "mu_i, %uD: yield (%d of %d flow, %d open)", dim, flowing, POINTS, open);
+		bool good = table_row(what, (double)yield, 0, 1e-12);
+		good &= table_row("  pressure", (double)pressure, 0, 1e-14);
+		good &= table_row("  stress", (double)stress, 0, 1e-14);
+		assert_true(good && flowing > POINTS / 10 && open > POINTS / 10);
 		free_cloud(&c), free_cloud(&was), free_law(&m);
 	}
 }
@@ -110,6 +113,8 @@ static void mu_i_states(void **unused) {
 static void drucker_prager_states(void **unused) {
 	(void)unused;
 	const double dt = 1e-4;
+	char what[80];
+	table_head("return to the yield stress: worst relative gap");
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		law m = usual_law(ids[DRUCKER_PRAGER], dim);
 		cloud c = make_cloud(&m, POINTS), was = make_cloud(&m, POINTS);
@@ -175,12 +180,15 @@ static void drucker_prager_states(void **unused) {
 			if (second < 1)
 				yield = largest(yield, fabsl(norm(deviator(dim, s)) / (-alpha * trace(dim, s) / dim) - 1));
 		}
-		printf("  %uD %d flow, %d open: yield %.2Le, strain %.2Le, J - 1 %.2Le, det %.2Le, energy %.2Le, "
-			   "stress %.2Le\n",
-			dim, flowing, open, yield, strain, volume, det, energy, stress);
-		assert_true(flowing > POINTS / 10 && open > POINTS / 10);
-		assert_true(yield < 1e-12 && strain < 1e-14 && volume < 1e-14 && det < 1e-14 && stress < 1e-14 &&
-					energy < 1e-13);
+		snprintf(what, sizeof what, "drucker_prager, %uD: yield (%d of %d flow, %d open)", dim, flowing,
+			POINTS, open);
+		bool good = table_row(what, (double)yield, 0, 1e-12);
+		good &= table_row("  deviator of the strain", (double)strain, 0, 1e-14);
+		good &= table_row("  J - 1", (double)volume, 0, 1e-14);
+		good &= table_row("  determinant of the strain", (double)det, 0, 1e-14);
+		good &= table_row("  energy", (double)energy, 0, 1e-13);
+		good &= table_row("  stress", (double)stress, 0, 1e-14);
+		assert_true(good && flowing > POINTS / 10 && open > POINTS / 10);
 		free_cloud(&c), free_cloud(&was), free_law(&m);
 	}
 }
@@ -242,6 +250,8 @@ static void refusals(void **unused) {
  * other comes back on the yield surface; tension is clipped. */
 static void state_from_stress(void **unused) {
 	(void)unused;
+	char what[80];
+	table_head("state from stress: worst relative gap");
 	for (int which = 0; which < MATERIALS; which++)
 		for (uint32_t dim = 2; dim <= 3; dim++) {
 			law m = usual_law(ids[which], dim);
@@ -293,12 +303,14 @@ static void state_from_stress(void **unused) {
 					back = largest(back, norm(plus(dim, get(dim, c.stress, i), -1, given[i])) / size);
 				else assert_true(norm(get(dim, c.stress, i)) == 0);
 			}
-			printf("  %-24s %uD %d kept: %.2Le, %d returned: yield %.2Le, pressure %.2Le, %d clipped; "
-				   "density %.2Le, "
-				   "a step later %.2Le\n",
-				ids[which], dim, held, kept, returned, yield, mean, clipped, density, back);
-			assert_true(held > POINTS / 4 && kept < 1e-12 && yield < 1e-12 && mean < 1e-14);
-			assert_true(density < 1e-14 && back < 1e-12);
+			snprintf(what, sizeof what, "%s, %uD: %d kept", ids[which], dim, held);
+			bool good = table_row(what, (double)kept, 0, 1e-12) && held > POINTS / 4;
+			snprintf(what, sizeof what, "  %d returned (%d clipped)", returned, clipped);
+			good &= table_row(what, (double)yield, 0, 1e-12);
+			good &= table_row("  their pressure", (double)mean, 0, 1e-14);
+			good &= table_row("  density", (double)density, 0, 1e-14);
+			good &= table_row("  stress a step at rest later", (double)back, 0, 1e-12);
+			assert_true(good);
 			assert_true(which == ELASTIC || (returned > POINTS / 10 && clipped > POINTS / 10));
 			free(given), free_cloud(&c), free_law(&m);
 		}

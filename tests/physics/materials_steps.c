@@ -20,6 +20,8 @@ static void turn_columns(uint32_t dim, matrix r, quern_real *const *columns, uin
 /* Seen by a turned observer the answer is the turned answer. */
 static void objectivity(void **unused) {
 	(void)unused;
+	char what[80];
+	table_head("objectivity: worst relative gap");
 	for (int which = 0; which < MATERIALS; which++)
 		for (uint32_t dim = 2; dim <= 3; dim++) {
 			law m = usual_law(ids[which], dim);
@@ -46,8 +48,8 @@ static void objectivity(void **unused) {
 				const matrix gap = plus(dim, get(dim, c.stress, i), -1, get(dim, turned.stress, i));
 				worst = largest(worst, norm(gap) / before[i]);
 			}
-			printf("  %-24s %uD: %.2Le\n", ids[which], dim, worst);
-			assert_true(worst < 1e-12);
+			snprintf(what, sizeof what, "%s, %uD", ids[which], dim);
+			assert_true(table_row(what, (double)worst, 0, 1e-12));
 			free(r), free(before), free_cloud(&c), free_cloud(&turned), free_law(&m);
 		}
 }
@@ -55,6 +57,8 @@ static void objectivity(void **unused) {
 /* Ten thousand steps of pure spin, small and large, keep the deviator's size and the pressure. */
 static void spin(void **unused) {
 	(void)unused;
+	char what[80];
+	table_head("spin for ten thousand steps: change");
 	for (int which = 0; which < MATERIALS; which += ELASTIC)
 		for (uint32_t dim = 2; dim <= 3; dim++) {
 			law m = usual_law(ids[which], dim);
@@ -75,8 +79,9 @@ static void spin(void **unused) {
 				worst = largest(worst, fabsl(shear_of(dim, now) / dev[i] - 1));
 				worst_p = largest(worst_p, fabsl(-trace(dim, now) / dim / p[i] - 1));
 			}
-			printf("  %-24s %uD: deviator %.2Le, pressure %.2Le\n", ids[which], dim, worst, worst_p);
-			assert_true(worst < 1e-12 && worst_p < 1e-12);
+			snprintf(what, sizeof what, "%s, %uD: deviator", ids[which], dim);
+			const bool good = table_row(what, (double)worst, 0, 1e-12);
+			assert_true(table_row("  pressure", (double)worst_p, 0, 1e-12) && good);
 			free_cloud(&c), free_law(&m);
 		}
 }

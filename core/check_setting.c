@@ -1,0 +1,209 @@
+/* check_setting - instances with parameters of ordinary size, at their bounds, or mixed; written as a scene would */
+#include "check.h"
+#include "random.h"
+#include "text.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef enum { ORDINARY, LOW, HIGH, ANY } choice;
+
+double check_ordinary(const check *c, const char *unit) {
+	static const struct {
+		const char *unit;
+		double value;
+	} sizes[] = { { "m", 1e-3 }, { "Pa", 1e7 }, { "N/m", 1e5 }, { "kg/m^3", 1500 }, { "m/s", 1 }, { "1/s", 10 },
+		{ "s", 1e-3 }, { "kg", 1e-3 }, { "m/s^2", 9.81 }, { "1", 0.5 }, { "N", 1 }, { "J", 1e-3 },
+		{ "rad/s", 10 }, { "rad", 0.5 }, { "m^3", 1e-9 }, { "kg m^2", 1e-9 }, { "J/kg", 1 }, { "N m", 1e-3 } };
+	if (!unit || !*unit) return 0.5;
+	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+		if (!strcmp(unit, sizes[i].unit) || quern_units_equal(c->units, unit, sizes[i].unit))
+			return sizes[i].value;
+	return 1;
+}
+
+static bool bounded(const quern_param *row) { return row->min != row->max; }
+
+static double within(const quern_param *row, double x) {
+	if (!bounded(row)) return x;
+	const double inset = isfinite(row->max - row->min) ? 1e-3 * (row->max - row->min) : 1e-3;
+	if (x < row->min || (x == row->min && row->flags & QUERN_MIN_OPEN)) x = row->min + inset;
+	if (x > row->max || (x == row->max && row->flags & QUERN_MAX_OPEN)) x = row->max - inset;
+	return x;
+}
+
+static bool needs_a_value(const quern_param *row) { return row->flags & QUERN_REQUIRED; }
+
+static double usual(const check *c, uint32_t dim, const quern_param *row) {
+	if (needs_a_value(row) || row->from || row->flags & QUERN_MAYBE) return within(row, check_ordinary(c, row->unit));
+	return quern_param_default(row, dim);
+}
+
+/* An open bound is neared by a factor of 1e-9 of the ordinary size. */
+static double bound(const check *c, uint32_t dim, const quern_param *row, choice how) {
+	const double near = 1e-9 * (fabs(usual(c, dim, row)) + 1e-300);
+	if (how == LOW) return row->min + (row->flags & QUERN_MIN_OPEN ? near : 0);
+	return row->max - (row->flags & QUERN_MAX_OPEN ? near + 1e-12 * fabs(row->max) : 0);
+}
+
+/* Between the bounds, evenly on a scale of decades where they are of one sign and far apart. */
+static double anywhere(const check *c, uint32_t dim, const quern_param *row, uint64_t key, uint64_t counter) {
+	const double low = bound(c, dim, row, LOW), high = bound(c, dim, row, HIGH);
+	if (low >= 0 && high > 1e3 * (low + 1e-30)) {
+		const double least = log(low > 0 ? low : 1e-6 * fabs(usual(c, dim, row)) + 1e-30);
+		return within(row, exp(check_uniform(key, counter, least, log(high))));
+	}
+	return check_uniform(key, counter, low, high);
+}
+
+static void put_number(quern_node *map, const char *name, double value) {
+	char text[32];
+	quern_number(value, text);
+	quern_node_put(map, name, text);
+}
+
+/* Vectors that must be given: different for every row, so that corners are apart and normals have a length. */
+static void put_vector(
+	const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how, uint64_t key, quern_node *map) {
+	const double size = check_ordinary(c, row->unit);
+	if (!needs_a_value(row) && how == ORDINARY) return;
+	if (how != ORDINARY && how != ANY && !bounded(row)) return;
+	quern_node *list = quern_node_put_list(map, row->name);
+	for (uint32_t k = 0; k < dim; k++) {
+		char text[32];
+		double x = size * (index + 1) * (0.2 + 0.2 * k);
+		if (how == ANY) x = check_uniform(key, index * 8 + k, -size, size);
+		else if (how != ORDINARY) x = bound(c, dim, row, how);
+		quern_number(within(row, x), text);
+		quern_node_append(list, text);
+	}
+}
+
+static void put_real(
+	const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how, uint64_t key, quern_node *map) {
+	if (how == ORDINARY) {
+		if (needs_a_value(row)) put_number(map, row->name, usual(c, dim, row));
+	} else if (bounded(row) && isfinite(row->max)) {
+		const double x = how == ANY ? anywhere(c, dim, row, key, index) : bound(c, dim, row, how);
+		put_number(map, row->name, row->type == QUERN_T_INT ? trunc(x) : x);
+	} else if (needs_a_value(row)) put_number(map, row->name, usual(c, dim, row));
+}
+
+static void put_choice(const quern_param *row, uint32_t index, choice how, uint64_t key, quern_node *map) {
+	uint32_t n = 0;
+	while (row->choices[n]) n++;
+	if (!n || (how == ORDINARY && !needs_a_value(row))) return;
+	const uint32_t any = (uint32_t)check_uniform(key, index, 0, n);
+	quern_node_put(map, row->name, row->choices[how == HIGH ? n - 1 : how == ANY && any < n ? any : 0]);
+}
+
+static void put_rows(const check *, uint32_t dim, const quern_param *rows, uint64_t setting, quern_node *map);
+
+static void put_row(
+	const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how, uint64_t key, quern_node *map) {
+	switch (row->type) {
+	case QUERN_T_REAL: put_real(c, dim, row, index, how, key, map); break;
+	case QUERN_T_INT:
+		if (row->choices) put_choice(row, index, how, key, map);
+		else put_real(c, dim, row, index, how, key, map);
+		break;
+	case QUERN_T_BOOL:
+		if (how != ORDINARY || needs_a_value(row))
+			quern_node_put(map, row->name,
+				how == HIGH || (how == ANY && check_uniform(key, index, 0, 1) < 0.5) ? "true" : "false");
+		break;
+	case QUERN_T_VECTOR: put_vector(c, dim, row, index, how, key, map); break;
+	case QUERN_T_TEXT:
+		if (needs_a_value(row)) quern_node_put_quoted(map, row->name, "check");
+		break;
+	case QUERN_T_LIST:
+		if (needs_a_value(row) || how == HIGH)
+			put_rows(c, dim, row->rows, 0, quern_node_append_map(quern_node_put_list(map, row->name)));
+		break;
+	default: break;
+	}
+}
+
+static void put_rows(const check *c, uint32_t dim, const quern_param *rows, uint64_t setting, quern_node *map) {
+	uint64_t n = 0;
+	for (const quern_param *row = rows; row && row->name; row++) n++;
+	for (uint32_t i = 0; i < n; i++) {
+		choice how = ORDINARY;
+		if (setting > 2 * n) how = (choice)check_uniform(setting, 1000 + i, 0, 4);
+		else if (setting && (setting - 1) / 2 == i) how = (setting - 1) % 2 ? HIGH : LOW;
+		put_row(c, dim, &rows[i], i, how, setting, map);
+	}
+}
+
+uint64_t check_settings(const check *c) { return 2 * (uint64_t)(c->file->n_params) + 1; }
+
+static void no_publish(const quern_setup *setup, const char *name, const char *unit, quern_real value) {
+	(void)setup, (void)name, (void)unit, (void)value;
+}
+
+static const void *no_extension(const char *id) { return (void)id, NULL; }
+
+static void say_why(check_instance *it, const char *fallback) {
+	char *data = NULL;
+	size_t size = 0;
+	FILE *text = open_memstream(&data, &size);
+	if (!text) return;
+	quern_report_print(it->report, text);
+	fclose(text);
+	snprintf(it->why, sizeof it->why, "%.*s", (int)strcspn(data, "\n"), size ? data : fallback);
+	free(data);
+}
+
+static check_outcome call_init(const check *c, check_instance *it, uint64_t setting) {
+	quern_host host = { .abi = QUERN_ABI, .fail = quern_scene_fail, .random = quern_random, .publish = no_publish, .extension = no_extension };
+	const uint32_t up = it->dim - 1;
+	quern_setup setup = { .dim = it->dim, .lanes = QUERN_LANES, .stream = 7, .host = &host };
+	quern_err err = { it->report, it->tree->root, { 0 }, c->file->plugin.id };
+	for (uint32_t k = 0; k < it->dim; k++) setup.upper[k] = 1;
+	setup.gravity[up] = -9.81;
+	check_place(c, "init, %u-D, with setting %llu of its parameters", it->dim, (unsigned long long)setting);
+	const quern_status status = c->file->plugin.init(it->self, &setup, &err);
+	const bool spoke = quern_report_errors(it->report) > 0;
+	it->ready = status == QUERN_OK;
+	if (it->ready && !spoke) return CHECK_READY;
+	say_why(it, "");
+	if (!it->ready && spoke) return CHECK_REFUSED;
+	snprintf(it->why, sizeof it->why, it->ready ? "init calls fail() and returns QUERN_OK"
+												: "init returns a failure and calls no fail()");
+	return CHECK_RUDE;
+}
+
+check_outcome check_instance_create(const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
+	const quern_plugin *p = &c->file->plugin;
+	const size_t size = (p->instance_size + 127u) & ~(size_t)63;
+	*it = (check_instance) { .dim = dim };
+	it->report = quern_report_create();
+	it->tree = quern_take(1, sizeof *it->tree);
+	it->tree->root = quern_node_create(QUERN_NODE_MAP);
+	it->self = aligned_alloc(64, size);
+	if (!it->self) abort();
+	memset(it->self, 0, size);
+	put_rows(c, dim, c->file->params, setting, it->tree->root);
+	quern_node_merge(it->tree->root, c->given);
+	const quern_reading reading = { it->report, c->units, dim, NULL, 0, it->tree };
+	quern_params_read(&reading, p->id, c->file->params, it->tree->root, (quern_mark) { 0 }, NULL, it->self);
+	if (quern_report_errors(it->report)) return say_why(it, ""), CHECK_REFUSED;
+	if (p->init) return call_init(c, it, setting);
+	it->ready = true;
+	return CHECK_READY;
+}
+
+void check_instance_finish(const check *c, check_instance *it) {
+	check_place(c, "finish, %u-D", it->dim);
+	if (it->ready && c->file->plugin.finish) c->file->plugin.finish(it->self);
+	if (it->self) quern_params_finish(c->file->params, it->self);
+	free(it->self);
+	quern_tree_destroy(it->tree);
+	quern_report_destroy(it->report);
+	*it = (check_instance) { 0 };
+}
+
+bool check_counts(const check *c, const check_instance *it, const quern_use *row) {
+	const quern_param *when = row->when ? quern_param_find(c->file->params, row->when) : NULL;
+	return !row->when || (when && quern_param_number(when, it->self) != 0);
+}

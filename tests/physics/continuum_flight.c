@@ -1,0 +1,390 @@
+/* Free flight, in which nothing may happen that no force causes: transfers keep momentum, uniform motion stays as it is to
+ * round-off, a body that turns as a whole feels no stress, and what a transfer takes from a turning body is what it
+ * promises. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "plugin_alone.h"
+#include "table.h"
+#include <stdlib.h>
+#include <string.h>
+
+static const double pi = 3.14159265358979312;
+
+static uint64_t state = 88172645463325252u;
+static double uniform(void) {
+	state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+	return (double)(state >> 11) * 0x1p-53;
+}
+
+/* ==== a transfer alone, on a grid of its own ==== */
+
+enum { N = 512, EDGE = 8, NODES = EDGE * EDGE * EDGE };
+
+typedef struct field {
+	double x[3][NODES];
+} field;
+
+typedef struct swarm {
+	uint32_t dim;
+	double mass[N], weight[N][27], position[3][N], normal[3][N];
+	int32_t node[N][27];
+	double pic[3][N], change[3][N], echo[3][N], sent[3][N], velocity[3][N];
+	double node_mass[NODES];
+} swarm;
+
+/* Points anywhere in a box, weights of the shape that is the solver's default. */
+static void make_swarm(swarm *s, uint32_t dim) {
+	static const alone_value none[] = { { NULL, 0 } };
+	const alone shape = alone_make("shape.gimp", dim, none);
+	double value[3][3][N], slope[3][3][N];
+	int32_t first[3][N];
+	quern_shape_batch b = { .n = N, .cap = N, .dim = dim, .inverse_cell = 1 };
+	memset(s, 0, sizeof *s);
+	s->dim = dim;
+	for (uint32_t a = 0; a < dim; a++) {
+		for (uint32_t i = 0; i < N; i++) s->position[a][i] = 1.5 + (EDGE - 4) * uniform();
+		b.position[a] = s->position[a], b.first[a] = first[a];
+		b.wall[a][0] = INT32_MIN, b.wall[a][1] = INT32_MAX;
+		for (int k = 0; k < 3; k++) b.value[a][k] = value[a][k], b.slope[a][k] = slope[a][k];
+	}
+	((const quern_shape_ops *)shape.plugin->ops)->weights(shape.self, &b);
+	for (uint32_t i = 0; i < N; i++) {
+		double length = 0;
+		s->mass[i] = 0.5 + uniform();
+		for (uint32_t a = 0; a < dim; a++) {
+			s->velocity[a][i] = 2 * uniform() - 1;
+			s->normal[a][i] = 2 * uniform() - 1;
+			length += s->normal[a][i] * s->normal[a][i];
+		}
+		for (uint32_t a = 0; a < dim; a++) s->normal[a][i] *= i % 5 ? 1 / sqrt(length) : 0;
+		for (int k = 0; k < (dim == 3 ? 27 : 9); k++) {
+			const int at[3] = { k % 3, k / 3 % 3, k / 9 };
+			s->weight[i][k] = 1;
+			for (uint32_t a = dim; a-- > 0;) {
+				s->weight[i][k] *= value[a][at[a]][i];
+				s->node[i][k] = s->node[i][k] * EDGE + first[a][i] + at[a];
+			}
+			s->node_mass[s->node[i][k]] += s->mass[i] * s->weight[i][k];
+		}
+	}
+	free(shape.self);
+}
+
+/* To the nodes with mass, divided by theirs. */
+static void scatter(const swarm *s, double (*from)[N], field *to) {
+	memset(to, 0, sizeof *to);
+	for (uint32_t a = 0; a < s->dim; a++) {
+		for (uint32_t i = 0; i < N; i++)
+			for (int k = 0; k < (s->dim == 3 ? 27 : 9); k++)
+				to->x[a][s->node[i][k]] += s->mass[i] * s->weight[i][k] * from[a][i];
+		for (int k = 0; k < NODES; k++) to->x[a][k] *= s->node_mass[k] > 0 ? 1 / s->node_mass[k] : 0;
+	}
+}
+
+static void gather(const swarm *s, const field *from, double (*to)[N]) {
+	for (uint32_t a = 0; a < s->dim; a++)
+		for (uint32_t i = 0; i < N; i++) {
+			to[a][i] = 0;
+			for (int k = 0; k < (s->dim == 3 ? 27 : 9); k++)
+				to[a][i] += s->weight[i][k] * from->x[a][s->node[i][k]];
+		}
+}
+
+/* As the solver does it: round trips, then the last call. */
+static void transfer(swarm *s, const alone *t, double dt) {
+	const quern_transfer_ops *ops = t->plugin->ops;
+	quern_column use = { .real = { s->normal[0], s->normal[1], s->normal[2] } };
+	for (uint32_t pass = 0; pass <= ops->passes; pass++) {
+		quern_transfer_batch b = { .n = N, .cap = N, .pass = pass, .dt = dt, .use = &use };
+		for (uint32_t a = 0; a < s->dim; a++) {
+			b.pic[a] = s->pic[a], b.change[a] = s->change[a], b.velocity[a] = s->velocity[a];
+			b.echo[a] = pass ? s->echo[a] : NULL;
+			b.send[a] = pass < ops->passes ? s->sent[a] : NULL;
+		}
+		ops->gather[s->dim - 2](t->self, &b);
+		if (pass == ops->passes) break;
+		field back;
+		scatter(s, s->sent, &back);
+		gather(s, &back, s->echo);
+	}
+}
+
+static double momentum(const swarm *s, uint32_t a) {
+	double sum = 0;
+	for (uint32_t i = 0; i < N; i++) sum += s->mass[i] * s->velocity[a][i];
+	return sum;
+}
+
+static const struct {
+	const char *name, *id;
+	alone_value values[2];
+} transfers[] = { { "picflip, rate 0 (FLIP)", "transfer.picflip", { { "rate", 0 } } },
+	{ "picflip, rate 30/s", "transfer.picflip", { { "rate", 30 } } },
+	{ "picflip, rate 1e300/s (PIC)", "transfer.picflip", { { "rate", 1e300 } } },
+	{ "picflip, flip 0.95", "transfer.picflip", { { "flip", 0.95 } } },
+	{ "mixed", "transfer.mixed", { { NULL, 0 } } } };
+enum { TRANSFERS = sizeof transfers / sizeof *transfers };
+
+/* A rate of its own, so that the rows without one have it. */
+static alone make_transfer(int k, uint32_t dim) {
+	const alone_value values[] = { { "rate", 30 }, transfers[k].values[0], { NULL, 0 } };
+	return alone_make(transfers[k].id, dim, transfers[k].values[0].name ? values : values + 2);
+}
+
+/* Random points, random velocities, random forces: points gain the momentum that the nodes gained, and nothing else. */
+static void transfers_keep_momentum(void **unused) {
+	(void)unused;
+	bool good = true;
+	swarm *s = malloc(sizeof *s);
+	assert_non_null(s);
+	table_head("momentum gained over sum m|v|, less the nodes' gain");
+	for (int k = 0; k < TRANSFERS; k++)
+		for (uint32_t dim = 2; dim <= 3; dim++) {
+			const alone t = make_transfer(k, dim);
+			double worst = 0, size = 0, expected[3];
+			char what[80];
+			field v, change = { 0 };
+			make_swarm(s, dim);
+			scatter(s, s->velocity, &v);
+			for (uint32_t a = 0; a < dim; a++) {
+				expected[a] = momentum(s, a);
+				for (uint32_t i = 0; i < N; i++) size += s->mass[i] * fabs(s->velocity[a][i]);
+				for (int i = 0; i < NODES; i++) {
+					change.x[a][i] = uniform() - 0.5;
+					v.x[a][i] += change.x[a][i];
+					expected[a] += s->node_mass[i] * change.x[a][i];
+				}
+			}
+			gather(s, &v, s->pic);
+			gather(s, &change, s->change);
+			transfer(s, &t, 0.01);
+			for (uint32_t a = 0; a < dim; a++) worst = fmax(worst, fabs(momentum(s, a) - expected[a]) / size);
+			snprintf(what, sizeof what, "%s, %uD", transfers[k].name, dim);
+			good &= table_row(what, worst, 0, 1e-12);
+			free(t.self);
+		}
+	free(s);
+	assert_true(good);
+}
+
+/* What a transfer leaves of motion that the grid does not see: all (FLIP), none (PIC), e^(-rate dt); mixed none along the
+ * normal and all across it. The points' velocities sum to nothing at every node, so that PIC is zero. */
+static void motion_below_the_grid(void **unused) {
+	(void)unused;
+	bool good = true;
+	swarm *s = malloc(sizeof *s);
+	assert_non_null(s);
+	table_head("unseen motion kept in a step of 0.01 s");
+	for (int k = 0; k < TRANSFERS; k++) {
+		const alone t = make_transfer(k, 3);
+		const double asked[] = { 1, exp(-0.3), 0, 0.95, 0 };
+		double along = 0, was_along = 0, across = 0, was_across = 0;
+		make_swarm(s, 3);
+		for (uint32_t i = 0; i < N; i++) { /* pairs at one place with opposite velocities */
+			double dot = 0;
+			for (uint32_t a = 0; a < 3; a++) {
+				if (i % 2) s->velocity[a][i] = -s->velocity[a][i - 1], s->normal[a][i] = s->normal[a][i - 1];
+				dot += s->velocity[a][i] * s->normal[a][i];
+			}
+			if (i % 2) memcpy(s->weight[i], s->weight[i - 1], sizeof *s->weight);
+			if (i % 2) memcpy(s->node[i], s->node[i - 1], sizeof *s->node);
+			s->mass[i] = 1;
+			was_along += dot * dot;
+			for (uint32_t a = 0; a < 3; a++) was_across += pow(s->velocity[a][i] - dot * s->normal[a][i], 2);
+		}
+		for (int i = 0; i < NODES; i++) s->node_mass[i] = 0;
+		for (uint32_t i = 0; i < N; i++)
+			for (int n = 0; n < 27; n++) s->node_mass[s->node[i][n]] += s->weight[i][n];
+		transfer(s, &t, 0.01); /* pic and change are zero */
+		for (uint32_t i = 0; i < N; i++) {
+			double dot = 0;
+			for (uint32_t a = 0; a < 3; a++) dot += s->velocity[a][i] * s->normal[a][i];
+			along += dot * dot;
+			for (uint32_t a = 0; a < 3; a++) across += pow(s->velocity[a][i] - dot * s->normal[a][i], 2);
+		}
+		good &= table_row(transfers[k].name, sqrt(along / was_along), asked[k], 1e-12);
+		good &= table_row(
+			"  across the normal", sqrt(across / was_across), k == TRANSFERS - 1 ? 1 : asked[k], 1e-12);
+		free(t.self);
+	}
+	free(s);
+	assert_true(good);
+}
+
+/* ==== a block in flight, the whole solver ==== */
+
+static quern_run *fly(int cells, const char *transfer, const char *cut, double g) {
+	return harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, %.17g], domain: {lower: [0, 0], upper: [2, 2]},\n"
+		"time: {end: 1000}, output: {every: 0.1, fields: [total.faces]},\n"
+		"continuum: {cell: %.17g, cut: %s, material: {elastic: {bulk_modulus: 1e5, density: 1000}},\n"
+		"  transfer: {%s}, fill: [{region: {box: {lower: [0.63, 0.63], upper: [1.43, 1.43]}}}]}}\n",
+		g, 0.8 / cells, cut, transfer);
+}
+
+typedef struct sums {
+	double mass, momentum[2], angular, size, faces[2];
+} sums;
+
+static sums sum(quern_run *run) {
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity"),
+					   m = harness_field(run, "point.mass"), f = harness_field(run, "total.faces");
+	sums s = { .faces = { f.real[0][0], f.real[1][0] } };
+	double centre[2] = { 0 };
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		s.mass += m.real[0][i];
+		for (int k = 0; k < 2; k++) {
+			centre[k] += m.real[0][i] * x.real[k][i];
+			s.momentum[k] += m.real[0][i] * v.real[k][i];
+		}
+		s.size += m.real[0][i] * hypot(v.real[0][i], v.real[1][i]);
+		s.angular += m.real[0][i] * (x.real[0][i] * v.real[1][i] - x.real[1][i] * v.real[0][i]);
+	}
+	s.angular -= (centre[0] * s.momentum[1] - centre[1] * s.momentum[0]) / s.mass;
+	return s;
+}
+
+static const char *const rates[] = { "picflip: {rate: 0}", "picflip: {rate: 3}", "picflip: {rate: 1e300}" };
+
+/* An elastic block whose points move at random, for 0.5 s: its own stresses change no momentum but that of light nodes,
+ * whose limited force is booked; gravity adds m g t. */
+static void flight_keeps_momentum(void **unused) {
+	(void)unused;
+	bool good = true;
+	for (int limited = 0; limited <= 1; limited++) {
+		table_head(
+			limited ? "gain less booked impulse, over sum m|v|" : "gain over sum m|v|, light nodes free");
+		for (int k = 0; k < 3; k++)
+			for (int falls = 0; falls <= 1; falls++) {
+				const double g = falls ? -0.5 : 0;
+				char what[80];
+				quern_run *run = fly(8, rates[k], limited ? "1e-3" : "1e-12", g);
+				const quern_column v = harness_field(run, "point.velocity");
+				for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+					v.real[0][i] = uniform() - 0.5, v.real[1][i] = uniform() - 0.4;
+				const sums before = sum(run);
+				harness_until(run, 0.5);
+				const sums after = sum(run);
+				double worst = 0;
+				for (int a = 0; a < 2; a++) {
+					const double weight = a ? after.mass * g * quern_run_time(run) : 0;
+					worst = fmax(worst, fabs(after.momentum[a] - before.momentum[a] - weight -
+											 (limited ? after.faces[a] - before.faces[a] : 0)));
+				}
+				snprintf(what, sizeof what, "%s%s", rates[k], falls ? ", falling" : "");
+				good &= table_row(what, worst / before.size, 0, 1e-12);
+				harness_close(run);
+			}
+	}
+	assert_true(good);
+}
+
+/* A block in uniform motion crosses cells and blocks of the grid and stays what it was, without stress. */
+static void uniform_motion(void **unused) {
+	(void)unused;
+	bool good = true;
+	table_head("uniform motion for 0.9 s, 4.5 cells: change");
+	for (int k = 0; k < 3; k++) {
+		quern_run *run = fly(8, rates[k], "1e-3", 0);
+		const quern_column v = harness_field(run, "point.velocity");
+		const uint32_t n = harness_count(run, "point");
+		for (uint32_t i = 0; i < n; i++) v.real[0][i] = 0.3, v.real[1][i] = 0.4;
+		harness_until(run, 0.9);
+		const quern_column now = harness_field(run, "point.velocity"), s = harness_field(run, "point.stress"),
+						   volume = harness_field(run, "point.volume"), m = harness_field(run, "point.mass");
+		double gap = 0, stress = 0, dense = 0;
+		for (uint32_t i = 0; i < n; i++) {
+			gap = fmax(gap, hypot(now.real[0][i] - 0.3, now.real[1][i] - 0.4) / 0.5);
+			dense = fmax(dense, fabs(m.real[0][i] / volume.real[0][i] / 1000 - 1));
+			for (int a = 0; a < 3; a++) stress = fmax(stress, fabs(s.real[a][i]) / 1e5);
+		}
+		good &= table_row(rates[k], gap, 0, 1e-12);
+		good &= table_row("  stress over the bulk modulus", stress, 0, 1e-12);
+		good &= table_row("  density", dense, 0, 1e-12);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+static void spin(quern_run *run, double rate) {
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		v.real[0][i] = -rate * (x.real[1][i] - 1.03), v.real[1][i] = rate * (x.real[0][i] - 1.03);
+}
+
+/* One step of rigid rotation: inside, where the lattice of points is whole around every node that is seen, the grid holds
+ * the linear field exactly; so any transfer leaves velocities alone, and no stress arises. */
+static void rotation_at_once(void **unused) {
+	(void)unused;
+	bool good = true;
+	table_head("one step of rigid rotation, two cells inside: change");
+	for (int k = 0; k < 3; k++) {
+		quern_run *run = fly(8, rates[k], "1e-3", 0);
+		const uint32_t n = harness_count(run, "point");
+		double was[2][1024], at[2][1024], gap = 0, stress = 0;
+		assert_true(n <= 1024);
+		spin(run, 3);
+		quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+		for (int a = 0; a < 2; a++) memcpy(at[a], x.real[a], n * sizeof **at);
+		for (int a = 0; a < 2; a++) memcpy(was[a], v.real[a], n * sizeof **was);
+		harness_steps(run, 1);
+		x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+		const quern_column s = harness_field(run, "point.stress");
+		const double dt = run->clock.dt;
+		for (uint32_t i = 0; i < n; i++) {
+			/* the sort may have moved it: its old place is where its new velocity came from */
+			const double old[2] = { x.real[0][i] - dt * v.real[0][i], x.real[1][i] - dt * v.real[1][i] };
+			if (fabs(old[0] - 1.03) > 0.2 || fabs(old[1] - 1.03) > 0.2) continue;
+			uint32_t j = 0;
+			while (j < n && hypot(at[0][j] - old[0], at[1][j] - old[1]) > 1e-6) j++;
+			assert_true(j < n);
+			gap = fmax(gap, hypot(v.real[0][i] - was[0][j], v.real[1][i] - was[1][j]));
+			for (int a = 0; a < 3; a++) stress = fmax(stress, fabs(s.real[a][i]) / 1e5);
+		}
+		good &= table_row(rates[k], gap, 0, 1e-12);
+		good &= table_row("  stress over the bulk modulus", stress, 0, 1e-12);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+/* Over a turn FLIP loses angular momentum at the free faces, less on finer grids; a PIC share takes more, PIC nearly all,
+ * and nothing may add any. */
+static void rotation_over_a_turn(void **unused) {
+	(void)unused;
+	bool good = true;
+	double kept[3][2];
+	table_head("angular momentum kept over a turn of 2.1 s");
+	for (int k = 0; k < 3; k++)
+		for (int fine = 0; fine <= 1; fine++) {
+			char what[80];
+			quern_run *run = fly(fine ? 16 : 8, rates[k], "1e-3", 0);
+			spin(run, 3);
+			const double before = sum(run).angular;
+			harness_until(run, 2 * pi / 3);
+			kept[k][fine] = sum(run).angular / before;
+			snprintf(what, sizeof what, "%s, %d cells across", rates[k], fine ? 16 : 8);
+			table_note(what, kept[k][fine]);
+			harness_close(run);
+		}
+	good &= table_row("FLIP, 8 cells", kept[0][0], 1, 0.1);
+	good &= table_row("FLIP, 16 cells", kept[0][1], 1, 0.05);
+	good &= table_row("PIC, 8 cells", kept[2][0], 0, 0.01);
+	for (int fine = 0; fine <= 1; fine++)
+		good &= kept[0][fine] > kept[1][fine] && kept[1][fine] > kept[2][fine] && kept[0][fine] < 1 + 1e-9;
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(transfers_keep_momentum),
+		cmocka_unit_test(motion_below_the_grid), cmocka_unit_test(flight_keeps_momentum),
+		cmocka_unit_test(uniform_motion), cmocka_unit_test(rotation_at_once),
+		cmocka_unit_test(rotation_over_a_turn) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
