@@ -176,7 +176,7 @@ void check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) 
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
 		const quern_use *row = &rows[r];
 		if (row->hook != hook || row->access > QUERN_ADD || row->shape == QUERN_ID) continue;
-		if (row->flags & (QUERN_OPTIONAL | QUERN_WANTED) && !optional) continue;
+		if ((row->with || row->flags & (QUERN_OPTIONAL | QUERN_WANTED)) && !optional) continue;
 		if (!check_counts(k->check, k->instance, row)) continue;
 		for (uint32_t side = 0; side <= second; side++) {
 			int *use = side ? k->use_second : k->use;

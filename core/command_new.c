@@ -1,5 +1,131 @@
+/* quern new - a plugin of one's own, from a template that works */
 #include "command.h"
+#include "loader.h"
+#include "templates.h"
+#include "text.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { LONGEST_NAME = 48 };
+
+/* ---- what is asked for ---- */
+
+static bool is_plain(const char *name) {
+	const size_t n = strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_");
+	return *name >= 'a' && *name <= 'z' && !name[n] && n <= LONGEST_NAME;
+}
+
+static int check_kind(const char *kind) {
+	if (quern_kind_of(kind)) return QUERN_EXIT_DONE;
+	const char *near = quern_nearest(kind, quern_kind_names);
+	quern_text all = { 0 };
+	for (size_t k = 0; quern_kind_names[k]; k++)
+		quern_text_add(&all, "%s%s", k ? ", " : "", quern_kind_names[k]);
+	const int status =
+		near ? quern_usage("new", "unknown kind '%s'; did you mean '%s'?", kind, near)
+			 : quern_usage("new", "unknown kind '%s'; there are %s", kind, quern_text_string(&all));
+	quern_text_finish(&all);
+	return status;
+}
+
+/* Two plugins of one kind and name would stand in each other's way as soon as both are on the search path. */
+static int check_name(const char *kind, const char *name) {
+	if (!is_plain(name))
+		return quern_usage(
+			"new", "'%s' is no name: small letters, digits and underscores, a letter first", name);
+	if (!strcmp(name, "v3") || !strcmp(name, "v4"))
+		return quern_usage("new", "'%s' stands for an instruction set: take another name", name);
+	quern_loader *loader = quern_loader_create();
+	char **ids = quern_loader_ids(loader), *id = quern_format("%s.%s", kind, name);
+	int status = QUERN_EXIT_DONE;
+	for (size_t i = 0; ids[i]; i++)
+		if (!strcmp(ids[i], id))
+			status = quern_usage("new", "%s is installed already: take another name", id);
+	free(id);
+	quern_loader_free_ids(ids);
+	quern_loader_destroy(loader);
+	return status;
+}
+
+/* ---- files ---- */
+
+static char *filled_in(const char *template, const char *kind, const char *name) {
+	const quern_template *t = quern_templates;
+	quern_text text = { 0 };
+	while (t->name && strcmp(t->name, template) != 0) t++;
+	for (const char *const *line = t->lines; line && *line; line++) {
+		const char *rest = *line;
+		for (const char *mark; (mark = strstr(rest, "my_")) != NULL; rest = mark) {
+			const bool is_kind = !strncmp(mark, "my_kind", 7), is_name = !strncmp(mark, "my_name", 7);
+			quern_text_add(&text, "%.*s%s", (int)(mark - rest), rest,
+				is_kind   ? kind
+				: is_name ? name
+						  : "my_");
+			mark += is_kind || is_name ? 7 : 3;
+		}
+		quern_text_add(&text, "%s\n", rest);
+	}
+	return text.data;
+}
+
+static int refuse(const char *path) {
+	fprintf(stderr, "quern new: %s cannot be written: %s\n", path, strerror(errno));
+	return QUERN_EXIT_IO;
+}
+
+/* Never into a file that is there. */
+static int write_file(const char *path, const char *text) {
+	const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL, 0666);
+	const size_t length = strlen(text);
+	if (fd < 0) return refuse(path);
+	const ssize_t n = write(fd, text, length);
+	if (close(fd) || n != (ssize_t)length) return refuse(path);
+	puts(path);
+	return QUERN_EXIT_DONE;
+}
+
+static int write_all(const char *folder, const char *kind, const char *name) {
+	char *template[3] = { quern_format("%s.c", kind), quern_copy("meson.build.txt"),
+		quern_copy("README.md.txt") };
+	char *path[3] = { quern_format("%s/%s.%s.c", folder, kind, name), quern_format("%s/meson.build", folder),
+		quern_format("%s/README.md", folder) };
+	int status = mkdir(folder, 0777) && errno != EEXIST ? refuse(folder) : QUERN_EXIT_DONE;
+	for (int k = 0; k < 3 && status == QUERN_EXIT_DONE; k++)
+		if (!access(path[k], F_OK)) {
+			fprintf(stderr, "quern new: %s is there already, and nothing was written\n", path[k]);
+			status = QUERN_EXIT_IO;
+		}
+	for (int k = 0; k < 3; k++) {
+		char *text = filled_in(template[k], kind, name);
+		if (status == QUERN_EXIT_DONE) status = write_file(path[k], text);
+		free(text);
+		free(template[k]);
+		free(path[k]);
+	}
+	return status;
+}
+
 int quern_command_new(int argc, char **argv) {
-	(void)argc, (void)argv;
-	return QUERN_EXIT_USAGE;
+	const char *kind = NULL, *name = NULL, *out = NULL;
+	for (int i = 1; i < argc; i++) {
+		if (!strcmp(argv[i], "-o") && i + 1 < argc) out = argv[++i];
+		else if (!strcmp(argv[i], "-o")) return quern_usage("new", "-o needs a folder");
+		else if (argv[i][0] == '-' || name) return quern_usage("new", "unknown argument '%s'", argv[i]);
+		else if (!kind) kind = argv[i];
+		else name = argv[i];
+	}
+	if (!name) return quern_usage("new", "a kind and a name are missing");
+	int status = check_kind(kind);
+	if (status == QUERN_EXIT_DONE) status = check_name(kind, name);
+	if (status != QUERN_EXIT_DONE) return status;
+	char *folder = out ? quern_copy(out) : quern_format("%s.%s", kind, name);
+	status = write_all(folder, kind, name);
+	if (status == QUERN_EXIT_DONE) printf("\ncd %s && meson setup build && ninja -C build\n", folder);
+	free(folder);
+	return status;
 }

@@ -70,8 +70,8 @@ render_view render_view_of(const render_frame *);
 void render_view_fit(render_view *, const render_frame *, double most_width, double most_height);
 void render_project(
 	const render_view *, const double x[3], double out[3]); /* pixels, and m away from the eye */
-/* The level of the floor, if the scene or its domain says so. */
-bool render_floor(const render_frame *, double *level);
+/* False for what is left out: fixed grains beside what moves. */
+bool render_shown(const render_view *, const render_frame *, const render_cloud *, size_t i);
 
 /* ---- render_plane.c, render_space.c: what lies in the picture, with its upper left corner at the origin ---- */
 

@@ -87,6 +87,7 @@ static void put_cloud(raster *r, const render_style *s, const render_cloud *clou
 	for (size_t i = 0; i < cloud->n; i++) {
 		double at[3];
 		if (cloud == &s->frame->cells && cloud->value[i] == 0) continue;
+		if (!render_shown(s->view, s->frame, cloud, i)) continue;
 		render_project(s->view, cloud->position[i], at);
 		at[0] *= FINE;
 		at[1] *= FINE;

@@ -3,30 +3,44 @@
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-bool render_floor(const render_frame *f, double *level) {
-	if (f->scene) *level = f->scene->general.lower[f->dimension - 1];
-	return f->scene != NULL;
+static bool is_fixed(const render_cloud *cloud, const render_frame *f, size_t i) {
+	return cloud == &f->grains && cloud->sort[i] == RENDER_FIXED;
 }
 
-static void add_cloud(render_view *v, const render_cloud *cloud, double half) {
-	for (size_t i = 0; i < cloud->n; i++)
-		for (int k = 0; k < 3; k++) {
-			const double x = cloud->position[i][k], r = half * cloud->size[i];
-			if (!isfinite(x)) continue;
-			v->low[k] = fmin(v->low[k], x - r);
-			v->high[k] = fmax(v->high[k], x + r);
-		}
+static void add(render_view *v, const double x[3], double half) {
+	for (int k = 0; k < 3 && isfinite(x[0] + x[1] + x[2]); k++) {
+		v->low[k] = fmin(v->low[k], x[k] - half);
+		v->high[k] = fmax(v->high[k], x[k] + half);
+	}
+}
+
+bool render_shown(const render_view *v, const render_frame *f, const render_cloud *cloud, size_t i) {
+	for (int k = 0; k < f->dimension - 1 && is_fixed(cloud, f, i); k++)
+		if (cloud->position[i][k] < v->low[k] || cloud->position[i][k] > v->high[k]) return false;
+	return true;
+}
+
+/* Grains that make up a rough floor do not widen the picture, unless there are no others. */
+static void add_clouds(render_view *v, const render_frame *f) {
+	const bool all =
+		!f->points.n && !render_has(&f->grains, RENDER_WHOLE) && !render_has(&f->grains, RENDER_SHARED);
+	for (int k = 0; k < 3; k++) v->low[k] = INFINITY, v->high[k] = -INFINITY;
+	for (size_t i = 0; i < f->grains.n; i++)
+		if (all || !is_fixed(&f->grains, f, i)) add(v, f->grains.position[i], f->grains.size[i]);
+	for (size_t i = 0; i < f->points.n; i++) add(v, f->points.position[i], 0.5 * f->points.size[i]);
 }
 
 /* What is occupied, down to the floor unless that is far below. */
 static void crop(render_view *v, const render_frame *f) {
 	const int up = f->dimension - 1;
-	double level, most = 0;
-	for (int k = 0; k < 3; k++) v->low[k] = INFINITY, v->high[k] = -INFINITY;
-	add_cloud(v, &f->grains, 1);
-	add_cloud(v, &f->points, 0.5);
+	double floor = INFINITY, most = 0;
+	add_clouds(v, f);
 	for (int k = 0; k < f->dimension; k++) most = fmax(most, v->high[k] - v->low[k]);
-	if (render_floor(f, &level) && level < v->low[up] && level > v->low[up] - 0.5 * most) v->low[up] = level;
+	if (f->scene) floor = f->scene->general.lower[up];
+	for (size_t i = 0; i < f->grains.n; i++)
+		if (is_fixed(&f->grains, f, i) && render_shown(v, f, &f->grains, i))
+			floor = fmin(floor, f->grains.position[i][up] - f->grains.size[i]);
+	if (floor < v->low[up] && floor > v->low[up] - 0.5 * most) v->low[up] = floor;
 	if (f->dimension == 2) v->low[2] = v->high[2] = 0;
 	if (!(most > 0)) most = 1;
 	const double margin = (f->dimension == 2 ? 0.03 : 0.02) * most;
@@ -67,7 +81,8 @@ void render_view_fit(render_view *v, const render_frame *f, double most_width, d
 		for (int k = 0; k < 3; k++) x[k] = corner >> k & 1 ? v->high[k] : v->low[k];
 		widen(v, x, 0, low, high);
 	}
-	for (size_t i = 0; i < f->grains.n; i++) widen(v, f->grains.position[i], f->grains.size[i], low, high);
+	for (size_t i = 0; i < f->grains.n; i++)
+		if (!is_fixed(&f->grains, f, i)) widen(v, f->grains.position[i], f->grains.size[i], low, high);
 	for (size_t i = 0; i < f->points.n; i++) widen(v, f->points.position[i], f->points.size[i], low, high);
 	v->scale = fmin(most_width / (high[0] - low[0]), most_height / (high[1] - low[1]));
 	v->left = low[0];

@@ -1,0 +1,6 @@
+/* check_table - rows of parameters and uses, wherever a table holds them */
+#pragma once
+#include "check.h"
+
+void check_parameter_rows(const check *, check_tally *, const quern_param *, size_t size, int depth);
+void check_use_rows(const check *, check_tally *, const quern_use *, const quern_param *params);
