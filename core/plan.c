@@ -378,7 +378,7 @@ static void conflicts(quern_plan *p, const quern_field *field, const quern_plan_
 			quern_report_add(p->scene->report, u->mark, "%s: %s overwrites what %s wrote and nobody read",
 				field->name, u->owner, last->owner);
 		if (u->row->access == QUERN_UPDATE && last->row->access == QUERN_UPDATE && was->phase == now->phase &&
-			was->solver != now->solver)
+			was->solver != now->solver && !now->observer) /* observers go in the order of their list */
 			quern_report_add(p->scene->report, u->mark,
 				"%s: %s and %s both change it and nothing says which comes first", field->name, last->owner,
 				u->owner);

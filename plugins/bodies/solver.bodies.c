@@ -34,7 +34,7 @@ static const quern_slot slots[] = { { .name = "",
 
 static const quern_use place_uses[] = { F("body.impulse", "N s", QUERN_WRITE, QUERN_VECTOR,
 											.flags = QUERN_OPTIONAL,
-											.doc = "Given to the material since the start."),
+											.doc = "Given to the material since the release."),
 	QUERN_END_USES };
 
 static quern_status place(const void *self, const quern_step *s) {

@@ -52,9 +52,9 @@ typedef struct sent {
 } sent;
 
 /* Adds one particle to the tile. `split` holds 1 in the lanes of `slope`, 0 elsewhere. */
-QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, quern_row split,
+QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, const quern_row *split_lanes,
 	quern_row *tile, const int dim, quern_real cell, int32_t span) {
-	const quern_row rest = 1 - split;
+	const quern_row split = *split_lanes, rest = 1 - split;
 	quern_real way[3][3];
 	for (int a = 0; a < dim; a++)
 		for (int k = 0; k < 3; k++) way[a][k] = (quern_real)(s->first[a][i] + k) * cell - s->position[a][i];

@@ -192,7 +192,7 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	for (uint32_t b = 0; b < n_blocks; b++) {
 		const quern_real way = sqrt(sh->farthest[b]);
 		farthest = way > farthest ? way : farthest;
-		for (uint32_t k = 0; k < s->dim; k++) {
+		for (uint32_t k = 0; k < s->dim && !s->settling; k++) {
 			const quern_real *impulse = sh->impulse + (size_t)b * (sh->n_bodies + 1) * 3;
 			for (uint32_t body = 0; body < sh->n_bodies && u[FORCE_IMPULSE].real[0]; body++)
 				u[FORCE_IMPULSE].real[k][body] += impulse[body * 3 + k];
@@ -202,11 +202,10 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	}
 	u[FORCE_DISPLACEMENT].real[0][0] = farthest;
 	if (!sh->energy) return;
-	for (int e = E_KINETIC; e <= E_SHEARED; e++) u[FORCE_KINETIC + e].real[0][0] = energy[e];
-	if (!s->settling) {
-		u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
-		u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
-	}
+	for (int e = E_KINETIC; e <= E_SHEARED; e++)
+		if (u[FORCE_KINETIC + e].real[0]) u[FORCE_KINETIC + e].real[0][0] = energy[e];
+	if (!s->settling && u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
+	if (!s->settling && u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
 }
 
 static quern_status lost(const forces_shared *sh, int32_t i) {

@@ -117,7 +117,7 @@ QUERN_INLINE void raster_block(const raster_work *w, raster_memory *m, uint32_t 
 			if (!c.any || !(w->s->use[R_WEIGHT].real[0][grain[k]] > 0)) continue;
 			const sent p = send_grain(w, m, k, grain[k], w->h->affine && c.all, dim);
 			stencil_scatter(
-				&m->stencil, k, &p, (quern_row) { 0 }, m->sum, dim, w->g->cell, (int32_t)w->g->span);
+				&m->stencil, k, &p, &(quern_row) { 0 }, m->sum, dim, w->g->cell, (int32_t)w->g->span);
 		}
 	}
 	quern_tile_add(w->g, w->mixture, b, m->sum);
@@ -345,7 +345,7 @@ QUERN_INLINE void back_block(const back_work *w, back_memory *m, uint32_t b, con
 			sent p = { .base = { 0 } };
 			for (int a = 0; a < dim; a++) p.base[a] = mass * m->send[a][k];
 			stencil_scatter(
-				&m->stencil, k, &p, (quern_row) { 0 }, m->trip, dim, w->g->cell, (int32_t)w->g->span);
+				&m->stencil, k, &p, &(quern_row) { 0 }, m->trip, dim, w->g->cell, (int32_t)w->g->span);
 		}
 	}
 	if (!last) quern_tile_add(w->g, w->trip, b, m->trip);

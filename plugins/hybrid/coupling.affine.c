@@ -6,7 +6,7 @@ typedef struct {
 	int32_t unused;
 } coupling;
 static const quern_param params[] = { QUERN_END_PARAMS };
-static const quern_use uses[] = { { .field = "point.gradient",
+static const quern_use uses[] = { { .field = "point.affine",
 									  .unit = "1/s",
 									  .doc = "Velocity gradient of the last step, sent with the velocity.",
 									  .access = QUERN_READ,

@@ -126,8 +126,9 @@ static void finish_chunk(
 	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, most = 0.5 * w->g->cell / w->s->dt;
 	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin;
 	for (uint32_t i = 0; i < n; i++) volume[i] = mass[i] / m->density[i];
-	for (uint32_t k = 0; k < dim * dim && u[GATHER_GRADIENT].real[0]; k++)
-		memcpy(u[GATHER_GRADIENT].real[k] + begin, m->gradient[k], n * sizeof(quern_real));
+	for (int row = GATHER_GRADIENT; row <= GATHER_AFFINE; row++)
+		for (uint32_t k = 0; k < dim * dim && u[row].real[0]; k++)
+			memcpy(u[row].real[k] + begin, m->gradient[k], n * sizeof(quern_real));
 	for (uint32_t i = 0; i < n && u[GATHER_PRESSURE].real[0]; i++) {
 		quern_real trace = 0;
 		for (uint32_t k = 0; k < dim; k++) trace += u[GATHER_STRESS].real[k][begin + i];
@@ -182,7 +183,7 @@ QUERN_INLINE void send_block(const gather_work *w, gather_memory *m, uint32_t b,
 			sent p = { .base = { 0 } };
 			for (int a = 0; a < dim; a++) p.base[a] = mass * m->send[a][k];
 			stencil_scatter(
-				&m->stencil, k, &p, (quern_row) { 0 }, m->trip, dim, w->g->cell, (int32_t)w->g->span);
+				&m->stencil, k, &p, &(quern_row) { 0 }, m->trip, dim, w->g->cell, (int32_t)w->g->span);
 		}
 	}
 	quern_tile_add(w->g, w->trip, b, m->trip);

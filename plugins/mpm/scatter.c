@@ -31,7 +31,7 @@ QUERN_INLINE sent send_point(const quern_column *u, uint32_t i, const int dim) {
 		p.slope[1] = (quern_row) { 0, 0, 0, 0, volume * t[3][i], volume * t[1][i], volume * t[4][i], 0 };
 		p.slope[2] = (quern_row) { 0, 0, 0, 0, volume * t[5][i], volume * t[4][i], volume * t[2][i], 0 };
 	}
-	quern_real *const *l = u[SCATTER_GRADIENT].real; /* m (v + L (x_i - x)) */
+	quern_real *const *l = u[SCATTER_AFFINE].real; /* m (v + L (x_i - x)) */
 	if (l[0])
 		for (int a = 0; a < dim; a++)
 			for (int k = 0; k < dim; k++) p.along[a][1 + k] = m * l[dim * k + a][i];
@@ -50,7 +50,7 @@ QUERN_INLINE void scatter_block(const scatter_work *w, scatter_memory *m, uint32
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[SCATTER_POSITION].real, i, NULL, n, &m->stencil);
 		for (uint32_t k = 0; k < n; k++) {
 			const sent p = send_point(u, i + k, dim);
-			stencil_scatter(&m->stencil, k, &p, split, m->tile, dim, w->g->cell, (int32_t)w->g->span);
+			stencil_scatter(&m->stencil, k, &p, &split, m->tile, dim, w->g->cell, (int32_t)w->g->span);
 		}
 	}
 	quern_tile_add(w->g, w->node, b, m->tile);

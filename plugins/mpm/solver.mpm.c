@@ -11,7 +11,7 @@ static const quern_param fill_rows[] = { QUERN_PARAM_AS(mpm_fill, lower, "region
 	QUERN_PARAM(mpm_fill, velocity, "m/s", "Velocity at the start."),
 	QUERN_PARAM(mpm_fill, stress, "1", "Stress at the start: none, or that of the weight above.",
 		.choices = stresses),
-	QUERN_PARAM(mpm_fill, lateral, "1", "Horizontal over vertical stress at rest.", .def = 0.5, .max = 10),
+	QUERN_PARAM(mpm_fill, lateral, "1", "Horizontal over vertical stress at rest.", .def = 0.6, .max = 10),
 	QUERN_END_PARAMS };
 static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 										  "Cell of the grid; the domain is a whole number of them.",
@@ -20,7 +20,7 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill)),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
-		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
+		.def = 1e-6, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -72,7 +72,7 @@ static const quern_use scatter_uses[] = { F("point.position", "m", QUERN_READ, Q
 	F("point.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
 	F("point.volume", "m^3", QUERN_READ, QUERN_SCALAR), F("point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC),
 	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("point.gradient", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL),
+	F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL),
 	F("node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass."),
 	F("node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum."),
 	F("node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force."), QUERN_END_USES };
@@ -93,6 +93,8 @@ static const quern_use gather_uses[] = { F("motion.velocity", "m/s", QUERN_READ,
 	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
 	F("point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL,
 		.doc = "Velocity gradient of the last step."),
+	F("point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL,
+		.doc = "The same, sent to the nodes with the velocity."),
 	F("point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
 		.doc = "Minus the mean normal stress."),
 	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,

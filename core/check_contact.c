@@ -1,0 +1,393 @@
+/* check_contact - laws between two grains: action and reaction, silence when apart, no energy out of nothing */
+#include "check.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { OVERLAP, NORMAL, VELOCITY, SPIN, TURN, RADIUS, MASS, FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED };
+
+static void call(const check_kernel *k, const check_batch *b) {
+	const quern_contact_ops *ops = k->ops;
+	const uint32_t dim = k->dim, turns = check_axial(dim);
+	quern_column use[CHECK_ROWS], use_second[CHECK_ROWS];
+	quern_contact_batch batch = { .n = b->n, .cap = b->cap, .dt = k->dt, .use = use, .use_second = use_second };
+	batch.overlap = check_at(k, b, OVERLAP, 0);
+	batch.radius = check_at(k, b, RADIUS, 0);
+	batch.mass = check_at(k, b, MASS, 0);
+	CHECK_VECTOR(batch.normal, k, b, NORMAL, dim);
+	CHECK_VECTOR(batch.velocity, k, b, VELOCITY, dim);
+	CHECK_VECTOR(batch.spin, k, b, SPIN, turns);
+	CHECK_VECTOR(batch.turn, k, b, TURN, dim == 3 ? 3u : 0u);
+	CHECK_VECTOR(batch.force, k, b, FORCE, dim);
+	CHECK_VECTOR(batch.couple, k, b, COUPLE, turns);
+	CHECK_VECTOR(batch.dashpot, k, b, DASHPOT, dim);
+	batch.stored = check_at(k, b, STORED, 0);
+	batch.sheared = check_at(k, b, SHEARED, 0);
+	batch.rubbed = check_at(k, b, RUBBED, 0);
+	check_columns(k, b, k->use, use);
+	check_columns(k, b, k->use_second, use_second);
+	ops->force[dim - 2](k->instance->self, &batch);
+}
+
+static bool uses_field(const check *c, const check_instance *it, const char *field) {
+	for (const quern_use *row = c->file->uses; row->field; row++)
+		if (!strcmp(row->field, field) && check_counts(c, it, row)) return true;
+	return false;
+}
+
+static quern_real step_of(const check_kernel *k) {
+	const quern_contact_ops *ops = k->ops;
+	const quern_real period =
+		ops->period ? ops->period(k->instance->self, k->dim, check_given(k, MASS, 0)[0], check_given(k, RADIUS, 0)[0])
+					: 0;
+	return period > 0 && isfinite(period) ? period / 50 : 1e-6;
+}
+
+/* Pairs of discs or spheres of 0.5 to 1.5 mm; every fifth is open. */
+static void fill_pairs(const check_kernel *k, uint64_t key) {
+	for (uint32_t i = 0; i < k->n; i++) {
+		double m[2], r[2], n[3];
+		for (uint32_t s = 0; s < 2; s++) {
+			r[s] = check_uniform(key, 2 * i + s, 0.5e-3, 1.5e-3);
+			m[s] = 2500 * 3.141592653589793 * r[s] * r[s] * (k->dim == 3 ? 4.0 / 3 * r[s] : 1);
+		}
+		check_given(k, RADIUS, 0)[i] = r[0] * r[1] / (r[0] + r[1]);
+		check_given(k, MASS, 0)[i] = m[0] * m[1] / (m[0] + m[1]);
+		check_given(k, OVERLAP, 0)[i] = (i % 5 ? 1 : -1) * check_uniform(key + 1, i, 0, 0.01) * r[0];
+		check_direction(k->dim, key + 2, i, n);
+		for (uint32_t c = 0; c < k->dim; c++) check_given(k, NORMAL, c)[i] = n[c];
+	}
+	check_fill(k, VELOCITY, k->dim, key + 3, -0.1, 0.1);
+}
+
+/* Relative and mean spin, from each body's where the law reads it. */
+static void fill_spins(const check_kernel *k, uint64_t key) {
+	const uint32_t turns = check_axial(k->dim);
+	const quern_use *rows = k->check->file->uses;
+	for (uint32_t c = 0; c < turns; c++)
+		for (uint32_t i = 0; i < k->n; i++) {
+			double first = check_uniform(key, c * 65536 + i, -20, 20),
+				   second = check_uniform(key + 1, c * 65536 + i, -20, 20);
+			for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
+				if (k->use[r] < 0 || k->use_second[r] < 0 || strcmp(rows[r].field, "grain.spin") != 0) continue;
+				((quern_real *)k->column[k->use[r] + (int)c].given)[i] = first;
+				((quern_real *)k->column[k->use_second[r] + (int)c].given)[i] = second;
+			}
+			check_given(k, SPIN, c)[i] = first - second;
+			if (k->dim == 3) check_given(k, TURN, c)[i] = 0.5 * (first + second);
+		}
+}
+
+enum { WITH_SPIN = 1, WITH_ENERGY = 2, VARIANTS = 4 };
+
+static void add_columns(const check *c, const check_instance *it, uint32_t variant, check_kernel *k) {
+	const uint32_t dim = it->dim, turns = check_axial(dim);
+	check_add(k, OVERLAP, "overlap", CHECK_IN, 1);
+	check_add(k, NORMAL, "normal", CHECK_IN, dim);
+	check_add(k, VELOCITY, "velocity", CHECK_IN, dim);
+	check_add(k, RADIUS, "radius", CHECK_IN, 1);
+	check_add(k, MASS, "mass", CHECK_IN, 1);
+	check_add(k, FORCE, "force", CHECK_CHANGED, dim);
+	check_add_uses(k, 0, variant & WITH_SPIN, true);
+	if (variant & WITH_SPIN || uses_field(c, it, "grain.spin")) {
+		check_add(k, SPIN, "spin", CHECK_IN, turns);
+		if (dim == 3) check_add(k, TURN, "turn", CHECK_IN, 3);
+		fill_spins(k, 40);
+	}
+	if (uses_field(c, it, "contact.couple")) check_add(k, COUPLE, "couple", CHECK_CHANGED, turns);
+	if (!(variant & WITH_ENERGY)) return;
+	check_add(k, DASHPOT, "dashpot", CHECK_CHANGED, dim);
+	check_add(k, STORED, "stored", CHECK_CHANGED, 1);
+	check_add(k, SHEARED, "sheared", CHECK_CHANGED, 1);
+	check_add(k, RUBBED, "rubbed", CHECK_CHANGED, 1);
+}
+
+/* Forces and energies are added to; between steps they begin at zero again, while histories go on. */
+static void clear_sums(const check_kernel *k) {
+	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED };
+	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++) {
+		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT ? k->dim : sums[s] == COUPLE ? check_axial(k->dim) : 1;
+		for (uint32_t c = 0; k->at[sums[s]] >= 0 && c < count; c++)
+			memset(check_given(k, sums[s], c), 0, k->n * sizeof(quern_real));
+	}
+}
+
+static void next_step(check_kernel *k) {
+	check_run(k, 512, NULL);
+	check_advance(k);
+	clear_sums(k);
+}
+
+static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
+	if (variant >= VARIANTS) return false;
+	check_kernel_init(k, c, it, "force", n);
+	k->call = call;
+	add_columns(c, it, variant, k);
+	fill_pairs(k, 20);
+	k->dt = step_of(k);
+	for (int step = 0; step < 3; step++) next_step(k);
+	return true;
+}
+
+/* ---- what must hold ---- */
+
+static double size_of(const check_kernel *k, int name, uint32_t count, uint32_t i) {
+	double sum = 0;
+	for (uint32_t c = 0; k->at[name] >= 0 && c < count; c++) sum += pow(check_found(k, name, c)[i], 2);
+	return sqrt(sum);
+}
+
+static void negate(const check_kernel *k, int name, uint32_t count) {
+	for (uint32_t c = 0; k->at[name] >= 0 && c < count; c++)
+		for (uint32_t i = 0; i < k->n; i++) check_given(k, name, c)[i] *= -1;
+}
+
+/* The same pairs named the other way round. */
+static void exchange(check_kernel *k) {
+	negate(k, NORMAL, k->dim);
+	negate(k, VELOCITY, k->dim);
+	negate(k, SPIN, check_axial(k->dim));
+	for (int r = 0; r < CHECK_ROWS; r++)
+		if (k->use[r] >= 0 && k->use_second[r] >= 0) {
+			const int first = k->use[r];
+			k->use[r] = k->use_second[r];
+			k->use_second[r] = first;
+		}
+}
+
+static void reaction(check_kernel *k, check_kernel *other, check_tally *t) {
+	exchange(other);
+	for (int step = 0; step < 8; step++) {
+		check_run(k, 512, NULL);
+		check_run(other, 512, NULL);
+		for (uint32_t i = 0; i < k->n; i++) {
+			const double force = size_of(k, FORCE, k->dim, i) + 1e-30,
+						 couple = size_of(k, COUPLE, check_axial(k->dim), i) + 1e-30;
+			for (uint32_t c = 0; c < k->dim; c++)
+				check_measure(t, fabs(check_found(k, FORCE, c)[i] + check_found(other, FORCE, c)[i]) / force, 1e-10,
+					"%u-D: the force on the second body is not minus that on the first: %.9g and %.9g N", k->dim,
+					check_found(k, FORCE, c)[i], check_found(other, FORCE, c)[i]);
+			for (uint32_t c = 0; k->at[COUPLE] >= 0 && c < check_axial(k->dim); c++)
+				check_measure(t, fabs(check_found(k, COUPLE, c)[i] + check_found(other, COUPLE, c)[i]) / couple,
+					1e-10, "%u-D: the couple on the second body is not minus that on the first", k->dim);
+		}
+		check_advance(k), clear_sums(k);
+		check_advance(other), clear_sums(other);
+	}
+}
+
+/* A law adds: what stood there stays. */
+static void addition(check_kernel *k, check_tally *t) {
+	check_run(k, 512, NULL);
+	quern_real *alone = malloc(k->n * sizeof(quern_real));
+	if (!alone) abort();
+	memcpy(alone, check_found(k, FORCE, 0), k->n * sizeof(quern_real));
+	for (uint32_t i = 0; i < k->n; i++) check_given(k, FORCE, 0)[i] = 3;
+	check_run(k, 512, NULL);
+	for (uint32_t i = 0; i < k->n; i++)
+		check_measure(t, fabs(check_found(k, FORCE, 0)[i] - alone[i] - 3) / (fabs(alone[i]) + 3), 1e-14,
+			"%u-D: the force is written over what another law has added", k->dim);
+	clear_sums(k);
+	free(alone);
+}
+
+static void apart(check_kernel *k, check_tally *t) {
+	const quern_contact_ops *ops = k->ops;
+	const quern_use *rows = k->check->file->uses;
+	for (uint32_t i = 0; i < k->n; i++) {
+		const quern_real radius = check_given(k, RADIUS, 0)[i];
+		const quern_real reach = ops->reach ? ops->reach(k->instance->self, radius) : 0;
+		check_given(k, OVERLAP, 0)[i] = -reach - (i % 3 ? 1e-3 * radius : 0);
+	}
+	next_step(k);
+	check_run(k, 512, NULL);
+	for (uint32_t i = 0; i < k->n; i++) {
+		const bool silent = size_of(k, FORCE, k->dim, i) == 0 && size_of(k, COUPLE, check_axial(k->dim), i) == 0;
+		check_expect(t, silent, "%u-D: a force of %.3g N between bodies that are apart", k->dim,
+			size_of(k, FORCE, k->dim, i));
+	}
+	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
+		if (k->use[r] < 0 || rows[r].access == QUERN_READ || strncmp(rows[r].field, "contact.", 8) != 0) continue;
+		for (uint32_t c = 0; c < check_components(rows[r].shape, k->dim); c++)
+			for (uint32_t i = 0; i < k->n; i++) {
+				const quern_real is = ((const quern_real *)k->column[k->use[r] + (int)c].found)[i];
+				check_expect(t, is == rows[r].initial || (c && is == 0), "%u-D: %s of bodies apart is %.3g, not as new",
+					k->dim, rows[r].field, is);
+			}
+	}
+}
+
+static void losses(check_kernel *k, check_tally *t) {
+	for (int step = 0; step < 8; step++) {
+		check_run(k, 512, NULL);
+		for (uint32_t i = 0; i < k->n; i++) {
+			double power = 0, scale = 1e-300, speed = 0;
+			for (uint32_t c = 0; c < k->dim; c++) {
+				power += check_found(k, DASHPOT, c)[i] * check_given(k, VELOCITY, c)[i];
+				speed += fabs(check_given(k, VELOCITY, c)[i]);
+			}
+			scale += speed * (size_of(k, FORCE, k->dim, i) + size_of(k, DASHPOT, k->dim, i));
+			check_measure(t, power / scale, 1e-12, "%u-D: the dashpot drives the bodies, with %.3g W", k->dim, power);
+			check_expect(t, check_found(k, STORED, 0)[i] >= 0 && check_found(k, SHEARED, 0)[i] >= 0,
+				"%u-D: a spring stores %.3g J", k->dim, check_found(k, STORED, 0)[i]);
+		}
+		check_advance(k), clear_sums(k);
+	}
+}
+
+/* ---- whole impacts ---- */
+
+typedef struct {
+	double x[3], v[3], w[2][3], r[2], m[2], energy;
+} impact;
+
+static double motion_energy(const check_kernel *k, const impact *p) {
+	const double m = p->m[0] * p->m[1] / (p->m[0] + p->m[1]), share = k->dim == 2 ? 0.5 : 0.4;
+	double sum = 0;
+	for (uint32_t c = 0; c < k->dim; c++) sum += 0.5 * m * p->v[c] * p->v[c];
+	for (uint32_t s = 0; s < 2; s++)
+		for (uint32_t c = 0; c < 3; c++) sum += 0.5 * share * p->m[s] * p->r[s] * p->r[s] * p->w[s][c] * p->w[s][c];
+	return sum;
+}
+
+static void cross(const double a[3], const double b[3], double out[3]) {
+	for (int c = 0; c < 3; c++) out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+}
+
+static void begin_impact(const check_kernel *k, uint32_t i, impact *p) {
+	double n[3];
+	*p = (impact) { .energy = 0 };
+	check_direction(k->dim, 70, i, n);
+	for (uint32_t s = 0; s < 2; s++) {
+		p->r[s] = check_uniform(71 + s, i, 0.5e-3, 1.5e-3);
+		p->m[s] = 2500 * 3.141592653589793 * p->r[s] * p->r[s] * (k->dim == 3 ? 4.0 / 3 * p->r[s] : 1);
+		for (uint32_t c = k->dim == 3 ? 0 : 2; c < 3 && k->at[SPIN] >= 0; c++)
+			p->w[s][c] = check_uniform(73 + s, c * 65536 + i, -50, 50);
+	}
+	for (uint32_t c = 0; c < k->dim; c++) {
+		p->x[c] = n[c] * (p->r[0] + p->r[1]) * (1 + 1e-9);
+		p->v[c] = -0.1 * n[c] + check_uniform(75, c * 65536 + i, -0.05, 0.05);
+	}
+	p->energy = motion_energy(k, p);
+}
+
+/* First minus second; b = -arm n for the first, +arm n for the second. Returns the overlap. */
+static void give_impact(const check_kernel *k, uint32_t i, const impact *p, double n[3], double arm[2]) {
+	double length = 0, spin[3], drift[3];
+	for (uint32_t c = 0; c < 3; c++) length += p->x[c] * p->x[c];
+	length = sqrt(length);
+	const double overlap = p->r[0] + p->r[1] - length;
+	for (uint32_t c = 0; c < 3; c++) n[c] = p->x[c] / length;
+	for (uint32_t s = 0; s < 2; s++) arm[s] = p->r[s] - 0.5 * overlap;
+	for (uint32_t c = 0; c < 3; c++) spin[c] = -arm[0] * p->w[0][c] - arm[1] * p->w[1][c];
+	cross(spin, n, drift);
+	check_given(k, OVERLAP, 0)[i] = overlap;
+	check_given(k, RADIUS, 0)[i] = p->r[0] * p->r[1] / (p->r[0] + p->r[1]);
+	check_given(k, MASS, 0)[i] = p->m[0] * p->m[1] / (p->m[0] + p->m[1]);
+	for (uint32_t c = 0; c < k->dim; c++) {
+		check_given(k, NORMAL, c)[i] = n[c];
+		check_given(k, VELOCITY, c)[i] = p->v[c] + drift[c];
+	}
+	const uint32_t from = k->dim == 3 ? 0 : 2;
+	for (uint32_t c = from; c < 3 && k->at[SPIN] >= 0; c++) {
+		check_given(k, SPIN, c - from)[i] = p->w[0][c] - p->w[1][c];
+		if (k->dim == 3) check_given(k, TURN, c)[i] = 0.5 * (p->w[0][c] + p->w[1][c]);
+	}
+}
+
+static void take_impact(const check_kernel *k, uint32_t i, impact *p, const double n[3], const double arm[2]) {
+	const double m = p->m[0] * p->m[1] / (p->m[0] + p->m[1]), share = k->dim == 2 ? 0.5 : 0.4;
+	const uint32_t from = k->dim == 3 ? 0 : 2;
+	double f[3] = { 0 }, torque[3];
+	for (uint32_t c = 0; c < k->dim; c++) f[c] = check_found(k, FORCE, c)[i];
+	cross(f, n, torque); /* b x f = -arm n x f */
+	for (uint32_t s = 0; s < 2; s++)
+		for (uint32_t c = from; c < 3 && k->at[SPIN] >= 0; c++) {
+			const double couple = k->at[COUPLE] < 0 ? 0 : (s ? -1 : 1) * check_found(k, COUPLE, c - from)[i];
+			p->w[s][c] += k->dt * (arm[s] * torque[c] + couple) / (share * p->m[s] * p->r[s] * p->r[s]);
+		}
+	for (uint32_t c = 0; c < k->dim; c++) {
+		p->v[c] += k->dt * f[c] / m;
+		p->x[c] += k->dt * p->v[c];
+	}
+}
+
+/* Impacts at all angles, from touching to apart: motion must not gain energy. */
+static void impacts(const check *c, const check_instance *it, check_tally *t) {
+	enum { PAIRS = 128, STEPS = 3000 };
+	check_kernel *k = malloc(sizeof *k);
+	impact *p = malloc(PAIRS * sizeof *p);
+	double(*n)[3] = malloc(PAIRS * sizeof *n), (*arm)[2] = malloc(PAIRS * sizeof *arm);
+	if (!k || !p || !n || !arm) abort();
+	check_kernel_init(k, c, it, "force in an impact", PAIRS);
+	k->call = call;
+	add_columns(c, it, 0, k);
+	for (uint32_t i = 0; i < PAIRS; i++) begin_impact(k, i, &p[i]), give_impact(k, i, &p[i], n[i], arm[i]);
+	k->dt = step_of(k) / 10;
+	for (uint32_t step = 0; step < STEPS; step++) {
+		for (uint32_t i = 0; i < PAIRS; i++) give_impact(k, i, &p[i], n[i], arm[i]);
+		next_step(k);
+		for (uint32_t i = 0; i < PAIRS; i++) take_impact(k, i, &p[i], n[i], arm[i]);
+	}
+	for (uint32_t i = 0; i < PAIRS; i++)
+		check_measure(t, motion_energy(k, &p[i]) / p[i].energy - 1, 5e-3, "%u-D: an impact ends with %.4f of its energy",
+			it->dim, motion_energy(k, &p[i]) / p[i].energy);
+	check_kernel_finish(k);
+	free(k), free(p), free(n), free(arm);
+}
+
+static void constants(const check_kernel *k, check_tally *t) {
+	const quern_contact_ops *ops = k->ops;
+	const quern_real mass = check_given(k, MASS, 0)[0], radius = check_given(k, RADIUS, 0)[0];
+	check_expect(t, ops->period != NULL, "there is no period, so nothing limits the step");
+	if (ops->period) {
+		const quern_real period = ops->period(k->instance->self, k->dim, mass, radius);
+		check_expect(t, period > 0 && isfinite(period), "%u-D: period is %.3g s", k->dim, period);
+	}
+	if (ops->stiffness) {
+		const quern_real stiffness = ops->stiffness(k->instance->self, k->dim, radius, 1);
+		check_expect(t, stiffness > 0 && isfinite(stiffness), "%u-D: stiffness is %.3g N/m", k->dim, stiffness);
+	}
+	if (ops->reach) {
+		const quern_real reach = ops->reach(k->instance->self, radius);
+		check_expect(t, reach >= 0 && isfinite(reach), "%u-D: reach is %.3g m", k->dim, reach);
+	}
+}
+
+static void law(const check *c) {
+	check_tally reacts = { .name = "action and reaction" }, adds = { .name = "laws add up" },
+				silent = { .name = "silence when apart" }, lost = { .name = "dashpots only take" },
+				whole = { .name = "impacts gain no energy" }, limits = { .name = "period, stiffness, reach" };
+	check_kernel *k = malloc(2 * sizeof *k);
+	if (!k) abort();
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		check_instance it;
+		if (check_has_dim(c, dim) && check_instance_create(c, dim, 0, &it) == CHECK_READY) {
+			/* from the first touch on, since a history need not turn round with the pair */
+			for (int i = 0; i < 2; i++) {
+				check_kernel_init(&k[i], c, &it, "force", 500);
+				k[i].call = call;
+				add_columns(c, &it, WITH_ENERGY, &k[i]);
+				fill_pairs(&k[i], 30);
+				k[i].dt = step_of(&k[i]);
+			}
+			constants(k, &limits);
+			reaction(&k[0], &k[1], &reacts);
+			addition(&k[0], &adds);
+			losses(&k[0], &lost);
+			apart(&k[0], &silent);
+			check_kernel_finish(&k[0]), check_kernel_finish(&k[1]);
+			impacts(c, &it, &whole);
+		}
+		if (check_has_dim(c, dim)) check_instance_finish(c, &it);
+	}
+	check_tell(c, &limits, NULL);
+	check_tell(c, &reacts, NULL);
+	check_tell(c, &adds, NULL);
+	check_tell(c, &silent, NULL);
+	check_tell(c, &lost, NULL);
+	check_tell(c, &whole, NULL);
+	free(k);
+}
+
+const check_kind check_contact = { .make = make, .law = law };

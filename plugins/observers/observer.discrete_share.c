@@ -1,0 +1,34 @@
+/* observer.discrete_share - the share of the mass that grains carry: sum of w m over all carried mass */
+#include "observers.h"
+
+typedef struct {
+	int32_t unused;
+} observer;
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { CLOUD_USES, QUERN_END_USES };
+static const quern_output outputs[] = { { .name = "share", .unit = "1", .doc = "Of the carried mass, by grains." },
+	{ .name = NULL } };
+
+static quern_status whole(
+	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+	quern_real grains = 0, points = 0;
+	(void)self;
+	CLOUD_SUM(b, host, run, false, i, 1, grains);
+	CLOUD_SUM(b, host, run, true, i, 1, points);
+	out[0] = grains + points > 0 ? grains / (grains + points) : 0;
+	return QUERN_OK;
+}
+
+static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, .whole = whole };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_OBSERVER,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "observer.discrete_share",
+	.brief = "The share of the mass that grains carry.",
+	.doc = "The summary's discrete_share is its mean over the observations.",
+	.instance_size = sizeof(observer),
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

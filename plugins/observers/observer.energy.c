@@ -1,0 +1,93 @@
+/* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section 5 */
+#include "observers.h"
+
+typedef struct {
+	int32_t unused;
+} observer;
+static const quern_param params[] = { QUERN_END_PARAMS };
+enum {
+	GRAIN_POSITION = CLOUD_ROWS,
+	GRAIN_VELOCITY,
+	GRAIN_SPIN,
+	GRAIN_RADIUS,
+	POINT_POSITION,
+	POINT_VELOCITY,
+	POINT_ENERGY,
+	STORED,
+	SHEARED,
+	DAMPED,
+	RUBBED,
+	EXCHANGED,
+	CONTACT_SHEARED,
+	TOUCH_SHEARED
+};
+#define LOOK(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_OPTIONAL)
+#define WANT(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_WANTED)
+static const quern_use uses[] = { CLOUD_USES, LOOK("grain.position", "m", QUERN_VECTOR),
+	LOOK("grain.velocity", "m/s", QUERN_VECTOR), LOOK("grain.spin", "rad/s", QUERN_AXIAL),
+	LOOK("grain.radius", "m", QUERN_SCALAR), LOOK("point.position", "m", QUERN_VECTOR),
+	LOOK("point.velocity", "m/s", QUERN_VECTOR), WANT("point.energy", "J/kg", QUERN_SCALAR),
+	WANT("total.stored", "J", QUERN_SCALAR), WANT("total.sheared", "J", QUERN_SCALAR),
+	WANT("total.damped", "J", QUERN_SCALAR), WANT("total.rubbed", "J", QUERN_SCALAR),
+	WANT("total.exchanged", "J", QUERN_SCALAR), WANT("contact.sheared", "J", QUERN_SCALAR),
+	WANT("touch.sheared", "J", QUERN_SCALAR), QUERN_END_USES };
+
+enum { KINETIC, SPINNING, POINTS, POTENTIAL, SPRINGS, TANGENTIAL, ELASTIC, DASHPOTS, SLIDING, COUPLING, SUM };
+static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = "Kinetic, of grains." },
+	{ .name = "spin", .unit = "J", .doc = "Kinetic, of their rotation." },
+	{ .name = "points", .unit = "J", .doc = "Kinetic, of points." },
+	{ .name = "potential", .unit = "J", .doc = "-m g x of both." },
+	{ .name = "stored", .unit = "J", .doc = "In normal springs of contacts." },
+	{ .name = "sheared", .unit = "J", .doc = "In tangential springs of contacts." },
+	{ .name = "elastic", .unit = "J", .doc = "In points." },
+	{ .name = "damped", .unit = "J", .doc = "Lost in dashpots so far." },
+	{ .name = "rubbed", .unit = "J", .doc = "Lost to sliding contacts so far." },
+	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
+	{ .name = "budget", .unit = "J", .doc = "All of it: constant for grains alone." }, { .name = NULL } };
+
+static quern_real square(const quern_column *c, uint32_t i, uint32_t n) {
+	quern_real sum = 0;
+	for (uint32_t k = 0; k < n; k++) sum += c->real[k][i] * c->real[k][i];
+	return sum;
+}
+static quern_real height(const quern_observer_batch *b, const quern_column *x, uint32_t i) {
+	quern_real sum = 0;
+	for (uint32_t k = 0; k < b->dim; k++) sum -= b->gravity[k] * x->real[k][i];
+	return sum;
+}
+
+static quern_status whole(
+	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+	const quern_column *u = b->use;
+	const uint32_t turns = b->dim == 3 ? 3 : 1;
+	(void)self;
+	CLOUD_SUM(b, host, run, false, i, 0.5 * square(&u[GRAIN_VELOCITY], i, b->dim), out[KINETIC]);
+	if (u[GRAIN_SPIN].real[0])
+		CLOUD_SUM(b, host, run, false, i,
+			(b->dim == 2 ? 0.25 : 0.2) * u[GRAIN_RADIUS].real[0][i] * u[GRAIN_RADIUS].real[0][i] *
+				square(&u[GRAIN_SPIN], i, turns),
+			out[SPINNING]);
+	CLOUD_SUM(b, host, run, true, i, 0.5 * square(&u[POINT_VELOCITY], i, b->dim), out[POINTS]);
+	CLOUD_SUM(b, host, run, false, i, height(b, &u[GRAIN_POSITION], i), out[POTENTIAL]);
+	CLOUD_SUM(b, host, run, true, i, height(b, &u[POINT_POSITION], i), out[POTENTIAL]);
+	if (u[POINT_ENERGY].real[0]) CLOUD_SUM(b, host, run, true, i, u[POINT_ENERGY].real[0][i], out[ELASTIC]);
+	const int rows[] = { STORED, SHEARED, DAMPED, RUBBED, EXCHANGED },
+			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
+	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;
+	for (int k = 0; k < SUM; k++) out[SUM] += out[k];
+	return QUERN_OK;
+}
+
+static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, .whole = whole };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_OBSERVER,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "observer.energy",
+	.brief = "Energy by kind: what there is and what was lost.",
+	.doc = "Makes the contact laws book what their springs hold and what dashpots and sliding take.",
+	.instance_size = sizeof(observer),
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,0 +1,59 @@
+/* observer.ledger - what grains and continuum owe each other, and how well mass is carried. docs/theory/hybrid.md, 5 */
+#include "observers.h"
+#include <math.h>
+
+typedef struct {
+	int32_t unused;
+} observer;
+static const quern_param params[] = { QUERN_END_PARAMS };
+enum { GRAIN_OWED = CLOUD_ROWS, POINT_OWED, MASS, MASS_DEFECT, MOMENTUM_DEFECT, EXCHANGE_DEFECT };
+static const quern_use uses[] = { CLOUD_USES,
+	F("cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
+	F("cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
+	F("total.mass_initial", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
+	F("total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
+	F("total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
+	F("total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
+static const quern_output outputs[] = { { .name = "entries", .unit = "1", .doc = "Sum of |entries| over the mass." },
+	{ .name = "carried", .unit = "1", .doc = "Carried mass over that at the release, minus 1." },
+	{ .name = "grains_owed", .unit = "kg", .doc = "Owed to the grains." },
+	{ .name = "points_owed", .unit = "kg", .doc = "Owed to the continuum." },
+	{ .name = "mass_defect", .unit = "1", .doc = "Of the mass invariant: the worst so far." },
+	{ .name = "momentum_defect", .unit = "1", .doc = "Of the momentum invariant: the worst so far." },
+	{ .name = "exchange_defect", .unit = "1", .doc = "Of the coupling's momentum, in the last step: the worst node." },
+	{ .name = NULL } };
+
+/* Without a hybrid there is no ledger: nothing is owed, nothing is missing. */
+static quern_status whole(
+	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+	const quern_column *u = b->use;
+	const uint32_t n = u[GRAIN_OWED].real[0] ? b->count[GRAIN_OWED] : 0;
+	quern_real mass = 0, *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
+	(void)self;
+	if (!u[GRAIN_OWED].real[0] || !(u[MASS].real[0][0] > 0)) return QUERN_OK;
+	if (!size) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < n; i++) size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
+	CLOUD_SUM(b, host, run, false, i, 1, mass);
+	CLOUD_SUM(b, host, run, true, i, 1, mass);
+	out[0] = host->sum(run, n, size) / u[MASS].real[0][0];
+	out[1] = mass / u[MASS].real[0][0] - 1;
+	out[2] = host->sum(run, n, u[GRAIN_OWED].real[0]);
+	out[3] = host->sum(run, n, u[POINT_OWED].real[0]);
+	for (int k = 0; k < 3; k++) out[4 + k] = u[MASS_DEFECT + k].real[0][0];
+	return QUERN_OK;
+}
+
+static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, .whole = whole };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_OBSERVER,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "observer.ledger",
+	.brief = "What grains and continuum owe each other.",
+	.doc = "The invariants hold to round-off by honest booking; the entries and the carried mass measure quality.",
+	.cite = "Chantharayukhonthorn 2019, 6.1",
+	.instance_size = sizeof(observer),
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,0 +1,37 @@
+/* observer.momentum - the momentum that grains and points carry together */
+#include "observers.h"
+
+typedef struct {
+	int32_t unused;
+} observer;
+static const quern_param params[] = { QUERN_END_PARAMS };
+enum { GRAIN_VELOCITY = CLOUD_ROWS, POINT_VELOCITY };
+static const quern_use uses[] = { CLOUD_USES,
+	F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
+	F("point.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
+static const quern_output outputs[] = { { .name = "x", .unit = "kg m/s", .doc = "Along x." },
+	{ .name = "y", .unit = "kg m/s", .doc = "Along y." },
+	{ .name = "z", .unit = "kg m/s", .doc = "Along z; 0 in 2-D." }, { .name = NULL } };
+
+static quern_status whole(
+	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+	(void)self;
+	for (uint32_t k = 0; k < b->dim; k++) {
+		CLOUD_SUM(b, host, run, false, i, b->use[GRAIN_VELOCITY].real[k][i], out[k]);
+		CLOUD_SUM(b, host, run, true, i, b->use[POINT_VELOCITY].real[k][i], out[k]);
+	}
+	return QUERN_OK;
+}
+
+static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, .whole = whole };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.kind = QUERN_OBSERVER,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "observer.momentum",
+	.brief = "The momentum that grains and points carry.",
+	.instance_size = sizeof(observer),
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");
