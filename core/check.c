@@ -44,7 +44,8 @@ void check_expect(check_tally *t, bool good, const char *fmt, ...) {
 void check_measure(check_tally *t, double value, double allowed, const char *fmt, ...) {
 	va_list list;
 	t->tried++;
-	if (!(value * t->allowed <= t->worst * allowed) || !(t->allowed > 0)) t->worst = value, t->allowed = allowed;
+	if (!(value * t->allowed <= t->worst * allowed) || !(t->allowed > 0))
+		t->worst = value, t->allowed = allowed;
 	if (value <= allowed) return;
 	va_start(list, fmt);
 	note_failure(t, fmt, list);
@@ -53,8 +54,7 @@ void check_measure(check_tally *t, double value, double allowed, const char *fmt
 
 void check_tell(const check *c, const check_tally *t, const char *note, ...) {
 	quern_text text = { 0 };
-	if (t->failed)
-		quern_text_add(&text, "%s (%u of %u cases)", t->first, t->failed, t->tried);
+	if (t->failed) quern_text_add(&text, "%s (%u of %u cases)", t->first, t->failed, t->tried);
 	else if (note) {
 		va_list list;
 		va_start(list, note);
@@ -149,8 +149,9 @@ static void fill_row(check_kernel *k, const quern_use *row, int first, uint64_t 
 		for (uint32_t c = 0; c < count; c++) {
 			const check_column *column = &k->column[first + (int)c];
 			const bool diagonal = (row->shape == QUERN_TENSOR && c % (k->dim + 1) == 0) ||
-								  (row->shape == QUERN_SYMMETRIC && c < k->dim) || row->shape < QUERN_SYMMETRIC;
-			const double x = fresh ? (diagonal ? row->initial : 0)
+								  (row->shape == QUERN_SYMMETRIC && c < k->dim) ||
+								  row->shape < QUERN_SYMMETRIC;
+			const double x = fresh  ? (diagonal ? row->initial : 0)
 							 : unit ? direction[c]
 							 : row->shape == QUERN_SCALAR
 								 ? check_uniform(key, (uint64_t)c << 32 | i, 0.5 * size, 1.5 * size)
@@ -192,7 +193,8 @@ void check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) 
 	}
 }
 
-void check_columns(const check_kernel *k, const check_batch *b, const int *use, quern_column out[CHECK_ROWS]) {
+void check_columns(
+	const check_kernel *k, const check_batch *b, const int *use, quern_column out[CHECK_ROWS]) {
 	const quern_use *rows = k->check->file->uses;
 	for (uint32_t r = 0; r < CHECK_ROWS; r++) out[r] = (quern_column) { .real = { NULL } };
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
@@ -221,7 +223,8 @@ static uint32_t control_word(void) {
 	return (__builtin_ia32_stmxcsr() & ~63u) ^ (uint32_t)x87 << 16;
 }
 
-static void load_column(const check_column *c, char *to, uint32_t begin, uint32_t n, uint32_t cap, size_t stride) {
+static void load_column(
+	const check_column *c, char *to, uint32_t begin, uint32_t n, uint32_t cap, size_t stride) {
 	const size_t size = entry_bytes(c);
 	memset(to - GUARD, POISON, stride);
 	if (c->role == CHECK_OUT) {
@@ -239,8 +242,8 @@ static bool is_poison(const char *bytes, size_t n) {
 	return true;
 }
 
-static void store_column(
-	runner *r, uint32_t worker, const check_column *c, const char *from, uint32_t begin, uint32_t n, uint32_t cap) {
+static void store_column(runner *r, uint32_t worker, const check_column *c, const char *from, uint32_t begin,
+	uint32_t n, uint32_t cap) {
 	const size_t size = entry_bytes(c);
 	const size_t after = r->stride - GUARD - cap * size;
 	if (!is_poison(from - GUARD, GUARD) || !is_poison(from + cap * size, after))
@@ -314,7 +317,8 @@ void check_carry(const check_kernel *from, check_kernel *to) {
 		for (uint32_t q = 0; rows[q].field && q < CHECK_ROWS; q++) {
 			if (from->use[r] < 0 || to->use[q] < 0 || strcmp(rows[r].field, rows[q].field) != 0) continue;
 			for (uint32_t c = 0; c < check_components(rows[r].shape, from->dim); c++) {
-				const check_column *a = &from->column[from->use[r] + (int)c], *b = &to->column[to->use[q] + (int)c];
+				const check_column *a = &from->column[from->use[r] + (int)c],
+								   *b = &to->column[to->use[q] + (int)c];
 				if (a->found) memcpy(b->given, a->found, from->n * entry_bytes(a));
 			}
 		}

@@ -3,6 +3,7 @@
  * A kernel is a function of a plugin that is called with batches, together with the columns it gets. Every call gets
  * copies of its own: cut as wished, padded with harmless lanes, with guards on both ends. */
 #pragma once
+#include "pool.h"
 #include "scene.h"
 
 /* What a child process tells its parent, in memory that both see. */
@@ -37,7 +38,8 @@ __attribute__((format(printf, 3, 4))) void check_expect(check_tally *, bool good
 __attribute__((format(printf, 4, 5))) void check_measure(
 	check_tally *, double value, double allowed, const char *fmt, ...);
 /* Prints the line: "ok  name: figure". `note` (printf-like, NULL: none) stands in place of the number of cases. */
-__attribute__((format(printf, 3, 4))) void check_tell(const check *, const check_tally *, const char *note, ...);
+__attribute__((format(printf, 3, 4))) void check_tell(
+	const check *, const check_tally *, const char *note, ...);
 
 /* ---- instances ---- */
 typedef struct check_instance {
@@ -136,8 +138,8 @@ typedef struct check_kind {
 	void (*law)(const check *); /* what must hold for this kind */
 } check_kind;
 
-extern const check_kind check_contact, check_material, check_shape, check_transfer, check_coupling, check_oracle,
-	check_packer, check_body, check_integrator, check_neighbours, check_observer;
+extern const check_kind check_contact, check_material, check_shape, check_transfer, check_coupling,
+	check_oracle, check_packer, check_body, check_integrator, check_neighbours, check_observer;
 
 void check_table(const check *);
 void check_solver(const check *);

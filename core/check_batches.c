@@ -52,19 +52,20 @@ static void try_kernel(check_kernel *k, batch_tallies *t, quern_pool *pool) {
 	for (size_t i = 0; i < sizeof cuts / sizeof *cuts; i++) {
 		check_run(k, cuts[i], NULL);
 		const char *column = differs(k, &whole);
-		check_expect(&t->batches, !column, "%s, %u-D: %s differs between batches of 512 and of %u", k->name, k->dim,
-			column, cuts[i]);
+		check_expect(&t->batches, !column, "%s, %u-D: %s differs between batches of 512 and of %u", k->name,
+			k->dim, column, cuts[i]);
 	}
 	for (int turn = 0; turn < 8; turn++) {
 		check_run(k, 16, pool);
 		const char *column = differs(k, &whole);
-		check_expect(&t->threads, !column, "%s, %u-D: %s differs when several threads call it", k->name, k->dim,
-			column);
+		check_expect(&t->threads, !column, "%s, %u-D: %s differs when several threads call it", k->name,
+			k->dim, column);
 	}
 	const char *culprit = k->culprit ? k->culprit : "";
 	check_expect(&t->guards, !k->overrun, "%s, %u-D: writes beyond cap of %s", k->name, k->dim, culprit);
 	check_expect(&t->inputs, !k->changed, "%s, %u-D: changes its input %s", k->name, k->dim, culprit);
-	check_expect(&t->self, !k->altered, "%s, %u-D: changes self, which is read-only after init", k->name, k->dim);
+	check_expect(
+		&t->self, !k->altered, "%s, %u-D: changes self, which is read-only after init", k->name, k->dim);
 	check_expect(&t->environment, !k->environment, "%s, %u-D: changes rounding or another mode of arithmetic",
 		k->name, k->dim);
 	free(whole.bytes);
@@ -82,8 +83,8 @@ static void try_instance(const check *c, const check_kind *kind, const check_ins
 }
 
 void check_batches(const check *c, const check_kind *kind) {
-	batch_tallies t = { { .name = "batches" }, { .name = "threads" }, { .name = "guards" }, { .name = "inputs" },
-		{ .name = "self" }, { .name = "arithmetic" } };
+	batch_tallies t = { { .name = "batches" }, { .name = "threads" }, { .name = "guards" },
+		{ .name = "inputs" }, { .name = "self" }, { .name = "arithmetic" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
@@ -117,7 +118,8 @@ static bool gives_sense(const check *c, const check_kind *kind, const check_inst
 
 void check_parameters(const check *c, const check_kind *kind) {
 	enum { MIXTURES = 60 };
-	check_tally ordinary = { .name = "set-up" }, polite = { .name = "parameters" }, finite = { .name = "finite" };
+	check_tally ordinary = { .name = "set-up" }, polite = { .name = "parameters" },
+				finite = { .name = "finite" };
 	const uint64_t single = check_settings(c), n = c->file->n_params ? single + MIXTURES : 1;
 	uint32_t accepted = 0, refused = 0;
 	for (uint32_t dim = 2; dim <= 3; dim++)

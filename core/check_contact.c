@@ -10,7 +10,9 @@ static void call(const check_kernel *k, const check_batch *b) {
 	const quern_contact_ops *ops = k->ops;
 	const uint32_t dim = k->dim, turns = check_axial(dim);
 	quern_column use[CHECK_ROWS], use_second[CHECK_ROWS];
-	quern_contact_batch batch = { .n = b->n, .cap = b->cap, .dt = k->dt, .use = use, .use_second = use_second };
+	quern_contact_batch batch = {
+		.n = b->n, .cap = b->cap, .dt = k->dt, .use = use, .use_second = use_second
+	};
 	batch.overlap = check_at(k, b, OVERLAP, 0);
 	batch.radius = check_at(k, b, RADIUS, 0);
 	batch.mass = check_at(k, b, MASS, 0);
@@ -37,9 +39,9 @@ static bool uses_field(const check *c, const check_instance *it, const char *fie
 
 static quern_real step_of(const check_kernel *k) {
 	const quern_contact_ops *ops = k->ops;
-	const quern_real period =
-		ops->period ? ops->period(k->instance->self, k->dim, check_given(k, MASS, 0)[0], check_given(k, RADIUS, 0)[0])
-					: 0;
+	const quern_real period = ops->period ? ops->period(k->instance->self, k->dim, check_given(k, MASS, 0)[0],
+												check_given(k, RADIUS, 0)[0])
+										  : 0;
 	return period > 0 && isfinite(period) ? period / 50 : 1e-6;
 }
 
@@ -69,7 +71,8 @@ static void fill_spins(const check_kernel *k, uint64_t key) {
 			double first = check_uniform(key, c * 65536 + i, -20, 20),
 				   second = check_uniform(key + 1, c * 65536 + i, -20, 20);
 			for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
-				if (k->use[r] < 0 || k->use_second[r] < 0 || strcmp(rows[r].field, "grain.spin") != 0) continue;
+				if (k->use[r] < 0 || k->use_second[r] < 0 || strcmp(rows[r].field, "grain.spin") != 0)
+					continue;
 				((quern_real *)k->column[k->use[r] + (int)c].given)[i] = first;
 				((quern_real *)k->column[k->use_second[r] + (int)c].given)[i] = second;
 			}
@@ -106,7 +109,9 @@ static void add_columns(const check *c, const check_instance *it, uint32_t varia
 static void clear_sums(const check_kernel *k) {
 	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED };
 	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++) {
-		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT ? k->dim : sums[s] == COUPLE ? check_axial(k->dim) : 1;
+		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT ? k->dim
+							   : sums[s] == COUPLE                    ? check_axial(k->dim)
+																	  : 1;
 		for (uint32_t c = 0; k->at[sums[s]] >= 0 && c < count; c++)
 			memset(check_given(k, sums[s], c), 0, k->n * sizeof(quern_real));
 	}
@@ -164,12 +169,14 @@ static void reaction(check_kernel *k, check_kernel *other, check_tally *t) {
 			const double force = size_of(k, FORCE, k->dim, i) + 1e-30,
 						 couple = size_of(k, COUPLE, check_axial(k->dim), i) + 1e-30;
 			for (uint32_t c = 0; c < k->dim; c++)
-				check_measure(t, fabs(check_found(k, FORCE, c)[i] + check_found(other, FORCE, c)[i]) / force, 1e-10,
-					"%u-D: the force on the second body is not minus that on the first: %.9g and %.9g N", k->dim,
-					check_found(k, FORCE, c)[i], check_found(other, FORCE, c)[i]);
+				check_measure(t, fabs(check_found(k, FORCE, c)[i] + check_found(other, FORCE, c)[i]) / force,
+					1e-10,
+					"%u-D: the force on the second body is not minus that on the first: %.9g and %.9g N",
+					k->dim, check_found(k, FORCE, c)[i], check_found(other, FORCE, c)[i]);
 			for (uint32_t c = 0; k->at[COUPLE] >= 0 && c < check_axial(k->dim); c++)
-				check_measure(t, fabs(check_found(k, COUPLE, c)[i] + check_found(other, COUPLE, c)[i]) / couple,
-					1e-10, "%u-D: the couple on the second body is not minus that on the first", k->dim);
+				check_measure(t,
+					fabs(check_found(k, COUPLE, c)[i] + check_found(other, COUPLE, c)[i]) / couple, 1e-10,
+					"%u-D: the couple on the second body is not minus that on the first", k->dim);
 		}
 		check_advance(k), clear_sums(k);
 		check_advance(other), clear_sums(other);
@@ -202,17 +209,19 @@ static void apart(check_kernel *k, check_tally *t) {
 	next_step(k);
 	check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
-		const bool silent = size_of(k, FORCE, k->dim, i) == 0 && size_of(k, COUPLE, check_axial(k->dim), i) == 0;
+		const bool silent =
+			size_of(k, FORCE, k->dim, i) == 0 && size_of(k, COUPLE, check_axial(k->dim), i) == 0;
 		check_expect(t, silent, "%u-D: a force of %.3g N between bodies that are apart", k->dim,
 			size_of(k, FORCE, k->dim, i));
 	}
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
-		if (k->use[r] < 0 || rows[r].access == QUERN_READ || strncmp(rows[r].field, "contact.", 8) != 0) continue;
+		if (k->use[r] < 0 || rows[r].access == QUERN_READ || strncmp(rows[r].field, "contact.", 8) != 0)
+			continue;
 		for (uint32_t c = 0; c < check_components(rows[r].shape, k->dim); c++)
 			for (uint32_t i = 0; i < k->n; i++) {
 				const quern_real is = ((const quern_real *)k->column[k->use[r] + (int)c].found)[i];
-				check_expect(t, is == rows[r].initial || (c && is == 0), "%u-D: %s of bodies apart is %.3g, not as new",
-					k->dim, rows[r].field, is);
+				check_expect(t, is == rows[r].initial || (c && is == 0),
+					"%u-D: %s of bodies apart is %.3g, not as new", k->dim, rows[r].field, is);
 			}
 	}
 }
@@ -227,7 +236,8 @@ static void losses(check_kernel *k, check_tally *t) {
 				speed += fabs(check_given(k, VELOCITY, c)[i]);
 			}
 			scale += speed * (size_of(k, FORCE, k->dim, i) + size_of(k, DASHPOT, k->dim, i));
-			check_measure(t, power / scale, 1e-12, "%u-D: the dashpot drives the bodies, with %.3g W", k->dim, power);
+			check_measure(
+				t, power / scale, 1e-12, "%u-D: the dashpot drives the bodies, with %.3g W", k->dim, power);
 			check_expect(t, check_found(k, STORED, 0)[i] >= 0 && check_found(k, SHEARED, 0)[i] >= 0,
 				"%u-D: a spring stores %.3g J", k->dim, check_found(k, STORED, 0)[i]);
 		}
@@ -246,7 +256,8 @@ static double motion_energy(const check_kernel *k, const impact *p) {
 	double sum = 0;
 	for (uint32_t c = 0; c < k->dim; c++) sum += 0.5 * m * p->v[c] * p->v[c];
 	for (uint32_t s = 0; s < 2; s++)
-		for (uint32_t c = 0; c < 3; c++) sum += 0.5 * share * p->m[s] * p->r[s] * p->r[s] * p->w[s][c] * p->w[s][c];
+		for (uint32_t c = 0; c < 3; c++)
+			sum += 0.5 * share * p->m[s] * p->r[s] * p->r[s] * p->w[s][c] * p->w[s][c];
 	return sum;
 }
 
@@ -295,7 +306,8 @@ static void give_impact(const check_kernel *k, uint32_t i, const impact *p, doub
 	}
 }
 
-static void take_impact(const check_kernel *k, uint32_t i, impact *p, const double n[3], const double arm[2]) {
+static void take_impact(
+	const check_kernel *k, uint32_t i, impact *p, const double n[3], const double arm[2]) {
 	const double m = p->m[0] * p->m[1] / (p->m[0] + p->m[1]), share = k->dim == 2 ? 0.5 : 0.4;
 	const uint32_t from = k->dim == 3 ? 0 : 2;
 	double f[3] = { 0 }, torque[3];
@@ -330,8 +342,8 @@ static void impacts(const check *c, const check_instance *it, check_tally *t) {
 		for (uint32_t i = 0; i < PAIRS; i++) take_impact(k, i, &p[i], n[i], arm[i]);
 	}
 	for (uint32_t i = 0; i < PAIRS; i++)
-		check_measure(t, motion_energy(k, &p[i]) / p[i].energy - 1, 5e-3, "%u-D: an impact ends with %.4f of its energy",
-			it->dim, motion_energy(k, &p[i]) / p[i].energy);
+		check_measure(t, motion_energy(k, &p[i]) / p[i].energy - 1, 5e-3,
+			"%u-D: an impact ends with %.4f of its energy", it->dim, motion_energy(k, &p[i]) / p[i].energy);
 	check_kernel_finish(k);
 	free(k), free(p), free(n), free(arm);
 }
@@ -346,7 +358,8 @@ static void constants(const check_kernel *k, check_tally *t) {
 	}
 	if (ops->stiffness) {
 		const quern_real stiffness = ops->stiffness(k->instance->self, k->dim, radius, 1);
-		check_expect(t, stiffness > 0 && isfinite(stiffness), "%u-D: stiffness is %.3g N/m", k->dim, stiffness);
+		check_expect(
+			t, stiffness > 0 && isfinite(stiffness), "%u-D: stiffness is %.3g N/m", k->dim, stiffness);
 	}
 	if (ops->reach) {
 		const quern_real reach = ops->reach(k->instance->self, radius);

@@ -34,7 +34,8 @@ static void call(const check_kernel *k, const check_batch *b) {
 	(update ? ops->update : ops->assign)[k->dim - 2](k->instance->self, &batch);
 }
 
-static void create(const check *c, const check_instance *it, uint32_t hook, bool outputs, uint32_t n, check_kernel *k) {
+static void create(
+	const check *c, const check_instance *it, uint32_t hook, bool outputs, uint32_t n, check_kernel *k) {
 	const bool update = hook == QUERN_MATERIAL_UPDATE;
 	check_kernel_init(k, c, it, update ? "update" : "assign", n);
 	k->call = call;
@@ -125,7 +126,8 @@ typedef struct {
 
 static void check_moduli(const check_kernel *assign, tallies *t) {
 	const moduli m = moduli_of(assign);
-	check_expect(&t->moduli, m.bulk > 0 && m.shear >= 0 && m.density > 0 && isfinite(m.bulk + m.shear + m.density),
+	check_expect(&t->moduli,
+		m.bulk > 0 && m.shear >= 0 && m.density > 0 && isfinite(m.bulk + m.shear + m.density),
 		"%u-D: bulk %.3g Pa, shear %.3g Pa, density %.3g kg/m^3", assign->dim, m.bulk, m.shear, m.density);
 }
 
@@ -142,14 +144,15 @@ static void check_assign(const check *c, const check_instance *it, check_kernel 
 	for (uint32_t i = 0; i < k->n; i++) {
 		double pressure = 0;
 		for (uint32_t s = 0; s < stresses(k); s++)
-			check_measure(&t->again, fabs(check_found(again, STRESS, s)[i] - check_found(k, STRESS, s)[i]) /
-										 stress_size(k, i, true), 1e-10,
-				"%u-D: assign changes a stress that it has given back itself", k->dim);
+			check_measure(&t->again,
+				fabs(check_found(again, STRESS, s)[i] - check_found(k, STRESS, s)[i]) /
+					stress_size(k, i, true),
+				1e-10, "%u-D: assign changes a stress that it has given back itself", k->dim);
 		for (uint32_t s = 0; s < k->dim; s++) pressure -= check_found(k, STRESS, s)[i] / k->dim;
 		const double strain = log(check_found(k, DENSITY, 0)[i] / m.density);
 		check_measure(&t->moduli, fabs(strain * m.bulk - pressure) / (0.01 * pressure + 1e-12 * m.bulk), 1,
-			"%u-D: a pressure of %.4g Pa goes with a density of %.6g kg/m^3, which moduli() does not say", k->dim,
-			pressure, check_found(k, DENSITY, 0)[i]);
+			"%u-D: a pressure of %.4g Pa goes with a density of %.6g kg/m^3, which moduli() does not say",
+			k->dim, pressure, check_found(k, DENSITY, 0)[i]);
 	}
 	check_kernel_finish(again);
 	free(again);
@@ -162,14 +165,15 @@ static void check_rest(check_kernel *k, tallies *t) {
 	check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t c = 0; c < stresses(k); c++)
-			check_measure(&t->held, fabs(check_found(k, STRESS, c)[i] - check_given(k, STRESS, c)[i]) /
-										stress_size(k, i, false), 1e-9,
-				"%u-D: a point at rest turns a stress of %.9g Pa into %.9g", k->dim, check_given(k, STRESS, c)[i],
-				check_found(k, STRESS, c)[i]);
+			check_measure(&t->held,
+				fabs(check_found(k, STRESS, c)[i] - check_given(k, STRESS, c)[i]) / stress_size(k, i, false),
+				1e-9, "%u-D: a point at rest turns a stress of %.9g Pa into %.9g", k->dim,
+				check_given(k, STRESS, c)[i], check_found(k, STRESS, c)[i]);
 }
 
 /* Whatever the strain, the stress is one that assign lets stand. */
-static void check_yield(const check *c, const check_instance *it, check_kernel *k, double strain, tallies *t) {
+static void check_yield(
+	const check *c, const check_instance *it, check_kernel *k, double strain, tallies *t) {
 	check_kernel *assign = malloc(sizeof *assign);
 	const char *column = "";
 	if (!assign) abort();
@@ -177,16 +181,19 @@ static void check_yield(const check *c, const check_instance *it, check_kernel *
 	k->dt = 1e-4;
 	check_fill(k, GRADIENT, k->dim * k->dim, 67, -strain / k->dt, strain / k->dt);
 	check_run(k, 512, NULL);
-	check_expect(&t->violent, check_finite(k, &column), "%u-D: %s is not finite after a strain of %.2g in one step",
-		k->dim, column, strain);
+	check_expect(&t->violent, check_finite(k, &column),
+		"%u-D: %s is not finite after a strain of %.2g in one step", k->dim, column, strain);
 	hand_over(k, assign);
 	check_run(assign, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t s = 0; s < stresses(k); s++)
-			check_measure(&t->yields, fabs(check_found(assign, STRESS, s)[i] - check_found(k, STRESS, s)[i]) /
-										  (stress_size(k, i, true) + 1e-12 * moduli_of(k).bulk), 1e-9,
-				"%u-D: update leaves a stress beyond yield or a tension: %.6g Pa, of which assign leaves %.6g", k->dim,
-				check_found(k, STRESS, s)[i], check_found(assign, STRESS, s)[i]);
+			check_measure(&t->yields,
+				fabs(check_found(assign, STRESS, s)[i] - check_found(k, STRESS, s)[i]) /
+					(stress_size(k, i, true) + 1e-12 * moduli_of(k).bulk),
+				1e-9,
+				"%u-D: update leaves a stress beyond yield or a tension: %.6g Pa, of which assign leaves "
+				"%.6g",
+				k->dim, check_found(k, STRESS, s)[i], check_found(assign, STRESS, s)[i]);
 	for (uint32_t i = 0; i < k->n && k->at[WAVE] >= 0; i++)
 		check_expect(&t->violent, check_found(k, WAVE, 0)[i] >= 0 && check_found(k, ENERGY, 0)[i] >= 0,
 			"%u-D: wave speed %.3g m/s, energy %.3g J/kg", k->dim, check_found(k, WAVE, 0)[i],
@@ -213,10 +220,10 @@ static void check_rotation(check_kernel *k, tallies *t) {
 		check_direction(3, 68, i, axis);
 		if (k->dim == 2) axis[0] = axis[1] = 0, axis[2] = 1;
 		for (int a = 0; a < 3; a++)
-			for (int b = 0; b < 3; b++)
-				w[a][b] = a == b ? 0 : (b == (a + 1) % 3 ? -1 : 1) * axis[3 - a - b];
+			for (int b = 0; b < 3; b++) w[a][b] = a == b ? 0 : (b == (a + 1) % 3 ? -1 : 1) * axis[3 - a - b];
 		for (uint32_t a = 0; a < k->dim; a++)
-			for (uint32_t b = 0; b < k->dim; b++) check_given(k, GRADIENT, a * k->dim + b)[i] = w[a][b] * angle / k->dt;
+			for (uint32_t b = 0; b < k->dim; b++)
+				check_given(k, GRADIENT, a * k->dim + b)[i] = w[a][b] * angle / k->dt;
 	}
 	check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
@@ -224,14 +231,15 @@ static void check_rotation(check_kernel *k, tallies *t) {
 		unpack(k, i, false, s);
 		unpack(k, i, true, now);
 		for (uint32_t a = 0; a < k->dim; a++)
-			for (uint32_t b = 0; b < k->dim; b++) w[a][b] = check_given(k, GRADIENT, a * k->dim + b)[i] * k->dt;
+			for (uint32_t b = 0; b < k->dim; b++)
+				w[a][b] = check_given(k, GRADIENT, a * k->dim + b)[i] * k->dt;
 		for (int a = 0; a < 3; a++)
 			for (int b = 0; b < 3; b++) {
 				double turned = s[a][b];
 				for (int c = 0; c < 3; c++) turned += w[a][c] * s[c][b] - s[a][c] * w[c][b];
 				check_measure(&t->turned, fabs(now[a][b] - turned), 10 * angle * angle * scale,
-					"%u-D: after a turn by %.0e a stress of %.9g Pa should be %.9g, is %.9g", k->dim, angle, s[a][b],
-					turned, now[a][b]);
+					"%u-D: after a turn by %.0e a stress of %.9g Pa should be %.9g, is %.9g", k->dim, angle,
+					s[a][b], turned, now[a][b]);
 			}
 	}
 }
@@ -257,8 +265,9 @@ static void try_dimension(const check *c, const check_instance *it, tallies *t) 
 }
 
 static void law(const check *c) {
-	tallies t = { { .name = "moduli and density" }, { .name = "assign twice" }, { .name = "assign and read back" },
-		{ .name = "yield" }, { .name = "rotation" }, { .name = "large gradients" } };
+	tallies t = { { .name = "moduli and density" }, { .name = "assign twice" },
+		{ .name = "assign and read back" }, { .name = "yield" }, { .name = "rotation" },
+		{ .name = "large gradients" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;

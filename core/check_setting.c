@@ -6,15 +6,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef enum { ORDINARY, LOW, HIGH, ANY } choice;
+typedef enum { ORDINARY, LOW, HIGH, ANY, NEAR } choice;
+
+/* Settings from here on lie around the ordinary values, for what refuses these. */
+static const uint64_t nearby = 1u << 20;
 
 double check_ordinary(const check *c, const char *unit) {
 	static const struct {
 		const char *unit;
 		double value;
-	} sizes[] = { { "m", 1e-3 }, { "Pa", 1e7 }, { "N/m", 1e5 }, { "kg/m^3", 1500 }, { "m/s", 1 }, { "1/s", 10 },
-		{ "s", 1e-3 }, { "kg", 1e-3 }, { "m/s^2", 9.81 }, { "1", 0.5 }, { "N", 1 }, { "J", 1e-3 },
-		{ "rad/s", 10 }, { "rad", 0.5 }, { "m^3", 1e-9 }, { "kg m^2", 1e-9 }, { "J/kg", 1 }, { "N m", 1e-3 } };
+	} sizes[] = { { "m", 1e-3 }, { "Pa", 1e7 }, { "N/m", 1e5 }, { "kg/m^3", 1500 }, { "m/s", 1 },
+		{ "1/s", 10 }, { "s", 1e-3 }, { "kg", 1e-3 }, { "m/s^2", 9.81 }, { "1", 0.5 }, { "N", 1 },
+		{ "J", 1e-3 }, { "rad/s", 10 }, { "rad", 0.5 }, { "m^3", 1e-9 }, { "kg m^2", 1e-9 }, { "J/kg", 1 },
+		{ "N m", 1e-3 } };
 	if (!unit || !*unit) return 0.5;
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
 		if (!strcmp(unit, sizes[i].unit) || quern_units_equal(c->units, unit, sizes[i].unit))
@@ -35,7 +39,8 @@ static double within(const quern_param *row, double x) {
 static bool needs_a_value(const quern_param *row) { return row->flags & QUERN_REQUIRED; }
 
 static double usual(const check *c, uint32_t dim, const quern_param *row) {
-	if (needs_a_value(row) || row->from || row->flags & QUERN_MAYBE) return within(row, check_ordinary(c, row->unit));
+	if (needs_a_value(row) || row->from || row->flags & QUERN_MAYBE)
+		return within(row, check_ordinary(c, row->unit));
 	return quern_param_default(row, dim);
 }
 
@@ -63,8 +68,8 @@ static void put_number(quern_node *map, const char *name, double value) {
 }
 
 /* Vectors that must be given: different for every row, so that corners are apart and normals have a length. */
-static void put_vector(
-	const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how, uint64_t key, quern_node *map) {
+static void put_vector(const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how,
+	uint64_t key, quern_node *map) {
 	const double size = check_ordinary(c, row->unit);
 	if (!needs_a_value(row) && how == ORDINARY) return;
 	if (how != ORDINARY && how != ANY && !bounded(row)) return;
@@ -79,9 +84,13 @@ static void put_vector(
 	}
 }
 
-static void put_real(
-	const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how, uint64_t key, quern_node *map) {
-	if (how == ORDINARY) {
+static void put_real(const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how,
+	uint64_t key, quern_node *map) {
+	if (how == NEAR) {
+		const double factor = exp(check_uniform(key, index, -2, 2));
+		if (needs_a_value(row) || check_uniform(key, 500 + index, 0, 1) < 0.7)
+			put_number(map, row->name, within(row, usual(c, dim, row) * factor));
+	} else if (how == ORDINARY) {
 		if (needs_a_value(row)) put_number(map, row->name, usual(c, dim, row));
 	} else if (bounded(row) && isfinite(row->max)) {
 		const double x = how == ANY ? anywhere(c, dim, row, key, index) : bound(c, dim, row, how);
@@ -99,8 +108,8 @@ static void put_choice(const quern_param *row, uint32_t index, choice how, uint6
 
 static void put_rows(const check *, uint32_t dim, const quern_param *rows, uint64_t setting, quern_node *map);
 
-static void put_row(
-	const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how, uint64_t key, quern_node *map) {
+static void put_row(const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how,
+	uint64_t key, quern_node *map) {
 	switch (row->type) {
 	case QUERN_T_REAL: put_real(c, dim, row, index, how, key, map); break;
 	case QUERN_T_INT:
@@ -124,12 +133,14 @@ static void put_row(
 	}
 }
 
-static void put_rows(const check *c, uint32_t dim, const quern_param *rows, uint64_t setting, quern_node *map) {
+static void put_rows(
+	const check *c, uint32_t dim, const quern_param *rows, uint64_t setting, quern_node *map) {
 	uint64_t n = 0;
 	for (const quern_param *row = rows; row && row->name; row++) n++;
 	for (uint32_t i = 0; i < n; i++) {
 		choice how = ORDINARY;
-		if (setting > 2 * n) how = (choice)check_uniform(setting, 1000 + i, 0, 4);
+		if (setting >= nearby) how = rows[i].type == QUERN_T_REAL ? NEAR : ORDINARY;
+		else if (setting > 2 * n) how = (choice)check_uniform(setting, 1000 + i, 0, 4);
 		else if (setting && (setting - 1) / 2 == i) how = (setting - 1) % 2 ? HIGH : LOW;
 		put_row(c, dim, &rows[i], i, how, setting, map);
 	}
@@ -155,7 +166,11 @@ static void say_why(check_instance *it, const char *fallback) {
 }
 
 static check_outcome call_init(const check *c, check_instance *it, uint64_t setting) {
-	quern_host host = { .abi = QUERN_ABI, .fail = quern_scene_fail, .random = quern_random, .publish = no_publish, .extension = no_extension };
+	quern_host host = { .abi = QUERN_ABI,
+		.fail = quern_scene_fail,
+		.random = quern_random,
+		.publish = no_publish,
+		.extension = no_extension };
 	const uint32_t up = it->dim - 1;
 	quern_setup setup = { .dim = it->dim, .lanes = QUERN_LANES, .stream = 7, .host = &host };
 	quern_err err = { it->report, it->tree->root, { 0 }, c->file->plugin.id };
@@ -168,12 +183,12 @@ static check_outcome call_init(const check *c, check_instance *it, uint64_t sett
 	if (it->ready && !spoke) return CHECK_READY;
 	say_why(it, "");
 	if (!it->ready && spoke) return CHECK_REFUSED;
-	snprintf(it->why, sizeof it->why, it->ready ? "init calls fail() and returns QUERN_OK"
-												: "init returns a failure and calls no fail()");
+	snprintf(it->why, sizeof it->why,
+		it->ready ? "init calls fail() and returns QUERN_OK" : "init returns a failure and calls no fail()");
 	return CHECK_RUDE;
 }
 
-check_outcome check_instance_create(const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
+static check_outcome create(const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
 	const quern_plugin *p = &c->file->plugin;
 	const size_t size = (p->instance_size + 127u) & ~(size_t)63;
 	*it = (check_instance) { .dim = dim };
@@ -191,6 +206,20 @@ check_outcome check_instance_create(const check *c, uint32_t dim, uint64_t setti
 	if (p->init) return call_init(c, it, setting);
 	it->ready = true;
 	return CHECK_READY;
+}
+
+check_outcome check_instance_create(const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
+	check_instance other;
+	check_outcome outcome = create(c, dim, setting, it);
+	for (uint64_t i = 0; !setting && outcome == CHECK_REFUSED && i < 200; i++) {
+		if (create(c, dim, nearby + i, &other) == CHECK_READY) {
+			check_instance_finish(c, it);
+			*it = other;
+			return CHECK_READY;
+		}
+		check_instance_finish(c, &other);
+	}
+	return outcome;
 }
 
 void check_instance_finish(const check *c, check_instance *it) {

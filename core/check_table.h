@@ -2,5 +2,6 @@
 #pragma once
 #include "check.h"
 
+bool check_is_unit(const check *, const char *unit);
 void check_parameter_rows(const check *, check_tally *, const quern_param *, size_t size, int depth);
 void check_use_rows(const check *, check_tally *, const quern_use *, const quern_param *params);

@@ -19,7 +19,8 @@ static const struct {
 		quern_command_describe },
 	{ "schema", "[-o FILE]", "JSON Schema of scenes, for editors", quern_command_schema },
 	{ "new", "KIND NAME [-o DIR]", "a plugin of your own from a template", quern_command_new },
-	{ "check", "PLUGIN.so", "conformance tests of a plugin", quern_command_check },
+	{ "check", "PLUGIN.so [--set key=value]... [--seconds N]", "conformance tests of a plugin",
+		quern_command_check },
 	{ "render", "DIR [--frame N] [--field NAME] [-o FILE.png] [--width N]", "a picture of a frame",
 		quern_command_render },
 };

@@ -261,7 +261,8 @@ static void make_fields(quern_plan *p) {
 		if (!made && section_left_out(p, s->fields[k])) {
 			if (s->general.model == 0)
 				quern_report_warn(s->report, s->field_marks[k],
-					"scene: output.fields: '%s' is left out: the section that makes it is not in this scene", s->fields[k]);
+					"scene: output.fields: '%s' is left out: the section that makes it is not in this scene",
+					s->fields[k]);
 		} else if (!made) {
 			const char *near = quern_nearest(s->fields[k], known);
 			quern_report_add(s->report, s->field_marks[k],
@@ -402,7 +403,8 @@ static void follow_field(quern_plan *p, int k) {
 				const bool fills = u->row->access == QUERN_WRITE || u->row->access == QUERN_ADD;
 				h.read = h.read || u->row->access == QUERN_READ || u->row->access == QUERN_UPDATE;
 				h.written = h.written || changes(u->row);
-				h.whole = h.whole || (i >= p->stages[s].first_use && i < p->stages[s].first_use + p->stages[s].n_uses);
+				h.whole = h.whole ||
+						  (i >= p->stages[s].first_use && i < p->stages[s].first_use + p->stages[s].n_uses);
 				others = others || u->row->flags & QUERN_OTHERS;
 				changed = changed || u->row->access == QUERN_UPDATE || u->row->access == QUERN_WRITE;
 				if (s != h.previous) h.stages++, h.previous = s;

@@ -30,8 +30,8 @@ typedef struct render_frame {
 		*scene; /* of scene.yaml in the run's folder, or NULL: then no domain and no bodies are drawn */
 } render_frame;
 
-/* Reads frame `number` (negative: the last one) of a run. `field`: "point.pressure", "grain.velocity.x", a bare "velocity"
- * of all that have it, or NULL for the speed where it is known. On a fault returns an exit status and one sentence. */
+/* Reads frame `number` (negative: the last one) of a run. `field`: "point.pressure", "grain.velocity.x", a bare
+ * "velocity" of all that have it, or NULL for the speed where it is known. On a fault returns an exit status and one sentence. */
 int render_frame_read(render_frame *, const char *folder, int64_t number, const char *field, quern_text *why);
 void render_frame_finish(render_frame *);
 

@@ -26,8 +26,8 @@ static render_colour from_oklab(double lightness, double a, double b) {
 		to_screen(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s) };
 }
 
-/* Lightness rises evenly while the hue turns from violet over blue and green to yellow: it reads in print, and for those
- * who do not see all colours. The chroma is what a screen can show all along the way. */
+/* Lightness rises evenly while the hue turns from violet over blue and green to yellow: it reads in print, and for
+ * those who do not see all colours. The chroma is what a screen can show all along the way. */
 render_colour render_map(double t) {
 	const double x = t < 0 ? 0 : t > 1 ? 1 : t, off = x - 0.45;
 	const double hue = (300 - 195 * x) * 0.017453292519943295, chroma = 0.10 + 0.28 * off * off;

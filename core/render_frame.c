@@ -73,12 +73,29 @@ static void read_grains(hid_t group, render_cloud *cloud) {
 	free(fixed);
 }
 
+static int by_size(const void *a, const void *b) {
+	const double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+/* Spray has an open volume, which says nothing about how much is there: it is not drawn larger than the rest. */
+static void limit_sizes(render_cloud *cloud) {
+	double *sorted = quern_take(cloud->n + 1, sizeof(double));
+	memcpy(sorted, cloud->size, cloud->n * sizeof(double));
+	qsort(sorted, cloud->n, sizeof(double), by_size);
+	const double most = 1.2 * sorted[cloud->n / 2];
+	for (size_t i = 0; i < cloud->n; i++)
+		if (!(cloud->size[i] < most)) cloud->size[i] = most;
+	free(sorted);
+}
+
 static void read_points(hid_t group, render_cloud *cloud, int dimension) {
 	size_t columns;
 	read_positions(group, cloud);
 	double *volume = cloud->n ? read_table(group, "volume", cloud->n, &columns) : NULL;
 	for (size_t i = 0; i < cloud->n; i++)
 		cloud->size[i] = volume ? (dimension == 2 ? sqrt(volume[i]) : cbrt(volume[i])) : 0;
+	if (volume) limit_sizes(cloud);
 	free(volume);
 }
 
@@ -130,7 +147,8 @@ static wanted_field parse_field(const char *text) {
 static bool take_values(hid_t group, const wanted_field *w, render_cloud *cloud, render_frame *f) {
 	size_t columns;
 	double *table = cloud->n ? read_table(group, w->name, cloud->n, &columns) : NULL;
-	if (!table || w->component >= (int)columns || !strcmp(w->name, "position")) {
+	if (!table || (w->component >= 0 && columns == 1) || w->component >= (int)columns ||
+		!strcmp(w->name, "position")) {
 		free(table);
 		return false;
 	}
@@ -223,6 +241,8 @@ static quern_scene *scene_of(const char *folder) {
 	free(path);
 	if (!quern_report_errors(scene->report)) return scene;
 	quern_scene_destroy(scene);
+	fprintf(
+		stderr, "quern render: domain and bodies are left out, since %s/scene.yaml cannot be read\n", folder);
 	return NULL;
 }
 

@@ -97,8 +97,8 @@ static void put_cloud(raster *r, const render_style *s, const render_cloud *clou
 	}
 }
 
-/* What lies in a hollow sees less of the sky: looks around, each at what stands nearer to the eye. What stands very much
- * nearer is something else in front, and casts nothing. */
+/* What lies in a hollow sees less of the sky: looks around, each at what stands nearer to the eye. What stands very
+ * much nearer is something else in front, and casts nothing. */
 static double openness(const raster *r, int x, int y, double reach) {
 	const double here = (double)r->depth[(size_t)y * (size_t)r->width + (size_t)x];
 	double hidden = 0;

@@ -63,7 +63,8 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	}
 	const int total = quern_store_set(&run->plan->store, "total");
 	bool reserved = quern_store_fill(&run->plan->store, total, 1) == QUERN_OK;
-	for (int i = 0; i < (int)run->plan->store.n_sets; i++) /* from now on a NULL column says: there is no such field */
+	for (int i = 0; i < (int)run->plan->store.n_sets;
+		 i++) /* from now on a NULL column says: there is no such field */
 		if (i != total && !run->plan->store.sets[i].rows)
 			reserved = reserved && quern_store_fill(&run->plan->store, i, 0) == QUERN_OK;
 	if (!reserved) {

@@ -93,7 +93,8 @@ static void fill_region(filling *f, const dem_fill *item, const quern_bound *pac
 	const uint32_t dim = f->d->dim;
 	uint32_t count[3] = { 1, 1, 1 };
 	f->item = item;
-	f->placer.n_bodies = item->fixed ? 0 : f->step->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
+	f->placer.n_bodies =
+		item->fixed ? 0 : f->step->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
 	for (uint32_t k = 0; k < dim; k++) {
 		const quern_real cells = (item->upper[k] - item->lower[k]) / (4 * f->d->radii.mean);
 		count[k] = cells > 1 ? (uint32_t)cells : 1;

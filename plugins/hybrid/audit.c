@@ -48,16 +48,17 @@ static quern_real impulse(const quern_step *s, uint32_t axis) {
 static bool take_sums(const quern_step *s, sums *out) {
 	const quern_column *u = s->use;
 	const size_t cells = s->host->set(s->run, "cell").n;
-	const cloud clouds[2] = { { &u[A_GRAIN_VELOCITY], &u[A_GRAIN_MASS], &u[A_GRAIN_WEIGHT], u[A_GRAIN_FIXED].index,
-								  s->host->set(s->run, "grain").n },
-		{ &u[A_POINT_VELOCITY], &u[A_POINT_MASS], &u[A_POINT_WEIGHT], NULL, s->host->set(s->run, "point").n } };
+	const cloud clouds[2] = { { &u[A_GRAIN_VELOCITY], &u[A_GRAIN_MASS], &u[A_GRAIN_WEIGHT],
+								  u[A_GRAIN_FIXED].index, s->host->set(s->run, "grain").n },
+		{ &u[A_POINT_VELOCITY], &u[A_POINT_MASS], &u[A_POINT_WEIGHT], NULL,
+			s->host->set(s->run, "point").n } };
 	for (int c = 0; c < 2; c++)
 		if (!add_cloud(s, &clouds[c], out)) return false;
 	out->mass = out->carried + s->host->sum(s->run, cells, u[A_GRAIN_OWED].real[0]) +
-		s->host->sum(s->run, cells, u[A_POINT_OWED].real[0]);
+				s->host->sum(s->run, cells, u[A_POINT_OWED].real[0]);
 	for (uint32_t k = 0; k < s->dim; k++)
 		out->owed_momentum[k] = s->host->sum(s->run, cells, u[A_GRAIN_OWED_MOMENTUM].real[k]) +
-			s->host->sum(s->run, cells, u[A_POINT_OWED_MOMENTUM].real[k]);
+								s->host->sum(s->run, cells, u[A_POINT_OWED_MOMENTUM].real[k]);
 	return true;
 }
 
@@ -65,11 +66,13 @@ static quern_status judge(const quern_step *s, const sums *now) {
 	const quern_column *u = s->use;
 	quern_real off = 0, pull = 0;
 	for (uint32_t k = 0; k < s->dim; k++) {
-		const quern_real left = now->momentum[k] + now->owed_momentum[k] - impulse(s, k) - u[A_MOMENTUM].real[k][0];
+		const quern_real left =
+			now->momentum[k] + now->owed_momentum[k] - impulse(s, k) - u[A_MOMENTUM].real[k][0];
 		off = fabs(left) > off ? fabs(left) : off;
 		pull = fabs(u[A_GRAVITY].real[k][0]) > pull ? fabs(u[A_GRAVITY].real[k][0]) : pull;
 	}
-	quern_real *scale = u[A_SCALE].real[0], *worst = u[A_MASS_DEFECT].real[0], *worst_momentum = u[A_MOMENTUM_DEFECT].real[0];
+	quern_real *scale = u[A_SCALE].real[0], *worst = u[A_MASS_DEFECT].real[0],
+			   *worst_momentum = u[A_MOMENTUM_DEFECT].real[0];
 	*scale = now->speed > *scale ? now->speed : *scale;
 	const quern_real mass_defect = fabs(now->mass / u[A_MASS].real[0][0] - 1), size = *scale + pull;
 	const quern_real momentum_defect = size > 0 ? off / size : 0;
@@ -77,12 +80,16 @@ static quern_status judge(const quern_step *s, const sums *now) {
 	*worst_momentum = momentum_defect > *worst_momentum ? momentum_defect : *worst_momentum;
 	if (!(mass_defect <= tolerance))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
-			"the ledger of mass is off by %.3g of the mass: what grains, points and entries hold is no longer constant", mass_defect);
+			"the ledger of mass is off by %.3g of the mass: what grains, points and entries hold is no "
+			"longer constant",
+			mass_defect);
 	if (!(momentum_defect <= tolerance))
-		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1, "the ledger of momentum is off by %.3g of it", momentum_defect);
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1, "the ledger of momentum is off by %.3g of it",
+			momentum_defect);
 	if (!(u[A_EXCHANGE].real[0][0] <= tolerance))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
-			"the coupling does not keep momentum: a node is off by %.3g of its own", u[A_EXCHANGE].real[0][0]);
+			"the coupling does not keep momentum: a node is off by %.3g of its own",
+			u[A_EXCHANGE].real[0][0]);
 	return QUERN_OK;
 }
 

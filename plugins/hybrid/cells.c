@@ -67,8 +67,11 @@ static bool holds(const void *arg, uint32_t block) {
 
 quern_status quern_hybrid_sort(update *d) {
 	const quern_step *s = d->s;
-	const cover c = { .point = s->use[U_POINT_POSITION], .grain = s->use[U_GRAIN_POSITION],
-		.n_grains = s->host->set(s->run, "grain").n, .holds = holds, .arg = s };
+	const cover c = { .point = s->use[U_POINT_POSITION],
+		.grain = s->use[U_GRAIN_POSITION],
+		.n_grains = s->host->set(s->run, "grain").n,
+		.holds = holds,
+		.arg = s };
 	const quern_status status = quern_cover_sort(s, &c);
 	if (status != QUERN_OK) return status;
 	d->g = s->host->grid(s->run);
@@ -100,7 +103,8 @@ quern_status quern_hybrid_sort(update *d) {
 
 /* ---- averages ---- */
 
-static void add_particle(const update *d, uint32_t c, quern_real m, quern_real *const v[3], int32_t i, quern_real *second) {
+static void add_particle(
+	const update *d, uint32_t c, quern_real m, quern_real *const v[3], int32_t i, quern_real *second) {
 	quern_real v2 = 0;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		d->velocity[k][c] += m * v[k][i];
@@ -119,11 +123,13 @@ void quern_hybrid_averages(update *d) {
 		for (uint32_t k = 0; k < d->s->dim; k++) d->velocity[k][c] = 0;
 		for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
 			const int32_t i = d->grain[q];
-			add_particle(d, c, u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i], u[U_GRAIN_VELOCITY].real, i, &second);
+			add_particle(d, c, u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i],
+				u[U_GRAIN_VELOCITY].real, i, &second);
 		}
 		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 			const int32_t i = d->point[q];
-			add_particle(d, c, u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i], u[U_POINT_VELOCITY].real, i, &second);
+			add_particle(d, c, u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i],
+				u[U_POINT_VELOCITY].real, i, &second);
 		}
 		if (!(d->mass[c] > 0)) continue;
 		for (uint32_t k = 0; k < d->s->dim; k++) {
@@ -146,7 +152,8 @@ void quern_hybrid_fractions(update *d) {
 	memset(fraction, 0, d->n_cells * sizeof(quern_real));
 	for (uint32_t i = 0; i < d->n_grains; i++) {
 		const quern_real r = u[U_GRAIN_RADIUS].real[0][i];
-		const quern_real half = (dim == 2 ? 0.886226925452758 : 0.805995977008235) * r; /* of the square, of the cube */
+		const quern_real half =
+			(dim == 2 ? 0.886226925452758 : 0.805995977008235) * r; /* of the square, of the cube */
 		int32_t first[3] = { 0 }, last[3] = { 0 };
 		if (d->grain_cell[i] < 0) continue;
 		for (uint32_t k = 0; k < dim; k++) {
@@ -160,8 +167,10 @@ void quern_hybrid_fractions(update *d) {
 					quern_real part = 1;
 					bool inside = true;
 					for (uint32_t k = 0; k < dim; k++) {
-						const quern_real low = d->g->lower[k] + cell[k] * h, at = u[U_GRAIN_POSITION].real[k][i];
-						const quern_real from = at - half > low ? at - half : low, to = at + half < low + h ? at + half : low + h;
+						const quern_real low = d->g->lower[k] + cell[k] * h,
+										 at = u[U_GRAIN_POSITION].real[k][i];
+						const quern_real from = at - half > low ? at - half : low,
+										 to = at + half < low + h ? at + half : low + h;
 						part *= to > from ? to - from : 0;
 						if (d->g->periodic[k]) cell[k] = (cell[k] + d->g->cells[k]) % d->g->cells[k];
 						inside = inside && cell[k] >= 0 && cell[k] < d->g->cells[k];
@@ -172,7 +181,8 @@ void quern_hybrid_fractions(update *d) {
 	}
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		quern_real mass = 0;
-		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) mass += u[U_POINT_MASS].real[0][d->point[q]];
+		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
+			mass += u[U_POINT_MASS].real[0][d->point[q]];
 		if (mass >= 0.1 * d->full) fraction[c] = 1;
 	}
 }
@@ -193,7 +203,8 @@ static quern_real pressure_of(const update *d, uint32_t c) {
 	for (uint32_t k = 0; k < dim; k++) grains -= stress[k] / dim;
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
-		for (uint32_t k = 0; k < dim; k++) points -= d->u[U_POINT_MASS].real[0][i] * d->u[U_POINT_STRESS].real[k][i] / dim;
+		for (uint32_t k = 0; k < dim; k++)
+			points -= d->u[U_POINT_MASS].real[0][i] * d->u[U_POINT_STRESS].real[k][i] / dim;
 		mass += d->u[U_POINT_MASS].real[0][i];
 	}
 	return share * grains + (1 - share) * (mass > 0 ? points / mass : 0);
@@ -205,11 +216,14 @@ static quern_real shear_rate(const update *d, const int32_t cell[3]) {
 	quern_real l[3][3] = { { 0 } }, sum = 0, trace = 0;
 	for (uint32_t b = 0; b < dim; b++) {
 		int32_t other[3];
-		const int32_t up = quern_hybrid_beside(d, cell, b, 1, other), down = quern_hybrid_beside(d, cell, b, -1, other);
+		const int32_t up = quern_hybrid_beside(d, cell, b, 1, other),
+					  down = quern_hybrid_beside(d, cell, b, -1, other);
 		const int32_t here = quern_grid_entry(d->g, cell);
-		const int32_t high = up >= 0 && d->mass[up] > 0 ? up : here, low = down >= 0 && d->mass[down] > 0 ? down : here;
+		const int32_t high = up >= 0 && d->mass[up] > 0 ? up : here,
+					  low = down >= 0 && d->mass[down] > 0 ? down : here;
 		const quern_real way = ((high != here) + (low != here)) * d->g->cell;
-		for (uint32_t a = 0; a < dim && way > 0; a++) l[a][b] = (d->velocity[a][high] - d->velocity[a][low]) / way;
+		for (uint32_t a = 0; a < dim && way > 0; a++)
+			l[a][b] = (d->velocity[a][high] - d->velocity[a][low]) / way;
 		trace += l[b][b];
 	}
 	for (uint32_t a = 0; a < dim; a++)
@@ -242,14 +256,16 @@ static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 	n[0] = n[1] = n[2] = 0;
 	if (!quern_hybrid_cell(d, c, cell)) return;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
-		const int32_t up = quern_hybrid_beside(d, cell, k, 1, other), down = quern_hybrid_beside(d, cell, k, -1, other);
+		const int32_t up = quern_hybrid_beside(d, cell, k, 1, other),
+					  down = quern_hybrid_beside(d, cell, k, -1, other);
 		n[k] = point_share(zone[up < 0 ? (int32_t)c : up]) - point_share(zone[down < 0 ? (int32_t)c : down]);
 		length += n[k] * n[k];
 	}
 	for (uint32_t k = 0; k < d->s->dim && length > 0; k++) n[k] /= sqrt(length);
 }
 
-static void put_normals(const update *d, uint32_t n, const quern_column *x, const quern_column *out, quern_real (*normal)[3]) {
+static void put_normals(
+	const update *d, uint32_t n, const quern_column *x, const quern_column *out, quern_real (*normal)[3]) {
 	for (uint32_t i = 0; i < n && out->real[0]; i++) {
 		const int32_t c = cell_of(d, x->real, i);
 		for (uint32_t k = 0; k < d->s->dim; k++) out->real[k][i] = c < 0 ? 0 : normal[c][k];
@@ -267,7 +283,8 @@ quern_status quern_hybrid_normals(update *d) {
 	return QUERN_OK;
 }
 
-static void put_homes(const update *d, uint32_t n, const quern_column *x, const int32_t *fixed, int32_t *home) {
+static void put_homes(
+	const update *d, uint32_t n, const quern_column *x, const int32_t *fixed, int32_t *home) {
 	for (uint32_t i = 0; i < n; i++) {
 		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i);
 		int32_t cell[3];
@@ -279,6 +296,7 @@ static void put_homes(const update *d, uint32_t n, const quern_column *x, const 
 
 void quern_hybrid_homes(update *d) {
 	const quern_column *u = d->u;
-	put_homes(d, d->s->host->set(d->s->run, "grain").n, &u[U_GRAIN_POSITION], u[U_GRAIN_FIXED].index, u[U_GRAIN_HOME].index);
+	put_homes(d, d->s->host->set(d->s->run, "grain").n, &u[U_GRAIN_POSITION], u[U_GRAIN_FIXED].index,
+		u[U_GRAIN_HOME].index);
 	put_homes(d, d->s->host->set(d->s->run, "point").n, &u[U_POINT_POSITION], NULL, u[U_POINT_HOME].index);
 }

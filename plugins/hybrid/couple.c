@@ -195,8 +195,9 @@ static void couple_block(void *arg, uint32_t b, uint32_t worker) {
 		quern_real gap2 = 0;
 		for (uint32_t a = 0; a < dim; a++) {
 			const quern_real made = m->mass[q] * (m->velocity[a][q] - m->before[a][q]) +
-				m->other_mass[q] * (m->other[a][q] - m->was[a][q]);
-			const quern_real there = m->mass[q] * fabs(m->before[a][q]) + m->other_mass[q] * fabs(m->was[a][q]);
+									m->other_mass[q] * (m->other[a][q] - m->was[a][q]);
+			const quern_real there =
+				m->mass[q] * fabs(m->before[a][q]) + m->other_mass[q] * fabs(m->was[a][q]);
 			if (fabs(made) > w->defect[b] * there) w->defect[b] = fabs(made) / there;
 			const quern_real gap = m->before[a][q] - m->was[a][q];
 			w->motion[k][a] = m->velocity[a][q];

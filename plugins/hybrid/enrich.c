@@ -24,7 +24,9 @@ static quern_real mass_of(const hybrid *h, quern_real r) {
 	return h->density * (h->dim == 2 ? area : 4.0 / 3 * area * r);
 }
 
-static quern_real waiting(const enriching *e) { return quern_radius_draw(&e->d->h->radii, e->d->s->host, e->draws); }
+static quern_real waiting(const enriching *e) {
+	return quern_radius_draw(&e->d->h->radii, e->d->s->host, e->draws);
+}
 
 /* Half a grain over would never be paid back: a grain is placed while more than all of it is owed. */
 static bool owes(const enriching *e) {
@@ -98,11 +100,13 @@ static void look_into(const update *d, uint32_t c, const quern_real at[3], surro
 	const quern_column *u = d->u;
 	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
 		const int32_t i = d->grain[q];
-		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY], u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i], i, at, sum);
+		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY],
+			u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i], i, at, sum);
 	}
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
-		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY], u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i], i, at, sum);
+		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY],
+			u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i], i, at, sum);
 	}
 }
 
@@ -142,7 +146,8 @@ static void set_motion(const update *d, new_grain *g) {
 			slope[k][j] = (sum.moment[k][j] - g->velocity[k] * sum.way[j]) * inverse2 / sum.weight;
 	if (d->s->dim == 2) g->spin[0] = 0.5 * (slope[1][0] - slope[0][1]);
 	else
-		for (uint32_t k = 0; k < 3; k++) g->spin[k] = 0.5 * (slope[(k + 2) % 3][(k + 1) % 3] - slope[(k + 1) % 3][(k + 2) % 3]);
+		for (uint32_t k = 0; k < 3; k++)
+			g->spin[k] = 0.5 * (slope[(k + 2) % 3][(k + 1) % 3] - slope[(k + 1) % 3][(k + 2) % 3]);
 }
 
 /* ---- one cell ---- */
@@ -197,10 +202,17 @@ static void enrich_cell(enriching *e, uint32_t c) {
 		e->lower[k] = k < d->s->dim ? d->g->lower[k] + cell[k] * d->g->cell : 0;
 		e->upper[k] = k < d->s->dim ? e->lower[k] + d->g->cell : 0;
 	}
-	quern_pack_job job = { .dim = d->s->dim, .stream = d->h->radii.stream + 1, .host = d->s->host,
+	quern_pack_job job = { .dim = d->s->dim,
+		.stream = d->h->radii.stream + 1,
+		.host = d->s->host,
 		.key = (uint64_t)((cell[2] * (int64_t)d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0]),
-		.counter = (uint64_t)d->u[U_UPDATES].index[0] << 32, .seed = e->seed, .radius = job_radius, .inside = job_inside,
-		.free = job_free, .place = job_place, .scene = e };
+		.counter = (uint64_t)d->u[U_UPDATES].index[0] << 32,
+		.seed = e->seed,
+		.radius = job_radius,
+		.inside = job_inside,
+		.free = job_free,
+		.place = job_place,
+		.scene = e };
 	memcpy(job.lower, e->lower, sizeof job.lower);
 	memcpy(job.upper, e->upper, sizeof job.upper);
 	find_upstream(d, cell, job.upstream);
@@ -221,10 +233,12 @@ static bool place_obstacles(enriching *e) {
 	for (uint32_t i = 0; i < d->n_grains; i++)
 		most = d->u[U_GRAIN_RADIUS].real[0][i] > most ? d->u[U_GRAIN_RADIUS].real[0][i] : most;
 	e->seed = s->host->memory(s->run, MOST_SEEDS * sizeof(quern_spot));
-	if (!body || !e->seed || quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK)
+	if (!body || !e->seed ||
+		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK)
 		return false;
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++)
-		if (quern_body_is_there(&s->slot[SLOT_BODIES][b], s->settling)) body[e->placer.n_bodies++] = s->slot[SLOT_BODIES][b];
+		if (quern_body_is_there(&s->slot[SLOT_BODIES][b], s->settling))
+			body[e->placer.n_bodies++] = s->slot[SLOT_BODIES][b];
 	e->placer.body = body;
 	for (uint32_t i = 0; i < d->n_grains; i++) {
 		quern_spot spot = { .radius = d->u[U_GRAIN_RADIUS].real[0][i] };

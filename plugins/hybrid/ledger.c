@@ -27,8 +27,8 @@ static void shift(entry e, uint32_t to, entry from, uint32_t c, uint32_t dim) {
 /* ---- entries move with the material ---- */
 
 typedef struct {
-	const int32_t *home;    /* by particle: linear cell of the last update, -1: new */
-	const int32_t *now;     /* by particle: its cell */
+	const int32_t *home; /* by particle: linear cell of the last update, -1: new */
+	const int32_t *now;  /* by particle: its cell */
 	const quern_real *weight, *mass;
 	uint32_t n;
 } movers;
@@ -64,13 +64,15 @@ static entry copy_of(update *d, entry e, quern_real *momentum[3]) {
 /* A particle that has left a cell takes its share of what the cell owed: by mass, of both clouds together. */
 void quern_hybrid_move_entries(update *d) {
 	const quern_column *u = d->u;
-	const movers clouds[2] = {
-		{ u[U_GRAIN_HOME].index, d->grain_cell, u[U_GRAIN_WEIGHT].real[0], u[U_GRAIN_MASS].real[0], d->n_grains },
-		{ u[U_POINT_HOME].index, d->point_cell, u[U_POINT_WEIGHT].real[0], u[U_POINT_MASS].real[0], d->n_points } };
+	const movers clouds[2] = { { u[U_GRAIN_HOME].index, d->grain_cell, u[U_GRAIN_WEIGHT].real[0],
+								   u[U_GRAIN_MASS].real[0], d->n_grains },
+		{ u[U_POINT_HOME].index, d->point_cell, u[U_POINT_WEIGHT].real[0], u[U_POINT_MASS].real[0],
+			d->n_points } };
 	quern_real *of_home = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	quern_real *grain_momentum[3] = { NULL }, *point_momentum[3] = { NULL };
 	const entry grains = grain_entry(d), points = point_entry(d);
-	const entry old_grains = copy_of(d, grains, grain_momentum), old_points = copy_of(d, points, point_momentum);
+	const entry old_grains = copy_of(d, grains, grain_momentum),
+				old_points = copy_of(d, points, point_momentum);
 	if (!of_home || d->failed) {
 		d->failed = true;
 		return;
@@ -82,7 +84,8 @@ void quern_hybrid_move_entries(update *d) {
 		}
 	for (int cloud = 0; cloud < 2; cloud++)
 		for (uint32_t i = 0; i < clouds[cloud].n; i++) {
-			const int32_t now = clouds[cloud].now[i], home = now < 0 ? -1 : home_entry(d, clouds[cloud].home[i]);
+			const int32_t now = clouds[cloud].now[i],
+						  home = now < 0 ? -1 : home_entry(d, clouds[cloud].home[i]);
 			if (home < 0 || home == now || !(of_home[home] > 0)) continue;
 			if (old_grains.mass[home] == 0 && old_points.mass[home] == 0) continue;
 			const quern_real share = clouds[cloud].weight[i] * clouds[cloud].mass[i] / of_home[home];
@@ -93,7 +96,8 @@ void quern_hybrid_move_entries(update *d) {
 
 /* ---- weights ---- */
 
-static void book(entry e, uint32_t c, quern_real change, quern_real mass, quern_real *const v[3], uint32_t i, uint32_t dim) {
+static void book(entry e, uint32_t c, quern_real change, quern_real mass, quern_real *const v[3], uint32_t i,
+	uint32_t dim) {
 	e.mass[c] -= change * mass;
 	for (uint32_t k = 0; k < dim; k++) e.momentum[k][c] -= change * mass * v[k][i];
 }
@@ -101,7 +105,8 @@ static void book(entry e, uint32_t c, quern_real change, quern_real mass, quern_
 /* Only the shares' sum is the material's stress; points that will carry all of it take it on. */
 static void take_over_stress(const update *d, uint32_t c) {
 	quern_real contact[6];
-	const uint32_t n = quern_shape_size(QUERN_SYMMETRIC, d->s->dim), begin = d->point_begin[c], end = d->point_begin[c + 1];
+	const uint32_t n = quern_shape_size(QUERN_SYMMETRIC, d->s->dim), begin = d->point_begin[c],
+				   end = d->point_begin[c + 1];
 	if (begin == end || !quern_hybrid_contact_stress(d, c, contact)) return;
 	for (uint32_t q = begin; q < end; q++)
 		for (uint32_t k = 0; k < n; k++) {
@@ -120,7 +125,9 @@ void quern_hybrid_weigh(update *d) {
 		const int32_t c = d->grain_cell[i];
 		if (c < 0) continue;
 		const quern_real weight = grain_share(d->zone[c]), change = weight - u[U_GRAIN_WEIGHT].real[0][i];
-		if (change != 0) book(point_entry(d), (uint32_t)c, change, u[U_GRAIN_MASS].real[0][i], u[U_GRAIN_VELOCITY].real, i, dim);
+		if (change != 0)
+			book(point_entry(d), (uint32_t)c, change, u[U_GRAIN_MASS].real[0][i], u[U_GRAIN_VELOCITY].real, i,
+				dim);
 		u[U_GRAIN_WEIGHT].real[0][i] = weight;
 		d->drop_grain[i] = weight == 0;
 	}
@@ -128,7 +135,9 @@ void quern_hybrid_weigh(update *d) {
 		const int32_t c = d->point_cell[i];
 		const quern_real weight = c < 0 ? u[U_POINT_WEIGHT].real[0][i] : point_share(d->zone[c]);
 		const quern_real change = weight - u[U_POINT_WEIGHT].real[0][i];
-		if (change != 0) book(grain_entry(d), (uint32_t)c, change, u[U_POINT_MASS].real[0][i], u[U_POINT_VELOCITY].real, i, dim);
+		if (change != 0)
+			book(grain_entry(d), (uint32_t)c, change, u[U_POINT_MASS].real[0][i], u[U_POINT_VELOCITY].real, i,
+				dim);
 		u[U_POINT_WEIGHT].real[0][i] = weight;
 		d->drop_point[i] = weight == 0;
 	}

@@ -14,13 +14,18 @@ void quern_hybrid_assign(const update *d, uint32_t begin, uint32_t n) {
 	for (uint32_t i = begin; i < begin + n; i += CHUNK) {
 		quern_column own[MOST_ROWS];
 		const uint32_t m = begin + n - i < CHUNK ? begin + n - i : CHUNK;
-		quern_material_batch b = { .n = m, .cap = CHUNK, .density = density, .wave_speed = wave, .energy = energy, .use = own };
-		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++) b.stress[k] = u[U_POINT_STRESS].real[k] + i;
+		quern_material_batch b = {
+			.n = m, .cap = CHUNK, .density = density, .wave_speed = wave, .energy = energy, .use = own
+		};
+		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
+			b.stress[k] = u[U_POINT_STRESS].real[k] + i;
 		for (uint32_t r = 0; r < material->n_uses && r < MOST_ROWS; r++)
 			own[r] = quern_column_from(material->column[r], material->uses[r].shape, i);
-		for (uint32_t k = 0; k < m; k++) density[k] = u[U_POINT_MASS].real[0][i + k] / u[U_POINT_VOLUME].real[0][i + k];
+		for (uint32_t k = 0; k < m; k++)
+			density[k] = u[U_POINT_MASS].real[0][i + k] / u[U_POINT_VOLUME].real[0][i + k];
 		((const quern_material_ops *)material->ops)->assign[d->s->dim - 2](material->self, &b);
-		for (uint32_t k = 0; k < m; k++) u[U_POINT_VOLUME].real[0][i + k] = u[U_POINT_MASS].real[0][i + k] / density[k];
+		for (uint32_t k = 0; k < m; k++)
+			u[U_POINT_VOLUME].real[0][i + k] = u[U_POINT_MASS].real[0][i + k] / density[k];
 	}
 }
 
@@ -68,7 +73,8 @@ static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]
 	quern_hybrid_cell(d, c, cell);
 	while (count < parts && mass / d->nominal >= 1.5 * count) count *= 2;
 	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++)
-		held[part_of(d, cell, d->u[U_GRAIN_POSITION].real, d->grain[q])] += d->u[U_GRAIN_MASS].real[0][d->grain[q]];
+		held[part_of(d, cell, d->u[U_GRAIN_POSITION].real, d->grain[q])] +=
+			d->u[U_GRAIN_MASS].real[0][d->grain[q]];
 	for (uint32_t k = 0; k < count; k++) {
 		uint32_t best = parts;
 		for (uint32_t p = 0; p < parts; p++)
@@ -106,10 +112,11 @@ static void grow(update *d, uint32_t c, quern_real mass, quern_real held, const 
 
 static void shrink(update *d, uint32_t c, quern_real mass, quern_real held) {
 	const quern_column *u = d->u;
-	const quern_real wanted = 1 + mass / held, factor = wanted > 0.7 ? wanted : 0.7, weight = point_share(d->zone[c]);
+	const quern_real wanted = 1 + mass / held, factor = wanted > 0.7 ? wanted : 0.7,
+					 weight = point_share(d->zone[c]);
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
-		const quern_real old = u[U_POINT_MASS].real[0][i], new = factor * old;
+		const quern_real old = u[U_POINT_MASS].real[0][i], new = factor *old;
 		quern_real v[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) v[k] = u[U_POINT_VELOCITY].real[k][i];
 		u[U_POINT_MASS].real[0][i] = new;
@@ -120,12 +127,14 @@ static void shrink(update *d, uint32_t c, quern_real mass, quern_real held) {
 
 static quern_real mass_held(const update *d, uint32_t c) {
 	quern_real sum = 0;
-	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) sum += d->u[U_POINT_MASS].real[0][d->point[q]];
+	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
+		sum += d->u[U_POINT_MASS].real[0][d->point[q]];
 	return sum;
 }
 
 static void settle(update *d, uint32_t c) {
-	const quern_real weight = point_share(d->zone[c]), owed = d->u[U_POINT_OWED].real[0][c], mass = owed / weight;
+	const quern_real weight = point_share(d->zone[c]), owed = d->u[U_POINT_OWED].real[0][c],
+					 mass = owed / weight;
 	const quern_real held = mass_held(d, c);
 	quern_real v[3] = { 0 };
 	quern_hybrid_owed_velocity(d, c, owed, d->u[U_POINT_OWED_MOMENTUM], v);
@@ -160,7 +169,8 @@ static void split(update *d, uint32_t c) {
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
 		const quern_real given = u[U_POINT_MASS].real[0][i] * share;
-		for (uint32_t k = 0; k < d->s->dim; k++) point.velocity[k] += given * u[U_POINT_VELOCITY].real[k][i] / point.mass;
+		for (uint32_t k = 0; k < d->s->dim; k++)
+			point.velocity[k] += given * u[U_POINT_VELOCITY].real[k][i] / point.mass;
 		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
 			point.stress[k] += given * u[U_POINT_STRESS].real[k][i] / point.mass;
 		u[U_POINT_MASS].real[0][i] -= given;
@@ -177,12 +187,14 @@ static void merge(update *d, uint32_t c) {
 	quern_real least = INFINITY;
 	if (end - begin <= 3 * parts_of(d)) return;
 	for (uint32_t q = begin; q < end; q++)
-		if (light < 0 || u[U_POINT_MASS].real[0][d->point[q]] < u[U_POINT_MASS].real[0][light]) light = d->point[q];
+		if (light < 0 || u[U_POINT_MASS].real[0][d->point[q]] < u[U_POINT_MASS].real[0][light])
+			light = d->point[q];
 	for (uint32_t q = begin; q < end; q++) {
 		quern_real d2 = 0;
 		if (d->point[q] == light) continue;
 		for (uint32_t k = 0; k < dim; k++) {
-			const quern_real x = u[U_POINT_POSITION].real[k][d->point[q]] - u[U_POINT_POSITION].real[k][light];
+			const quern_real x =
+				u[U_POINT_POSITION].real[k][d->point[q]] - u[U_POINT_POSITION].real[k][light];
 			d2 += x * x;
 		}
 		if (d2 < least) least = d2, near = d->point[q];
@@ -190,11 +202,14 @@ static void merge(update *d, uint32_t c) {
 	const quern_real a = u[U_POINT_MASS].real[0][near], b = u[U_POINT_MASS].real[0][light];
 	const quern_real va = u[U_POINT_VOLUME].real[0][near], vb = u[U_POINT_VOLUME].real[0][light];
 	for (uint32_t k = 0; k < dim; k++) {
-		u[U_POINT_VELOCITY].real[k][near] = (a * u[U_POINT_VELOCITY].real[k][near] + b * u[U_POINT_VELOCITY].real[k][light]) / (a + b);
-		u[U_POINT_POSITION].real[k][near] = (a * u[U_POINT_POSITION].real[k][near] + b * u[U_POINT_POSITION].real[k][light]) / (a + b);
+		u[U_POINT_VELOCITY].real[k][near] =
+			(a * u[U_POINT_VELOCITY].real[k][near] + b * u[U_POINT_VELOCITY].real[k][light]) / (a + b);
+		u[U_POINT_POSITION].real[k][near] =
+			(a * u[U_POINT_POSITION].real[k][near] + b * u[U_POINT_POSITION].real[k][light]) / (a + b);
 	}
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
-		u[U_POINT_STRESS].real[k][near] = (va * u[U_POINT_STRESS].real[k][near] + vb * u[U_POINT_STRESS].real[k][light]) / (va + vb);
+		u[U_POINT_STRESS].real[k][near] =
+			(va * u[U_POINT_STRESS].real[k][near] + vb * u[U_POINT_STRESS].real[k][light]) / (va + vb);
 	u[U_POINT_MASS].real[0][near] = a + b;
 	u[U_POINT_VOLUME].real[0][near] = va + vb;
 	quern_hybrid_assign(d, (uint32_t)near, 1);
@@ -232,7 +247,8 @@ quern_status quern_hybrid_apply_points(update *d) {
 			u[U_POINT_POSITION].real[k][to] = p->position[k];
 			u[U_POINT_VELOCITY].real[k][to] = p->velocity[k];
 		}
-		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++) u[U_POINT_STRESS].real[k][to] = p->stress[k];
+		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
+			u[U_POINT_STRESS].real[k][to] = p->stress[k];
 		u[U_POINT_MASS].real[0][to] = p->mass;
 		u[U_POINT_VOLUME].real[0][to] = p->mass / d->h->packed;
 		u[U_POINT_WEIGHT].real[0][to] = p->weight;

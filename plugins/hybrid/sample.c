@@ -102,7 +102,7 @@ static void sample_touches(sampling *p) {
 	const quern_step *s = p->s;
 	const quern_column *u = s->use;
 	_Alignas(64) quern_real at[3][QUERN_LANES] = { { 0 } }, radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES],
-		normal[3][QUERN_LANES] = { { 0 } }, velocity[3][QUERN_LANES];
+							normal[3][QUERN_LANES] = { { 0 } }, velocity[3][QUERN_LANES];
 	for (uint32_t q = 0; q < s->host->set(s->run, "touch").n; q++) {
 		const int32_t i = u[S_TOUCH_GRAIN].index[q];
 		const quern_bound *body = &s->slot[SLOT_BODIES][u[S_TOUCH_BODY].index[q]];
@@ -114,8 +114,14 @@ static void sample_touches(sampling *p) {
 		}
 		if (!(force2 > 0)) continue;
 		radius[0] = u[S_RADIUS].real[0][i];
-		const quern_body_batch batch = { .n = 1, .cap = QUERN_LANES, .dim = s->dim, .pose = &still,
-			.position = { at[0], at[1], at[2] }, .radius = radius, .gap = gap, .normal = { normal[0], normal[1], normal[2] },
+		const quern_body_batch batch = { .n = 1,
+			.cap = QUERN_LANES,
+			.dim = s->dim,
+			.pose = &still,
+			.position = { at[0], at[1], at[2] },
+			.radius = radius,
+			.gap = gap,
+			.normal = { normal[0], normal[1], normal[2] },
 			.velocity = { velocity[0], velocity[1], velocity[2] } };
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 		for (uint32_t k = 0; k < s->dim; k++) {

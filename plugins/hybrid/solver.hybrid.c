@@ -1,35 +1,40 @@
 /* solver.hybrid - who is where: zones, conversions, the coupling of grains and continuum. docs/theory/hybrid.md */
 #include "hybrid.h"
 
-static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1", "Grain steps per step of the continuum.",
-										  .def = 10, .min = 1, .max = 10000),
-	QUERN_PARAM(hybrid, update, "1", "Grain steps between updates of the zones.", .def = 400, .min = 1, .max = 1e9),
-	QUERN_PARAM(hybrid, samples, "1", "Samples of the contact stress between updates.", .def = 8, .min = 1, .max = 10000,
-		.flags = QUERN_ADVANCED),
-	QUERN_PARAM(hybrid, hysteresis, "1", "Mean diameters by which a surface must move before a zone follows.", .def = 0.75,
-		.max = 100, .flags = QUERN_ADVANCED),
-	QUERN_PARAM(hybrid, guard, "1", "A cell leaves the hybrid zone once it is owed less than this share of its half.",
-		.def = 0.3, .max = 10, .flags = QUERN_ADVANCED),
-	QUERN_PARAM_AS(hybrid, diameter, "grain.diameter", "m", "Mean diameter of grains that are placed.", .from = "grain.diameter",
-		.flags = QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
-	QUERN_PARAM_AS(hybrid, radii.spread, "grain.spread", "1", "Spread of their radii.", .from = "grain.radius_spread",
-		.max = 0.45, .flags = QUERN_ADVANCED),
+static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
+										  "Grain steps per step of the continuum.", .def = 10, .min = 1,
+										  .max = 10000),
+	QUERN_PARAM(
+		hybrid, update, "1", "Grain steps between updates of the zones.", .def = 400, .min = 1, .max = 1e9),
+	QUERN_PARAM(hybrid, samples, "1", "Samples of the contact stress between updates.", .def = 8, .min = 1,
+		.max = 10000, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, hysteresis, "1", "Mean diameters by which a surface must move before a zone follows.",
+		.def = 0.75, .max = 100, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, guard, "1",
+		"A cell leaves the hybrid zone once it is owed less than this share of its half.", .def = 0.3,
+		.max = 10, .flags = QUERN_ADVANCED),
+	QUERN_PARAM_AS(hybrid, diameter, "grain.diameter", "m", "Mean diameter of grains that are placed.",
+		.from = "grain.diameter", .flags = QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
+	QUERN_PARAM_AS(hybrid, radii.spread, "grain.spread", "1", "Spread of their radii.",
+		.from = "grain.radius_spread", .max = 0.45, .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(hybrid, law_number, "grain.law", "1", "0: normal, cut at two deviations; 1: uniform.",
 		.from = "grain.radius_law", .max = 1, .flags = QUERN_ADVANCED),
-	QUERN_PARAM_AS(hybrid, density, "grain.density", "kg/m^3", "Density of their material.", .from = "grain.density",
-		.flags = QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
+	QUERN_PARAM_AS(hybrid, density, "grain.density", "kg/m^3", "Density of their material.",
+		.from = "grain.density", .flags = QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, packed, "packed_density", "kg/m^3", "Density of the continuum without stress.",
 		.from = "continuum.density", .flags = QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
-static const quern_set sets[] = { { .name = "mixture", .doc = "What grains bring to the nodes.", .rows = 8 }, { .name = NULL } };
+static const quern_set sets[] = { { .name = "mixture", .doc = "What grains bring to the nodes.", .rows = 8 },
+	{ .name = NULL } };
 
-static const quern_slot slots[] = { { .name = "oracle",
-										.doc = "who says where grains are needed; the least continuous wish wins",
-										.kind = QUERN_ORACLE,
-										.list = 1,
-																		.stage = { "hybrid.update" } },
+static const quern_slot slots[] = {
+	{ .name = "oracle",
+		.doc = "who says where grains are needed; the least continuous wish wins",
+		.kind = QUERN_ORACLE,
+		.list = 1,
+		.stage = { "hybrid.update" } },
 	{ .name = "packer",
 		.doc = "who places new grains",
 		.kind = QUERN_PACKER,
@@ -40,7 +45,10 @@ static const quern_slot slots[] = { { .name = "oracle",
 		.kind = QUERN_COUPLING,
 		.def = "affine",
 		.stage = { "hybrid.couple" } },
-	{ .name = "material", .kind = QUERN_MATERIAL, .stage = { NULL, "hybrid.update" }, .same_as = "continuum.material" },
+	{ .name = "material",
+		.kind = QUERN_MATERIAL,
+		.stage = { NULL, "hybrid.update" },
+		.same_as = "continuum.material" },
 	{ .name = "shape", .kind = QUERN_SHAPE, .stage = { "hybrid.raster" }, .same_as = "continuum.shape" },
 	{ .name = "transfer",
 		.doc = "from the nodes back to the grains",
@@ -49,7 +57,8 @@ static const quern_slot slots[] = { { .name = "oracle",
 		.stage = { "hybrid.back" },
 		.particle = "grain" },
 	{ .name = "bodies", .kind = QUERN_BODY, .list = 1, .stage = { "hybrid.update" }, .same_as = "bodies" },
-	{ .name = NULL } };
+	{ .name = NULL }
+};
 
 #define FIXED F("grain.fixed", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL)
 static const quern_use update_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
@@ -58,29 +67,40 @@ static const quern_use update_uses[] = { F("grain.position", "m", QUERN_UPDATE, 
 	F("grain.radius", "m", QUERN_UPDATE, QUERN_SCALAR), F("grain.mass", "kg", QUERN_UPDATE, QUERN_SCALAR),
 	F("grain.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN), FIXED,
 	F("grain.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update."),
-	F("grain.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, .doc = "Unit normal of the zone's level set."),
-	F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR), F("point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
-	F("point.mass", "kg", QUERN_UPDATE, QUERN_SCALAR), F("point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR),
+	F("grain.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
+		.doc = "Unit normal of the zone's level set."),
+	F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR),
+	F("point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("point.mass", "kg", QUERN_UPDATE, QUERN_SCALAR),
+	F("point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR),
 	F("point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC),
 	F("point.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN),
 	F("point.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update."),
-	F("point.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, .doc = "Unit normal of the zone's level set."),
-	F("cell.zone", "1", QUERN_UPDATE, QUERN_INDEX, .flags = QUERN_SHOWN, .doc = "0: grains, 1: both, 2: continuum."),
+	F("point.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
+		.doc = "Unit normal of the zone's level set."),
+	F("cell.zone", "1", QUERN_UPDATE, QUERN_INDEX, .flags = QUERN_SHOWN,
+		.doc = "0: grains, 1: both, 2: continuum."),
 	F("cell.packing_fraction", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
 		.doc = "Of grains; 1 where the continuum fills the cell."),
-	F("cell.shear_rate", "1/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = "Of the mean velocity of both."),
-	F("cell.inertial_number", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = "Shear rate times d sqrt(rho/p)."),
+	F("cell.shear_rate", "1/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "Of the mean velocity of both."),
+	F("cell.inertial_number", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "Shear rate times d sqrt(rho/p)."),
 	F("cell.grain_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the grains."),
 	F("cell.point_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the continuum."),
-	F("cell.grain_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, .doc = "Momentum owed to the grains."),
-	F("cell.point_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, .doc = "Momentum owed to the continuum."),
-	F("cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, .doc = "Sum of the contact stress over the samples since the last update."),
+	F("cell.grain_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR,
+		.doc = "Momentum owed to the grains."),
+	F("cell.point_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR,
+		.doc = "Momentum owed to the continuum."),
+	F("cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC,
+		.doc = "Sum of the contact stress over the samples since the last update."),
 	F("total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Samples of the contact stress."),
 	F("total.draws", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Radii drawn for new grains."),
 	F("total.updates", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Zone updates so far."),
 	F("total.mass_initial", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass at the release."),
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR), F("total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX),
-	F("total.mass_defect", "1", QUERN_READ, QUERN_SCALAR), F("total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR), QUERN_END_USES };
+	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR),
+	F("total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX),
+	F("total.mass_defect", "1", QUERN_READ, QUERN_SCALAR),
+	F("total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR), QUERN_END_USES };
 
 static const quern_use sample_uses[] = { F("contact.force", "N", QUERN_READ, QUERN_VECTOR),
 	F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
@@ -88,46 +108,60 @@ static const quern_use sample_uses[] = { F("contact.force", "N", QUERN_READ, QUE
 	F("touch.force", "N", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED),
 	F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL),
 	F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body", .flags = QUERN_OPTIONAL),
-	F("grain.position", "m", QUERN_READ, QUERN_VECTOR), F("grain.radius", "m", QUERN_READ, QUERN_SCALAR), FIXED,
-	F("cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC), F("total.samples", "1", QUERN_UPDATE, QUERN_SCALAR), QUERN_END_USES };
+	F("grain.position", "m", QUERN_READ, QUERN_VECTOR), F("grain.radius", "m", QUERN_READ, QUERN_SCALAR),
+	FIXED, F("cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC),
+	F("total.samples", "1", QUERN_UPDATE, QUERN_SCALAR), QUERN_END_USES };
 
 static const quern_use raster_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR),
 	F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR),
 	F("grain.weight", "1", QUERN_READ, QUERN_SCALAR), FIXED, F("node.mass", "kg", QUERN_READ, QUERN_SCALAR),
 	F("motion.velocity", "m/s", QUERN_READ, QUERN_VECTOR),
 	F("mixture.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass of grains."),
-	F("mixture.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum of grains."), QUERN_END_USES };
+	F("mixture.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum of grains."),
+	QUERN_END_USES };
 
 static const quern_use couple_uses[] = { F("node.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("mixture.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("total.exchange_defect", "1", QUERN_WRITE, QUERN_SCALAR, .doc = "Momentum that the coupling made, over that of the node: the worst node."),
-	F("total.exchanged", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = "Taken by the coupling so far."),
-	F("motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("motion.density", "kg/m^3", QUERN_UPDATE, QUERN_SCALAR),
+	F("motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
+	F("mixture.mass", "kg", QUERN_READ, QUERN_SCALAR),
+	F("total.exchange_defect", "1", QUERN_WRITE, QUERN_SCALAR,
+		.doc = "Momentum that the coupling made, over that of the node: the worst node."),
+	F("total.exchanged", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
+		.doc = "Taken by the coupling so far."),
+	F("motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR),
+	F("motion.density", "kg/m^3", QUERN_UPDATE, QUERN_SCALAR),
 	F("mixture.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR),
-	F("mixture.change", "m/s", QUERN_ADD, QUERN_VECTOR, .doc = "What the coupling changes."), QUERN_END_USES };
+	F("mixture.change", "m/s", QUERN_ADD, QUERN_VECTOR, .doc = "What the coupling changes."),
+	QUERN_END_USES };
 
 static const quern_use back_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
 	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR),
 	F("grain.weight", "1", QUERN_READ, QUERN_SCALAR), FIXED, F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR),
 	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), F("mixture.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR), F("mixture.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR),
+	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR),
+	F("mixture.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR),
 	F("mixture.change", "m/s", QUERN_READ, QUERN_VECTOR), QUERN_END_USES };
 
 static const quern_use audit_uses[] = { F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR),
 	F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR), F("grain.weight", "1", QUERN_READ, QUERN_SCALAR), FIXED,
 	F("point.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
 	F("point.weight", "1", QUERN_READ, QUERN_SCALAR), F("cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR),
-	F("cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR), F("cell.grain_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR),
+	F("cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR),
+	F("cell.grain_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR),
 	F("cell.point_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR),
-	F("body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED), F("total.faces", "N s", QUERN_READ, QUERN_VECTOR),
-	F("total.support", "N s", QUERN_READ, QUERN_VECTOR), F("total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR),
-	F("total.gravity_impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .doc = "Given by gravity since the first audit."),
+	F("body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED),
+	F("total.faces", "N s", QUERN_READ, QUERN_VECTOR), F("total.support", "N s", QUERN_READ, QUERN_VECTOR),
+	F("total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR),
+	F("total.gravity_impulse", "N s", QUERN_UPDATE, QUERN_VECTOR,
+		.doc = "Given by gravity since the first audit."),
 	F("total.audit_mass", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Carried and owed at the first audit."),
-	F("total.audit_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, .doc = "Carried and owed at the first audit, without impulses."),
+	F("total.audit_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR,
+		.doc = "Carried and owed at the first audit, without impulses."),
 	F("total.audit_scale", "kg m/s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Largest sum of w m |v| so far."),
 	F("total.audits", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: the first audit has been."),
-	F("total.mass_defect", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of the mass invariant, relative: the worst so far."),
-	F("total.momentum_defect", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of the momentum invariant, relative: the worst so far."),
+	F("total.mass_defect", "1", QUERN_UPDATE, QUERN_SCALAR,
+		.doc = "Of the mass invariant, relative: the worst so far."),
+	F("total.momentum_defect", "1", QUERN_UPDATE, QUERN_SCALAR,
+		.doc = "Of the momentum invariant, relative: the worst so far."),
 	QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "hybrid.update",
@@ -178,10 +212,12 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
-static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot, const uint32_t *n_slot, quern_err *err) {
+static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
+	const uint32_t *n_slot, quern_err *err) {
 	hybrid *h = self;
 	if (!n_slot[SLOT_ORACLE])
-		return setup->host->fail(err, QUERN_E_PARAM, NULL, "give an oracle: without one nobody says where grains are needed");
+		return setup->host->fail(
+			err, QUERN_E_PARAM, NULL, "give an oracle: without one nobody says where grains are needed");
 	h->affine = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->affine != 0;
 	return QUERN_OK;
 }
@@ -192,10 +228,11 @@ static void account(const void *self, const quern_step *s, quern_account *out) {
 	const quern_column *u = s->use;
 	const size_t n = s->host->set(s->run, "cell").n;
 	(void)self;
-	out->owed += s->host->sum(s->run, n, u[U_GRAIN_OWED].real[0]) + s->host->sum(s->run, n, u[U_POINT_OWED].real[0]);
+	out->owed +=
+		s->host->sum(s->run, n, u[U_GRAIN_OWED].real[0]) + s->host->sum(s->run, n, u[U_POINT_OWED].real[0]);
 	for (uint32_t k = 0; k < s->dim; k++)
 		out->owed_momentum[k] += s->host->sum(s->run, n, u[U_GRAIN_OWED_MOMENTUM].real[k]) +
-			s->host->sum(s->run, n, u[U_POINT_OWED_MOMENTUM].real[k]);
+								 s->host->sum(s->run, n, u[U_POINT_OWED_MOMENTUM].real[k]);
 	const quern_real mass = u[U_MASS_DEFECT].real[0][0], momentum = u[U_MOMENTUM_DEFECT].real[0][0];
 	const quern_real worst = mass > momentum ? mass : momentum;
 	out->defect = worst > out->defect ? worst : out->defect;
@@ -214,7 +251,8 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.hybrid",
 	.brief = "Grains where they matter, continuum everywhere else.",
-	.doc = "Zones by oracles, conversions with a ledger of mass and momentum, coupling at the nodes of the grid.",
+	.doc = "Zones by oracles, conversions with a ledger of mass and momentum, coupling at the nodes of the "
+		   "grid.",
 	.cite = "Yue et al. 2018; Chantharayukhonthorn 2019",
 	.instance_size = sizeof(hybrid),
 	.params = params,

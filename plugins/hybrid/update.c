@@ -71,7 +71,8 @@ static void say(const quern_step *s, uint32_t changed) {
 	quern_real entries = 0;
 	for (uint32_t c = 0; c < s->host->set(s->run, "cell").n; c++)
 		entries += fabs(u[U_GRAIN_OWED].real[0][c]) + fabs(u[U_POINT_OWED].real[0][c]);
-	s->host->log(s->run, 0, "update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",
+	s->host->log(s->run, 0,
+		"update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",
 		u[U_UPDATES].index[0], (long long)s->step, changed, entries / whole, carried_mass(s) / whole - 1);
 }
 

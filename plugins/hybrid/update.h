@@ -21,17 +21,17 @@ typedef struct update {
 	/* by cell: the moving grains and the points in it */
 	uint32_t *grain_begin, *point_begin;
 	int32_t *grain, *point;
-	int32_t *grain_cell, *point_cell;   /* by particle: its cell, -1 for none and for fixed grains */
+	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
-	quern_real full, nominal;           /* kg: of a full cell, of one point in it */
-	int32_t *zone;                      /* by cell: the new one; the old one stands in the field until the end */
+	quern_real full, nominal;                /* kg: of a full cell, of one point in it */
+	int32_t *zone; /* by cell: the new one; the old one stands in the field until the end */
 	bool *drop_grain, *drop_point;
 	new_point *points;
 	uint32_t n_new_points, cap_points;
 	new_grain *grains;
 	uint32_t n_new_grains, cap_grains;
-	uint32_t changed;                   /* cells that changed zone */
-	bool failed;                        /* memory ran out */
+	uint32_t changed; /* cells that changed zone */
+	bool failed;      /* memory ran out */
 } update;
 
 /* Global coordinates of a cell of the set "cell"; false for cells beyond the domain's end. */
@@ -62,7 +62,8 @@ void quern_hybrid_weigh(update *);
 void quern_hybrid_net(update *);
 quern_status quern_hybrid_hand_over(update *);
 /* The velocity at which mass owed to a cell is given: P/M, or the cell's own where that would be noise. */
-void quern_hybrid_owed_velocity(const update *, uint32_t cell, quern_real mass, const quern_column momentum, quern_real v[3]);
+void quern_hybrid_owed_velocity(
+	const update *, uint32_t cell, quern_real mass, const quern_column momentum, quern_real v[3]);
 
 /* ---- points.c ---- */
 void quern_hybrid_points(update *);

@@ -18,9 +18,9 @@ typedef struct {
 	const update *d;
 	heap_entry *heap;
 	size_t n, cap;
-	quern_real *distance;     /* by cell */
-	int16_t (*way)[3];        /* by cell: to its source, in cells */
-	bool boxes;               /* the source is a whole cell, not its centre */
+	quern_real *distance; /* by cell */
+	int16_t (*way)[3];    /* by cell: to its source, in cells */
+	bool boxes;           /* the source is a whole cell, not its centre */
 	bool failed;
 } spreading;
 
@@ -139,14 +139,20 @@ typedef struct {
 /* A place is behind a body if it lies in one that is there now. */
 static bool in_body(const update *d, const quern_real x[3]) {
 	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
-	_Alignas(64) quern_real position[3][QUERN_LANES], radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES], n[3][QUERN_LANES],
-		v[3][QUERN_LANES];
+	_Alignas(64) quern_real position[3][QUERN_LANES], radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES],
+													  n[3][QUERN_LANES], v[3][QUERN_LANES];
 	for (uint32_t k = 0; k < 3; k++)
 		for (uint32_t i = 0; i < QUERN_LANES; i++) position[k][i] = x[k];
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
-		const quern_body_batch batch = { .n = 1, .cap = QUERN_LANES, .dim = d->s->dim, .pose = &still,
-			.position = { position[0], position[1], position[2] }, .radius = radius, .gap = gap, .normal = { n[0], n[1], n[2] },
+		const quern_body_batch batch = { .n = 1,
+			.cap = QUERN_LANES,
+			.dim = d->s->dim,
+			.pose = &still,
+			.position = { position[0], position[1], position[2] },
+			.radius = radius,
+			.gap = gap,
+			.normal = { n[0], n[1], n[2] },
 			.velocity = { v[0], v[1], v[2] } };
 		if (!quern_body_is_there(body, d->s->settling)) continue;
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
@@ -177,7 +183,8 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 		bool open = false;
 		if (!quern_hybrid_cell(d, c, cell) || f->solid[c] || level[c] > 0) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++)
-			for (int step = -1; step <= 1; step += 2) open = open || beside(d, cell, k, step, &other) == BESIDE_OPEN;
+			for (int step = -1; step <= 1; step += 2)
+				open = open || beside(d, cell, k, step, &other) == BESIDE_OPEN;
 		if (open) f->outside[c] = true, f->queue[n++] = c;
 	}
 	for (uint32_t q = 0; q < n; q++) {
@@ -194,12 +201,15 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 }
 
 /* Distance of a cell's centre to the nearest cell outside. */
-static quern_status surface_distance(update *d, const quern_real *level, uint32_t flags, quern_real *distance) {
+static quern_status surface_distance(
+	update *d, const quern_real *level, uint32_t flags, quern_real *distance) {
 	const quern_step *s = d->s;
 	surface f = { s->host->memory(s->run, d->n_cells + 1u), s->host->memory(s->run, d->n_cells + 1u),
-		s->host->memory(s->run, d->n_cells + 1u), s->host->memory(s->run, ((size_t)d->n_cells + 1) * sizeof(uint32_t)) };
+		s->host->memory(s->run, d->n_cells + 1u),
+		s->host->memory(s->run, ((size_t)d->n_cells + 1) * sizeof(uint32_t)) };
 	spreading p;
-	if (!f.outside || !f.solid || !f.inside || !f.queue || !spreading_init(&p, d, true, distance)) return QUERN_E_MEMORY;
+	if (!f.outside || !f.solid || !f.inside || !f.queue || !spreading_init(&p, d, true, distance))
+		return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
 		quern_real x[3];
@@ -237,13 +247,19 @@ typedef struct {
 	_Alignas(64) quern_real centre[3][N], shifted[N];
 } oracle_memory;
 
-static void ask(const update *d, const quern_bound *oracle, uint32_t b, const quern_real *distance, quern_real shift,
-	oracle_memory *m, quern_real *level, int32_t *wish) {
+static void ask(const update *d, const quern_bound *oracle, uint32_t b, const quern_real *distance,
+	quern_real shift, oracle_memory *m, quern_real *level, int32_t *wish) {
 	enum { MOST_ROWS = 16 };
 	const quern_oracle_ops *ops = oracle->ops;
 	quern_column own[MOST_ROWS];
-	quern_cell_batch batch = { .n = N, .cap = N, .dim = d->s->dim, .cell = d->g->cell, .zone = d->u[U_ZONE].index + (size_t)b * N,
-		.use = own, .level = level, .wish = wish };
+	quern_cell_batch batch = { .n = N,
+		.cap = N,
+		.dim = d->s->dim,
+		.cell = d->g->cell,
+		.zone = d->u[U_ZONE].index + (size_t)b * N,
+		.use = own,
+		.level = level,
+		.wish = wish };
 	for (uint32_t i = 0; i < N; i++) {
 		int32_t cell[3];
 		quern_real x[3];
@@ -261,14 +277,16 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 }
 
 /* low: the zone wished for half the hysteresis nearer to the surface, high: half of it deeper. A zone within stays. */
-static quern_status wishes(update *d, const quern_bound *oracle, quern_real *level, quern_real *distance, int32_t *low, int32_t *high) {
+static quern_status wishes(update *d, const quern_bound *oracle, quern_real *level, quern_real *distance,
+	int32_t *low, int32_t *high) {
 	const quern_oracle_ops *ops = oracle->ops;
 	const quern_real half = 0.5 * d->h->hysteresis * d->h->diameter;
 	oracle_memory *m = d->s->host->scratch(d->s->run, 0, sizeof *m);
 	int32_t wish[N];
 	if (!m) return QUERN_E_MEMORY;
 	for (uint32_t b = 0; b < d->g->n_blocks; b++) ask(d, oracle, b, NULL, 0, m, level + (size_t)b * N, NULL);
-	const quern_status status = surface_distance(d, level, ops->surface ? ops->surface(oracle->self) : 0, distance);
+	const quern_status status =
+		surface_distance(d, level, ops->surface ? ops->surface(oracle->self) : 0, distance);
 	if (status != QUERN_OK) return status;
 	for (uint32_t b = 0; b < d->g->n_blocks; b++)
 		for (int side = 0; side < 2; side++) {
@@ -294,8 +312,10 @@ static int32_t guarded(const update *d, uint32_t c, int32_t old, int32_t new) {
 quern_status quern_hybrid_zones(update *d) {
 	const quern_step *s = d->s;
 	const size_t n = (size_t)d->n_cells + 1;
-	quern_real *level = s->host->memory(s->run, n * sizeof(quern_real)), *distance = s->host->memory(s->run, n * sizeof(quern_real));
-	int32_t *low = s->host->memory(s->run, n * sizeof(int32_t)), *high = s->host->memory(s->run, n * sizeof(int32_t));
+	quern_real *level = s->host->memory(s->run, n * sizeof(quern_real)),
+			   *distance = s->host->memory(s->run, n * sizeof(quern_real));
+	int32_t *low = s->host->memory(s->run, n * sizeof(int32_t)),
+			*high = s->host->memory(s->run, n * sizeof(int32_t));
 	if (!level || !distance || !low || !high) return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++) low[c] = high[c] = QUERN_CONTINUUM;
 	for (uint32_t o = 0; o < s->n_slot[SLOT_ORACLE]; o++) {

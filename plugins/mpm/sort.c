@@ -14,6 +14,8 @@ quern_status quern_mpm_sort(const void *self, const quern_step *s) {
 	if (!*unsorted) return QUERN_OK;
 	*unsorted = 0;
 	const bool cells = s->host->set(s->run, "cell").n > 0;
-	const cover c = { .point = s->use[SORT_POSITION], .grain = { .real = { NULL } }, .holds = cells ? always : NULL };
+	const cover c = {
+		.point = s->use[SORT_POSITION], .grain = { .real = { NULL } }, .holds = cells ? always : NULL
+	};
 	return quern_cover_sort(s, &c);
 }

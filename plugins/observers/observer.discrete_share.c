@@ -6,11 +6,12 @@ typedef struct {
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
 static const quern_use uses[] = { CLOUD_USES, QUERN_END_USES };
-static const quern_output outputs[] = { { .name = "share", .unit = "1", .doc = "Of the carried mass, by grains." },
-	{ .name = NULL } };
+static const quern_output outputs[] = {
+	{ .name = "share", .unit = "1", .doc = "Of the carried mass, by grains." }, { .name = NULL }
+};
 
-static quern_status whole(
-	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
+	const quern_host *host, quern_run *run) {
 	quern_real grains = 0, points = 0;
 	(void)self;
 	CLOUD_SUM(b, host, run, false, i, 1, grains);

@@ -56,8 +56,8 @@ static quern_real height(const quern_observer_batch *b, const quern_column *x, u
 	return sum;
 }
 
-static quern_status whole(
-	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
+	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t turns = b->dim == 3 ? 3 : 1;
 	(void)self;

@@ -14,25 +14,30 @@ static const quern_use uses[] = { CLOUD_USES,
 	F("total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
 	F("total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
 	F("total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
-static const quern_output outputs[] = { { .name = "entries", .unit = "1", .doc = "Sum of |entries| over the mass." },
+static const quern_output outputs[] = {
+	{ .name = "entries", .unit = "1", .doc = "Sum of |entries| over the mass." },
 	{ .name = "carried", .unit = "1", .doc = "Carried mass over that at the release, minus 1." },
 	{ .name = "grains_owed", .unit = "kg", .doc = "Owed to the grains." },
 	{ .name = "points_owed", .unit = "kg", .doc = "Owed to the continuum." },
 	{ .name = "mass_defect", .unit = "1", .doc = "Of the mass invariant: the worst so far." },
 	{ .name = "momentum_defect", .unit = "1", .doc = "Of the momentum invariant: the worst so far." },
-	{ .name = "exchange_defect", .unit = "1", .doc = "Of the coupling's momentum, in the last step: the worst node." },
-	{ .name = NULL } };
+	{ .name = "exchange_defect",
+		.unit = "1",
+		.doc = "Of the coupling's momentum, in the last step: the worst node." },
+	{ .name = NULL }
+};
 
 /* Without a hybrid there is no ledger: nothing is owed, nothing is missing. */
-static quern_status whole(
-	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
+	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t n = u[GRAIN_OWED].real[0] ? b->count[GRAIN_OWED] : 0;
 	quern_real mass = 0, *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
 	(void)self;
 	if (!u[GRAIN_OWED].real[0] || !(u[MASS].real[0][0] > 0)) return QUERN_OK;
 	if (!size) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < n; i++) size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
+	for (uint32_t i = 0; i < n; i++)
+		size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
 	CLOUD_SUM(b, host, run, false, i, 1, mass);
 	CLOUD_SUM(b, host, run, true, i, 1, mass);
 	out[0] = host->sum(run, n, size) / u[MASS].real[0][0];
@@ -50,7 +55,8 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.ledger",
 	.brief = "What grains and continuum owe each other.",
-	.doc = "The invariants hold to round-off by honest booking; the entries and the carried mass measure quality.",
+	.doc = "The invariants hold to round-off by honest booking; the entries and the carried mass measure "
+		   "quality.",
 	.cite = "Chantharayukhonthorn 2019, 6.1",
 	.instance_size = sizeof(observer),
 	.params = params,

@@ -10,8 +10,8 @@ static const quern_output outputs[] = { { .name = "carried", .unit = "kg", .doc 
 	{ .name = "grains", .unit = "kg", .doc = "By grains, weighted, without fixed ones." },
 	{ .name = "points", .unit = "kg", .doc = "By points, weighted." }, { .name = NULL } };
 
-static quern_status whole(
-	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
+	const quern_host *host, quern_run *run) {
 	(void)self;
 	CLOUD_SUM(b, host, run, false, i, 1, out[1]);
 	CLOUD_SUM(b, host, run, true, i, 1, out[2]);

@@ -13,8 +13,8 @@ static const quern_output outputs[] = { { .name = "x", .unit = "kg m/s", .doc = 
 	{ .name = "y", .unit = "kg m/s", .doc = "Along y." },
 	{ .name = "z", .unit = "kg m/s", .doc = "Along z; 0 in 2-D." }, { .name = NULL } };
 
-static quern_status whole(
-	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
+	const quern_host *host, quern_run *run) {
 	(void)self;
 	for (uint32_t k = 0; k < b->dim; k++) {
 		CLOUD_SUM(b, host, run, false, i, b->use[GRAIN_VELOCITY].real[k][i], out[k]);

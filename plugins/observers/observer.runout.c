@@ -7,27 +7,35 @@ typedef struct {
 	int32_t axis;
 	quern_real origin, quantile, gap, diameter;
 } observer;
-static const quern_param params[] = { QUERN_PARAM(observer, axis, "1", "Axis of the run-out: 0 x, 1 y, 2 z.", .max = 2),
+static const quern_param params[] = { QUERN_PARAM(observer, axis, "1", "Axis of the run-out: 0 x, 1 y, 2 z.",
+										  .max = 2),
 	QUERN_PARAM(observer, origin, "m", "Where the run-out begins."),
-	QUERN_PARAM(observer, quantile, "1", "Share of the connected mass that front and height enclose.", .def = 0.99,
-		.min = 0, .max = 1, .flags = QUERN_MIN_OPEN),
-	QUERN_PARAM(observer, gap, "m", "Mass is connected while no wider gap along the axis separates it; default: 3 diameters.",
+	QUERN_PARAM(observer, quantile, "1", "Share of the connected mass that front and height enclose.",
+		.def = 0.99, .min = 0, .max = 1, .flags = QUERN_MIN_OPEN),
+	QUERN_PARAM(observer, gap, "m",
+		"Mass is connected while no wider gap along the axis separates it; default: 3 diameters.",
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(observer, diameter, "m", "Mean diameter of the grains.", .from = "grain.diameter",
 		.flags = QUERN_MAYBE | QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 enum { GRAIN_POSITION = CLOUD_ROWS, POINT_POSITION };
-static const quern_use uses[] = { CLOUD_USES, F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
+static const quern_use uses[] = { CLOUD_USES,
+	F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
 	F("point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
-static const quern_output outputs[] = { { .name = "front", .unit = "m", .doc = "Quantile of the connected mass, from the origin." },
-	{ .name = "height", .unit = "m", .doc = "Quantile of the connected mass against gravity, from the domain's lower end." },
+static const quern_output outputs[] = {
+	{ .name = "front", .unit = "m", .doc = "Quantile of the connected mass, from the origin." },
+	{ .name = "height",
+		.unit = "m",
+		.doc = "Quantile of the connected mass against gravity, from the domain's lower end." },
 	{ .name = "foremost", .unit = "m", .doc = "The farthest grain or point, from the origin." },
-	{ .name = "connected", .unit = "1", .doc = "Connected mass over all mass." }, { .name = NULL } };
+	{ .name = "connected", .unit = "1", .doc = "Connected mass over all mass." }, { .name = NULL }
+};
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	observer *o = self;
 	if ((uint32_t)o->axis >= setup->dim)
-		return setup->host->fail(err, QUERN_E_PARAM, "axis", "must be less than %u in this scene", setup->dim);
+		return setup->host->fail(
+			err, QUERN_E_PARAM, "axis", "must be less than %u in this scene", setup->dim);
 	if (isnan(o->gap)) o->gap = isnan(o->diameter) ? INFINITY : 3 * o->diameter;
 	return QUERN_OK;
 }
@@ -85,8 +93,8 @@ static quern_real quantile(const item *it, uint32_t n, quern_real wanted, bool u
 	return n ? (up ? it[n - 1].up : it[n - 1].along) : 0;
 }
 
-static quern_status whole(
-	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
+	const quern_host *host, quern_run *run) {
 	const observer *o = self;
 	const size_t most = (size_t)cloud_size(b, false) + cloud_size(b, true);
 	item *it = host->memory(run, (most + 1) * sizeof(item));
@@ -116,7 +124,8 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.runout",
 	.brief = "How far and how high the material lies.",
-	.doc = "Front and height enclose a share of the connected mass; single grains that ran ahead count in `foremost` alone.",
+	.doc = "Front and height enclose a share of the connected mass; single grains that ran ahead count in "
+		   "`foremost` alone.",
 	.instance_size = sizeof(observer),
 	.params = params,
 	.uses = uses,

@@ -5,24 +5,27 @@
 typedef struct {
 	int32_t body;
 } observer;
-static const quern_param params[] = { QUERN_PARAM(observer, body, "1", "Number of the body in the scene's list, from 0.",
-										  .max = 1e6),
+static const quern_param params[] = { QUERN_PARAM(observer, body, "1",
+										  "Number of the body in the scene's list, from 0.", .max = 1e6),
 	QUERN_END_PARAMS };
 enum { IMPULSE, BEFORE, SINCE };
-static const quern_use uses[] = { F("body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .doc = "Given to the material since the release."),
+static const quern_use uses[] = { F("body.impulse", "N s", QUERN_READ, QUERN_VECTOR,
+									  .doc = "Given to the material since the release."),
 	F("body.impulse_before", "N s", QUERN_UPDATE, QUERN_VECTOR, .doc = "The same, at the last observation."),
-	F("body.observed", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Time of the last observation."), QUERN_END_USES };
+	F("body.observed", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Time of the last observation."),
+	QUERN_END_USES };
 static const quern_output outputs[] = { { .name = "x", .unit = "N", .doc = "Along x." },
-	{ .name = "y", .unit = "N", .doc = "Along y." }, { .name = "z", .unit = "N", .doc = "Along z; 0 in 2-D." }, { .name = NULL } };
+	{ .name = "y", .unit = "N", .doc = "Along y." },
+	{ .name = "z", .unit = "N", .doc = "Along z; 0 in 2-D." }, { .name = NULL } };
 
-static quern_status whole(
-	const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
+	const quern_host *host, quern_run *run) {
 	const observer *o = self;
 	const quern_column *u = b->use;
 	const uint32_t i = (uint32_t)o->body;
 	if (i >= b->count[IMPULSE])
-		return host->stop(run, QUERN_E_PARAM, NULL, -1, "wall_force: there is no body %d; the scene has %u, counted from 0",
-			o->body, b->count[IMPULSE]);
+		return host->stop(run, QUERN_E_PARAM, NULL, -1,
+			"wall_force: there is no body %d; the scene has %u, counted from 0", o->body, b->count[IMPULSE]);
 	const quern_real length = b->time - u[SINCE].real[0][i];
 	for (uint32_t k = 0; k < b->dim; k++) {
 		const quern_real given = u[IMPULSE].real[k][i] - u[BEFORE].real[k][i];

@@ -6,14 +6,16 @@ typedef struct {
 	bool walls;
 } surface;
 
-static const quern_param params[] = { QUERN_PARAM(surface, critical, "1",
-										  "Packing fraction of grains below which a cell is empty.", .def = 0.4, .min = 0,
-										  .max = 1, .flags = QUERN_MIN_OPEN | QUERN_MAX_OPEN),
+static const quern_param params[] = {
+	QUERN_PARAM(surface, critical, "1", "Packing fraction of grains below which a cell is empty.", .def = 0.4,
+		.min = 0, .max = 1, .flags = QUERN_MIN_OPEN | QUERN_MAX_OPEN),
 	QUERN_PARAM(surface, depth, "m", "Depth of the middle of the hybrid zone below the surface.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(surface, half_width, "m", "Half the width of the hybrid zone; a cell at least.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(surface, walls, NULL, "Walls and floors count as surface too, so that grains meet them."), QUERN_END_PARAMS };
+	QUERN_PARAM(surface, walls, NULL, "Walls and floors count as surface too, so that grains meet them."),
+	QUERN_END_PARAMS
+};
 enum { FRACTION };
 static const quern_use uses[] = { { .field = "cell.packing_fraction",
 									  .unit = "1",
@@ -40,7 +42,9 @@ static void decide(const void *self, const quern_cell_batch *b) {
 	const surface *p = self;
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_real d = b->distance[i] - p->depth;
-		b->wish[i] = d < -p->half_width ? QUERN_DISCRETE : d <= p->half_width ? QUERN_HYBRID : QUERN_CONTINUUM;
+		b->wish[i] = d < -p->half_width   ? QUERN_DISCRETE
+					 : d <= p->half_width ? QUERN_HYBRID
+										  : QUERN_CONTINUUM;
 	}
 }
 
@@ -55,7 +59,8 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "oracle.packing_fraction",
 	.brief = "Grains within a depth of the free surface.",
-	.doc = "The surface is where the packing fraction falls below a critical one and open space is connected with the "
+	.doc = "The surface is where the packing fraction falls below a critical one and open space is connected "
+		   "with the "
 		   "outside; a void within does not count.",
 	.cite = "Yue et al. 2018, 4.1",
 	.instance_size = sizeof(surface),

@@ -7,12 +7,13 @@ typedef struct {
 	bool by_rate, by_number;
 } shear;
 
-static const quern_param params[] = { QUERN_PARAM(shear, shear_rate, "1/s", "Shear rate from which on grains are wanted.",
+static const quern_param params[] = { QUERN_PARAM(shear, shear_rate, "1/s",
+										  "Shear rate from which on grains are wanted.",
 										  .flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
 	QUERN_PARAM(shear, inertial_number, "1", "Inertial number from which on grains are wanted.",
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(shear, release, "1", "Grains stay until the flow is slower than this share of the threshold.", .def = 0.6,
-		.min = 0, .max = 1, .flags = QUERN_MIN_OPEN),
+	QUERN_PARAM(shear, release, "1", "Grains stay until the flow is slower than this share of the threshold.",
+		.def = 0.6, .min = 0, .max = 1, .flags = QUERN_MIN_OPEN),
 	QUERN_PARAM(shear, depth, "m", "Distance from the fast region to the middle of the hybrid zone.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(shear, half_width, "m", "Half the width of the hybrid zone; a cell at least.",
@@ -62,7 +63,9 @@ static void decide(const void *self, const quern_cell_batch *b) {
 	const shear *p = self;
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_real d = b->distance[i] - p->depth;
-		b->wish[i] = d < -p->half_width ? QUERN_DISCRETE : d <= p->half_width ? QUERN_HYBRID : QUERN_CONTINUUM;
+		b->wish[i] = d < -p->half_width   ? QUERN_DISCRETE
+					 : d <= p->half_width ? QUERN_HYBRID
+										  : QUERN_CONTINUUM;
 	}
 }
 
@@ -73,7 +76,8 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "oracle.strain_rate",
 	.brief = "Grains where the flow shears fast.",
-	.doc = "Cells whose shear rate or inertial number is above a threshold count as surface: shear bands and jets are "
+	.doc = "Cells whose shear rate or inertial number is above a threshold count as surface: shear bands and "
+		   "jets are "
 		   "made of grains before they matter. Combine it with packing_fraction by a list.",
 	.cite = "Yue et al. 2018, 8 (as future work); GDR MiDi 2004",
 	.instance_size = sizeof(shear),

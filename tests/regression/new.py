@@ -1,4 +1,5 @@
-"""`quern new`: a plugin of every kind, built outside the source tree against an installed Quern, described and run."""
+"""`quern new`: a plugin of every kind, built outside the source tree against an installed Quern, checked, described
+and run."""
 import concurrent.futures
 import os
 import pathlib
@@ -14,8 +15,8 @@ quern: 1
 dimension: {dimension}
 gravity: {gravity}
 domain: {domain}
-time: {{end: 50 ms}}
-output: {{every: 50 ms}}
+time: {{end: 20 ms}}
+output: {{every: 20 ms{fields}}}
 """
 BOX = {2: {"dimension": 2, "gravity": "[0, -9.81]", "domain": "{lower: [0, 0], upper: [0.1, 0.1]}"},
        3: {"dimension": 3, "gravity": "[0, 0, -9.81]",
@@ -51,17 +52,16 @@ continuum:
 bodies:
   {floor}
 grains:
-  material: {{density: 2500, radius: {{mean: 1 mm, spread: 10 %}}}}
+  material: {{density: 2500, radius: {{mean: 2 mm, spread: 10 %}}}}
   contact: {{linear: {{stiffness: 1e5}}}}
   fill: {{region: {{box: {region}}}}}
-continuum: {{cell: 4 mm, material: mu_i}}
+continuum: {{cell: 10 mm, material: mu_i}}
 hybrid:
-  oracle: [{{mine: {{height: 0.05, depth: 8 mm}}}}]
+  oracle: [{{mine: {{height: 0.05, depth: 20 mm}}}}]
   coupling: {{mine: {{share: 0.5}}}}
 """,
     "solver": """
 grains: {{solver: mine, radius: 1 mm}}
-output: {{every: 50 ms, fields: [grain.velocity]}}
 """,
 }
 
@@ -86,11 +86,12 @@ def make(kind, program, folder, environment):
     run(program, "new", kind, "mine", cwd=folder, env=environment)
     place = folder / f"{kind}.mine"
     text = "".join(file.read_text() for file in place.iterdir())
-    assert "my_" not in text.replace("my_kind", "my_"), f"{kind}: a token was not replaced"
+    assert "my_kind" not in text and "my_name" not in text, f"{kind}: a token was not replaced"
     environment = dict(environment, CFLAGS="-Werror -Wshadow -Wconversion -Wundef -Wmissing-prototypes")
     run("meson", "setup", "build", cwd=place, env=environment)
     run("ninja", "-C", "build", cwd=place, env=environment)
     assert len(list((place / "build").glob("*.so"))) == 3, f"{kind}: not one object per instruction set"
+    run(program, "check", place / f"build/{kind}.mine.so", env=environment)
     return kind
 
 
@@ -110,7 +111,7 @@ def main():
         assert "contact.linear" in run(program, "list", env=environment), "the installed program finds no plugins"
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             for kind in pool.map(lambda kind: make(kind, program, folder, environment), KINDS):
-                print(f"{kind}.mine: made and built")
+                print(f"{kind}.mine: made, built and checked")
         refusals(program, folder, environment)
         environment["QUERN_PLUGIN_PATH"] = ":".join(str(folder / f"{kind}.mine/build") for kind in KINDS)
         listed = run(program, "list", env=environment)
@@ -120,8 +121,8 @@ def main():
         for scene, text in SCENES.items():
             for d in (2, 3):
                 file = folder / f"{scene}{d}.yaml"
-                head = HEAD if scene != "solver" else HEAD.replace("output: {{every: 50 ms}}\n", "")
-                file.write_text(f"name: {scene}" + head.format(**BOX[d]) +
+                fields = ", fields: [grain.velocity]" if scene == "solver" else ""
+                file.write_text(f"name: {scene}" + HEAD.format(fields=fields, **BOX[d]) +
                                 text.format(floor=FLOOR[d], ball=BALL[d], region=REGION[d]))
                 run(program, "run", file, "--quiet", "-o", folder / f"{scene}{d}", env=environment)
                 print(f"{scene}, {d}-D: runs with them")

@@ -1,0 +1,218 @@
+/* check_body - geometry: unit normals, gaps that grow along them, surfaces that go with the pose */
+#include "check.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { POSITION, RADIUS, FEATURE, GAP, NORMAL, SPEED };
+enum { NODES, GRAINS, VARIANTS };
+
+static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+
+static void call(const check_kernel *k, const check_batch *b) {
+	const quern_body_ops *ops = k->ops;
+	quern_body_batch batch = { .n = b->n, .cap = b->cap, .dim = k->dim, .pose = k->more };
+	CHECK_VECTOR(batch.position, k, b, POSITION, k->dim);
+	batch.radius = check_at(k, b, RADIUS, 0);
+	batch.feature = check_at(k, b, FEATURE, 0);
+	batch.gap = check_at(k, b, GAP, 0);
+	CHECK_VECTOR(batch.normal, k, b, NORMAL, k->dim);
+	CHECK_VECTOR(batch.velocity, k, b, SPEED, k->dim);
+	ops->closest(k->instance->self, &batch);
+}
+
+/* Bounded axes are covered with a margin of their own length, the others from -1 to 1. */
+static void range_of(const check_kernel *k, uint32_t a, double *low, double *high) {
+	quern_real lower[3] = { 0 }, upper[3] = { 0 };
+	const quern_body_ops *ops = k->ops;
+	*low = -1, *high = 1;
+	ops->bounds(k->instance->self, k->dim, lower, upper);
+	if (!isfinite(lower[a]) || !isfinite(upper[a])) return;
+	*low = lower[a] - (upper[a] - lower[a]) - 1e-3;
+	*high = upper[a] + (upper[a] - lower[a]) + 1e-3;
+}
+
+static void create(
+	const check *c, const check_instance *it, const quern_pose *pose, uint32_t n, check_kernel *k) {
+	check_kernel_init(k, c, it, "closest", n);
+	k->call = call;
+	k->more = pose;
+	check_add(k, POSITION, "position", CHECK_IN, k->dim);
+	check_add(k, RADIUS, "radius", CHECK_IN, 1);
+	check_add(k, GAP, "gap", CHECK_OUT, 1);
+	check_add(k, NORMAL, "normal", CHECK_OUT, k->dim);
+	check_add(k, SPEED, "velocity", CHECK_OUT, k->dim);
+	for (uint32_t a = 0; a < k->dim; a++) {
+		double low, high;
+		range_of(k, a, &low, &high);
+		for (uint32_t i = 0; i < n; i++)
+			check_given(k, POSITION, a)[i] = check_uniform(130, (uint64_t)a << 32 | i, low, high);
+	}
+}
+
+static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
+	if (variant >= VARIANTS) return false;
+	create(c, it, &still, n, k);
+	if (variant == GRAINS) check_fill(k, RADIUS, 1, 131, 1e-4, 1e-3);
+	return true;
+}
+
+/* ---- what must hold ---- */
+
+typedef struct {
+	check_tally normals, gaps, radii, bounds, shifts, turns, features;
+} tallies;
+
+static void check_surface(check_kernel *k, check_kernel *moved, tallies *t) {
+	const double scale = 1e-4;
+	check_run(k, 64, NULL);
+	for (uint32_t i = 0; i < k->n; i++) {
+		double length = 0;
+		for (uint32_t a = 0; a < k->dim; a++) length += pow(check_found(k, NORMAL, a)[i], 2);
+		check_measure(&t->normals, fabs(sqrt(length) - 1), 1e-12, "%u-D: a normal has the length %.15g",
+			k->dim, sqrt(length));
+		for (uint32_t a = 0; a < k->dim; a++)
+			check_given(moved, POSITION, a)[i] =
+				check_given(k, POSITION, a)[i] + scale * check_found(k, NORMAL, a)[i];
+		check_given(moved, RADIUS, 0)[i] = 2e-4;
+	}
+	check_run(moved, 64, NULL);
+	for (uint32_t i = 0; i < k->n; i++) {
+		const double was = check_found(k, GAP, 0)[i], is = check_found(moved, GAP, 0)[i] + 2e-4;
+		if (was <= 0 && is > 0) continue; /* through the surface a corner may be nearer */
+		check_measure(&t->gaps, fabs(is - was - scale) / scale, 1e-9,
+			"%u-D: %.3g m along the normal change the gap from %.9g to %.9g m", k->dim, scale, was, is);
+	}
+	memcpy(check_given(moved, POSITION, 0), check_given(k, POSITION, 0), k->n * sizeof(quern_real));
+	for (uint32_t a = 1; a < k->dim; a++)
+		memcpy(check_given(moved, POSITION, a), check_given(k, POSITION, a), k->n * sizeof(quern_real));
+	check_run(moved, 64, NULL);
+	for (uint32_t i = 0; i < k->n; i++)
+		check_measure(&t->radii, fabs(check_found(k, GAP, 0)[i] - check_found(moved, GAP, 0)[i] - 2e-4),
+			1e-15, "%u-D: a radius of 2e-4 m changes the gap from %.9g to %.9g m", k->dim,
+			check_found(k, GAP, 0)[i], check_found(moved, GAP, 0)[i]);
+}
+
+static void check_bounds(const check_kernel *k, tallies *t) {
+	quern_real lower[3] = { 0 }, upper[3] = { 0 };
+	((const quern_body_ops *)k->ops)->bounds(k->instance->self, k->dim, lower, upper);
+	for (uint32_t i = 0; i < k->n; i++)
+		for (uint32_t a = 0; a < k->dim; a++) {
+			const double x = check_given(k, POSITION, a)[i];
+			check_expect(&t->bounds, check_found(k, GAP, 0)[i] > 0 || (x >= lower[a] && x <= upper[a]),
+				"%u-D: a place inside the body, at %.6g m along axis %u, lies outside bounds()", k->dim, x,
+				a);
+		}
+}
+
+/* x = position + turn x'; v + w x (x - position) */
+static void pose_point(const quern_pose *p, uint32_t dim, const double x[3], double out[3]) {
+	for (uint32_t a = 0; a < 3; a++) {
+		out[a] = p->position[a];
+		for (uint32_t b = 0; b < dim; b++) out[a] += p->turn[3 * a + b] * x[b];
+	}
+}
+
+static void check_pose(
+	check_kernel *k, check_kernel *posed, const quern_pose *pose, bool spins, check_tally *t) {
+	posed->more = pose;
+	for (uint32_t i = 0; i < k->n; i++) {
+		double x[3] = { 0 }, out[3];
+		for (uint32_t a = 0; a < k->dim; a++) x[a] = check_given(k, POSITION, a)[i];
+		pose_point(pose, k->dim, x, out);
+		for (uint32_t a = 0; a < k->dim; a++) check_given(posed, POSITION, a)[i] = out[a];
+		check_given(posed, RADIUS, 0)[i] = 0;
+	}
+	check_run(posed, 64, NULL);
+	for (uint32_t i = 0; i < k->n; i++) {
+		const double gap = check_found(k, GAP, 0)[i], is = check_found(posed, GAP, 0)[i];
+		check_measure(t, fabs(gap - is), 1e-12,
+			"%u-D: the gap to the body in its pose is %.9g m, should be %.9g", k->dim, is, gap);
+		if (fabs(gap) < 1e-9) continue;
+		double arm[3] = { 0 };
+		for (uint32_t a = 0; a < k->dim; a++)
+			arm[a] = check_given(posed, POSITION, a)[i] - is * check_found(posed, NORMAL, a)[i] -
+					 pose->position[a];
+		for (uint32_t a = 0; a < k->dim; a++) {
+			const uint32_t b = (a + 1) % 3, c = (a + 2) % 3;
+			const double v =
+				pose->velocity[a] + (spins ? pose->spin[b] * arm[c] - pose->spin[c] * arm[b] : 0);
+			check_measure(t, fabs(check_found(posed, SPEED, a)[i] - v), 1e-9,
+				"%u-D: the surface moves with %.9g m/s, should with %.9g", k->dim,
+				check_found(posed, SPEED, a)[i], v);
+		}
+	}
+}
+
+/* Every feature in reach is at least as far as the nearest one, which is among them. */
+static void check_features(const check_kernel *k, tallies *t) {
+	const quern_body_ops *ops = k->ops;
+	check_kernel *one = malloc(sizeof *one);
+	if (!one) abort();
+	for (uint32_t i = 0; i < k->n && i < 100; i++) {
+		enum { MOST = 64 };
+		int32_t feature[MOST];
+		double x[3] = { 0 }, nearest = INFINITY;
+		const double gap = check_found(k, GAP, 0)[i];
+		for (uint32_t a = 0; a < k->dim; a++) x[a] = check_given(k, POSITION, a)[i];
+		check_place(k->check, "features, %u-D", k->dim);
+		const uint32_t n = ops->features(k->instance->self, &still, x, fabs(gap) + 1e-6, MOST, feature);
+		for (uint32_t f = 0; f < n && f < MOST; f++) {
+			create(k->check, k->instance, &still, 1, one);
+			check_add_integers(one, FEATURE, "feature", CHECK_IN);
+			((int32_t *)one->column[one->at[FEATURE]].given)[0] = feature[f];
+			for (uint32_t a = 0; a < k->dim; a++) check_given(one, POSITION, a)[0] = x[a];
+			check_run(one, 8, NULL);
+			if (check_found(one, GAP, 0)[0] < nearest) nearest = check_found(one, GAP, 0)[0];
+			check_kernel_finish(one);
+		}
+		check_expect(&t->features, n <= MOST && (gap < 0 || fabs(nearest - gap) < 1e-9),
+			"%u-D: the nearest surface is %.9g m away, the nearest of %u features %.9g", k->dim, gap, n,
+			nearest);
+	}
+	free(one);
+}
+
+static void try_dimension(const check *c, const check_instance *it, tallies *t) {
+	enum { PLACES = 1000 };
+	const double cosine = 0.8, sine = 0.6;
+	const quern_pose shifted = { .position = { 0.01, -0.02, it->dim == 3 ? 0.03 : 0 },
+		.turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 },
+		.velocity = { 0.5, -0.25, it->dim == 3 ? 0.125 : 0 } };
+	const quern_pose turned = { .position = { 0.01, -0.02, 0 },
+		.turn = { cosine, -sine, 0, sine, cosine, 0, 0, 0, 1 },
+		.spin = { 0, 0, 2 } };
+	check_kernel *k = malloc(2 * sizeof *k);
+	if (!k) abort();
+	create(c, it, &still, PLACES, &k[0]);
+	create(c, it, &still, PLACES, &k[1]);
+	check_surface(&k[0], &k[1], t);
+	check_bounds(&k[0], t);
+	check_pose(&k[0], &k[1], &shifted, false, &t->shifts);
+	check_pose(&k[0], &k[1], &turned, true, &t->turns);
+	if (((const quern_body_ops *)c->file->plugin.ops)->features) check_features(&k[0], t);
+	check_kernel_finish(&k[0]);
+	check_kernel_finish(&k[1]);
+	free(k);
+}
+
+static void law(const check *c) {
+	tallies t = { { .name = "unit normals" }, { .name = "gap along the normal" },
+		{ .name = "gap and radius" }, { .name = "bounds" }, { .name = "moved pose" },
+		{ .name = "turned pose" }, { .name = "features" } };
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		check_instance it;
+		if (!check_has_dim(c, dim)) continue;
+		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, &t);
+		check_instance_finish(c, &it);
+	}
+	check_tell(c, &t.normals, NULL);
+	check_tell(c, &t.gaps, NULL);
+	check_tell(c, &t.radii, NULL);
+	check_tell(c, &t.bounds, NULL);
+	check_tell(c, &t.shifts, NULL);
+	check_tell(c, &t.turns, NULL);
+	if (t.features.tried) check_tell(c, &t.features, NULL);
+}
+
+const check_kind check_body = { .make = make, .law = law };

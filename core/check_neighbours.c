@@ -1,0 +1,215 @@
+/* check_neighbours - searches: the same pairs as by looking at all of them, each once in its block */
+#include "check.h"
+#include "text.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+	uint32_t n, dim, periodic; /* bits by axis */
+	double spread, length[3], reach;
+} scenery;
+
+typedef struct {
+	quern_neighbour_job job;
+	quern_real *memory, *position[3], *radius;
+	uint32_t *block;
+} grains;
+
+static const scenery sceneries[] = { { 0, 0, 0, 0.1, { 1, 1, 1 }, 0.1 }, { 1, 0, 0, 0.1, { 1, 1, 1 }, 0.1 },
+	{ 2, 0, 7, 0.1, { 0.1, 0.1, 0.1 }, 0.1 }, { 500, 0, 0, 0.1, { 40, 40, 12 }, 0.2 },
+	{ 500, 0, 7, 0.1, { 40, 40, 12 }, 0.2 }, { 400, 0, 1, 0.8, { 30, 60, 9 }, 0.5 },
+	{ 300, 0, 7, 0.3, { 7, 40, 7 }, 0.3 }, { 200, 0, 2, 0.3, { 400, 400, 400 }, 0.1 },
+	{ 300, 0, 0, 0.0, { 10, 0.001, 10 }, 0.1 } };
+
+/* Lengths are in diameters of 2 mm. */
+static void create(const scenery *s, uint64_t key, grains *g) {
+	const double diameter = 2e-3;
+	*g = (grains) { .memory = quern_take(4 * (size_t)(s->n + 8), sizeof(quern_real)) };
+	g->block = quern_take((size_t)s->n + 2, sizeof(uint32_t));
+	g->radius = g->memory + 3 * (s->n + 8);
+	g->job =
+		(quern_neighbour_job) { .n = s->n, .dim = s->dim, .radius = g->radius, .reach = s->reach * diameter };
+	for (uint32_t i = 0; i < s->n; i++) {
+		g->radius[i] = 0.5 * diameter * (1 + check_uniform(key, i, -s->spread, s->spread));
+		if (g->radius[i] > g->job.largest) g->job.largest = g->radius[i];
+	}
+	for (uint32_t a = 0; a < s->dim; a++) {
+		g->position[a] = g->memory + a * (s->n + 8);
+		g->job.position[a] = g->position[a];
+		g->job.lower[a] = -0.01;
+		g->job.upper[a] = g->job.lower[a] + s->length[a] * diameter;
+		g->job.periodic[a] = s->periodic >> a & 1;
+		for (uint32_t i = 0; i < s->n; i++)
+			g->position[a][i] =
+				check_uniform(key + 1, (uint64_t)a << 32 | i, g->job.lower[a], g->job.upper[a]);
+	}
+}
+
+static void finish(grains *g) {
+	free(g->job.memory);
+	free(g->memory);
+	free(g->block);
+}
+
+typedef struct {
+	uint64_t key;
+	uint32_t from;
+} place;
+
+static int by_key(const void *pa, const void *pb) {
+	const place *a = pa, *b = pb;
+	if (a->key != b->key) return a->key < b->key ? -1 : 1;
+	return a->from < b->from ? -1 : a->from > b->from;
+}
+
+/* As the grains' solver does it: keys, a stable sort, blocks, an index. */
+static void sort_grains(const check *c, const check_instance *it, grains *g) {
+	const quern_neighbour_ops *ops = c->file->plugin.ops;
+	const uint32_t n = g->job.n;
+	uint64_t *key = quern_take((size_t)n + 1, sizeof *key);
+	place *order = quern_take((size_t)n + 1, sizeof *order);
+	quern_real *old = quern_take((size_t)n + 1, sizeof *old);
+	check_place(c, "keys, %u-D, while n = %u", g->job.dim, n);
+	const size_t wanted = ops->keys(it->self, &g->job, key);
+	for (uint32_t i = 0; i < n; i++) order[i] = (place) { key[i], i };
+	qsort(order, n, sizeof *order, by_key);
+	for (uint32_t a = 0; a <= g->job.dim; a++) {
+		quern_real *column = a < g->job.dim ? g->position[a] : g->radius;
+		memcpy(old, column, n * sizeof *old);
+		for (uint32_t i = 0; i < n; i++) column[i] = old[order[i].from];
+	}
+	for (uint32_t i = 0; i < n; i++)
+		if (!i || order[i].key >> 32 != order[i - 1].key >> 32) g->block[g->job.n_blocks++] = i;
+	g->block[g->job.n_blocks] = n;
+	g->job.block = g->block;
+	g->job.memory = quern_take(wanted + 64, 1);
+	check_place(c, "index, %u-D, while n = %u", g->job.dim, n);
+	if (ops->index) ops->index(it->self, &g->job);
+	free(key), free(order), free(old);
+}
+
+static bool is_near(const quern_neighbour_job *j, uint32_t a, uint32_t b) {
+	double d2 = 0;
+	for (uint32_t k = 0; k < j->dim; k++) {
+		const double length = j->upper[k] - j->lower[k];
+		double d = j->position[k][a] - j->position[k][b];
+		if (j->periodic[k]) d = d > 0.5 * length ? d - length : d < -0.5 * length ? d + length : d;
+		d2 += d * d;
+	}
+	const double reach = j->radius[a] + j->radius[b] + j->reach;
+	return d2 < reach * reach;
+}
+
+typedef struct {
+	const check *c;
+	const check_instance *it;
+	const grains *g;
+	quern_pair **pair; /* by block */
+	uint32_t *found, *overrun, cap;
+} search;
+
+static void find(void *arg, uint32_t b, uint32_t worker) {
+	enum { GUARD = -7 };
+	search *s = arg;
+	const quern_neighbour_ops *ops = s->c->file->plugin.ops;
+	(void)worker;
+	for (uint32_t i = s->cap; i < s->cap + 4; i++) s->pair[b][i] = (quern_pair) { GUARD, GUARD };
+	s->found[b] = ops->pairs(s->it->self, &s->g->job, b, s->cap, s->pair[b]);
+	for (uint32_t i = s->cap; i < s->cap + 4; i++)
+		if (s->pair[b][i].first != GUARD || s->pair[b][i].second != GUARD) s->overrun[b]++;
+}
+
+typedef struct {
+	check_tally pairs, once, room, threads;
+} tallies;
+
+static void compare(const search *s, tallies *t) {
+	const quern_neighbour_job *j = &s->g->job;
+	bool *seen = quern_take((size_t)j->n * j->n + 1, sizeof *seen);
+	for (uint32_t b = 0; b < j->n_blocks; b++) {
+		const uint32_t begin = j->block[b], end = j->block[b + 1];
+		memset(seen, 0, (size_t)j->n * j->n);
+		for (uint32_t i = 0; i < s->found[b] && i < s->cap; i++) {
+			const quern_pair p = s->pair[b][i];
+			const bool known =
+				p.first >= 0 && p.second >= 0 && (uint32_t)p.first < j->n && (uint32_t)p.second < j->n;
+			check_expect(&t->once,
+				known && (uint32_t)p.first >= begin && (uint32_t)p.first < end && p.first != p.second,
+				"%u-D: the pair (%d, %d) does not begin in its block", j->dim, p.first, p.second);
+			if (!known) continue;
+			const size_t low = (size_t)(p.first < p.second ? p.first : p.second),
+						 high = (size_t)(p.first < p.second ? p.second : p.first);
+			check_expect(
+				&t->once, !seen[low * j->n + high], "%u-D: a pair stands twice in one block", j->dim);
+			check_expect(&t->pairs, is_near(j, (uint32_t)low, (uint32_t)high),
+				"%u-D: a pair is farther than its reach", j->dim);
+			seen[low * j->n + high] = true;
+		}
+		for (uint32_t a = begin; a < end; a++)
+			for (uint32_t k = 0; k < j->n; k++) {
+				const size_t low = a < k ? a : k, high = a < k ? k : a;
+				if (k == a || !is_near(j, a, k)) continue;
+				check_expect(&t->pairs, seen[low * j->n + high], "%u-D: %u grains: a near pair is not found",
+					j->dim, j->n);
+			}
+	}
+	free(seen);
+}
+
+static void try_scenery(const check *c, const check_instance *it, const scenery *what, tallies *t) {
+	grains g;
+	create(what, 140, &g);
+	sort_grains(c, it, &g);
+	quern_pool *pool = quern_pool_create(4);
+	search s = { .c = c, .it = it, .g = &g };
+	s.pair = quern_take(g.job.n_blocks + 1, sizeof *s.pair);
+	s.found = quern_take(g.job.n_blocks + 1, sizeof *s.found);
+	s.overrun = quern_take(g.job.n_blocks + 1, sizeof *s.overrun);
+	uint32_t *first = quern_take(g.job.n_blocks + 1, sizeof *first);
+	for (uint32_t b = 0; b < g.job.n_blocks; b++)
+		s.pair[b] = quern_take((size_t)g.job.n * 256 + 16, sizeof(quern_pair));
+	check_place(c, "pairs, %u-D, while n = %u", g.job.dim, g.job.n);
+	for (uint32_t cap = 0; cap < 3; cap++) { /* too little room: counts are right all the same */
+		s.cap = cap;
+		for (uint32_t b = 0; b < g.job.n_blocks; b++) find(&s, b, 0), first[b] = s.found[b];
+	}
+	s.cap = g.job.n * 256;
+	for (uint32_t b = 0; b < g.job.n_blocks; b++) {
+		find(&s, b, 0);
+		check_expect(&t->room, first[b] == s.found[b],
+			"%u-D: %u pairs are counted with little room, %u with enough", g.job.dim, first[b], s.found[b]);
+		check_expect(&t->room, !s.overrun[b], "%u-D: pairs are written beyond cap", g.job.dim);
+	}
+	compare(&s, t);
+	memcpy(first, s.found, g.job.n_blocks * sizeof *first);
+	quern_pool_each(pool, g.job.n_blocks, find, &s);
+	check_expect(&t->threads, !memcmp(first, s.found, g.job.n_blocks * sizeof *first),
+		"%u-D: several threads at once find other pairs", g.job.dim);
+	for (uint32_t b = 0; b < g.job.n_blocks; b++) free(s.pair[b]);
+	free(s.pair), free(s.found), free(s.overrun), free(first);
+	quern_pool_destroy(pool);
+	finish(&g);
+}
+
+static void law(const check *c) {
+	tallies t = { { .name = "the same pairs as by brute force" }, { .name = "each once, in its block" },
+		{ .name = "room" }, { .name = "threads" } };
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		check_instance it;
+		if (!check_has_dim(c, dim)) continue;
+		if (check_instance_create(c, dim, 0, &it) == CHECK_READY)
+			for (size_t i = 0; i < sizeof sceneries / sizeof *sceneries; i++) {
+				scenery s = sceneries[i];
+				s.dim = dim;
+				try_scenery(c, &it, &s, &t);
+			}
+		check_instance_finish(c, &it);
+	}
+	check_tell(c, &t.pairs, NULL);
+	check_tell(c, &t.once, NULL);
+	check_tell(c, &t.room, "counts do not depend on cap, and nothing is written beyond it");
+	check_tell(c, &t.threads, NULL);
+}
+
+const check_kind check_neighbours = { .law = law };

@@ -1,0 +1,167 @@
+/* check_packer - placing grains in a region: no overlap, nothing outside, the radius that waits, the same again */
+#include "check.h"
+#include "random.h"
+#include "text.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST = 4000 };
+enum { EMPTY, SEEDED, WALLED, ROUND, REGIONS };
+
+typedef struct {
+	quern_pack_job job; /* first, so that a job is its packing */
+	uint32_t shape, n, limit;
+	quern_spot spot[MOST];
+	uint32_t overlaps, outside, other_radius, after_end, off_plane;
+} packing;
+
+static const double mean = 1e-3, side = 12e-3;
+
+static double drawn(const packing *p) { return mean * check_uniform(150, p->n - p->job.n_seed, 0.8, 1.2); }
+
+static quern_real radius(quern_pack_job *job) { return drawn((packing *)(void *)job); }
+
+static bool inside(const quern_pack_job *job, const quern_real x[3]) {
+	const packing *p = (const packing *)(const void *)job;
+	double r2 = 0;
+	for (uint32_t k = 0; k < job->dim; k++) {
+		if (!(x[k] >= job->lower[k] && x[k] <= job->upper[k])) return false;
+		r2 += pow(x[k] - 0.5 * side, 2);
+	}
+	return p->shape != ROUND || r2 <= 0.25 * side * side;
+}
+
+static bool is_free(const quern_pack_job *job, const quern_spot *s) {
+	const packing *p = (const packing *)(const void *)job;
+	if (p->shape == WALLED && s->x[job->dim - 1] < s->radius * (1 - 1e-9)) return false;
+	for (uint32_t i = 0; i < p->n; i++) {
+		double d2 = 0;
+		for (uint32_t k = 0; k < job->dim; k++) d2 += pow(s->x[k] - p->spot[i].x[k], 2);
+		const double reach = s->radius + p->spot[i].radius - 1e-9 * s->radius;
+		if (d2 < reach * reach) return false;
+	}
+	return true;
+}
+
+static bool place(quern_pack_job *job, const quern_spot *s) {
+	packing *p = (packing *)(void *)job;
+	if (p->n >= p->limit) return p->after_end++, false;
+	p->overlaps += !is_free(job, s);
+	p->outside += !inside(job, s->x);
+	p->other_radius += s->radius != drawn(p);
+	p->off_plane += job->dim == 2 && s->x[2] != 0;
+	p->spot[p->n++] = *s;
+	return p->n < p->limit;
+}
+
+static const quern_host host = { .abi = QUERN_ABI, .random = quern_random };
+
+static void begin(uint32_t dim, uint32_t shape, uint64_t key, uint32_t limit, packing *p) {
+	memset(p, 0, sizeof *p);
+	p->shape = shape;
+	p->job = (quern_pack_job) { .dim = dim,
+		.stream = 3,
+		.key = key,
+		.host = &host,
+		.radius = radius,
+		.inside = inside,
+		.free = is_free,
+		.place = place };
+	for (uint32_t k = 0; k < dim; k++) p->job.upper[k] = side;
+	if (shape == SEEDED) { /* one inside, two beside it */
+		static const double at[3][3] = { { 0.5, 0.5, 0.5 }, { -0.05, 0.5, 0.5 }, { 1.1, 0.3, 0.5 } };
+		for (int s = 0; s < 3; s++, p->n++) {
+			p->spot[s].radius = mean;
+			for (uint32_t k = 0; k < dim; k++) p->spot[s].x[k] = at[s][k] * side;
+		}
+		p->job.n_seed = 3, p->job.n_own = 1;
+	}
+	p->limit = p->n + limit;
+}
+
+/* The seeds stay where they were at the start while others are placed. */
+static void pack(const check *c, const check_instance *it, packing *p) {
+	const quern_packer_ops *ops = c->file->plugin.ops;
+	quern_spot seed[3];
+	memcpy(seed, p->spot, sizeof seed);
+	p->job.seed = seed;
+	check_place(c, "pack, %u-D, in region %u", it->dim, p->shape);
+	ops->pack[it->dim - 2](it->self, &p->job);
+	p->job.seed = NULL;
+}
+
+typedef struct {
+	check_tally overlap, inside, radius, end, again, grains, self;
+} tallies;
+
+static void look(const packing *p, tallies *t) {
+	const uint32_t dim = p->job.dim, n = p->n - p->job.n_seed;
+	check_expect(&t->overlap, !p->overlaps,
+		"%u-D: %u of %u grains overlap others or a wall by more than 1e-9", dim, p->overlaps, n);
+	check_expect(&t->inside, !p->outside && !p->off_plane,
+		"%u-D: %u of %u grains have their centre outside the region", dim, p->outside + p->off_plane, n);
+	check_expect(&t->radius, !p->other_radius,
+		"%u-D: %u of %u grains have another radius than the one that waits", dim, p->other_radius, n);
+	check_expect(&t->end, !p->after_end, "%u-D: %u grains are placed after place() has said enough", dim,
+		p->after_end);
+	check_expect(&t->grains, n > 0, "%u-D: nothing is placed in an empty region", dim);
+}
+
+static bool same(const packing *a, const packing *b) {
+	return a->n == b->n && a->job.counter == b->job.counter &&
+		   !memcmp(a->spot, b->spot, a->n * sizeof *a->spot);
+}
+
+static void try_dimension(const check *c, const check_instance *it, packing p[2], tallies *t) {
+	const uint32_t size = c->file->plugin.instance_size;
+	void *before = quern_take(1, size);
+	memcpy(before, it->self, size);
+	for (uint32_t shape = 0; shape < REGIONS; shape++)
+		for (uint64_t key = 0; key < 4; key++) {
+			for (int i = 0; i < 2; i++) {
+				begin(it->dim, shape, key, key == 3 ? 7 : MOST - 8, &p[i]);
+				pack(c, it, &p[i]);
+			}
+			look(&p[0], t);
+			check_expect(&t->again, same(&p[0], &p[1]),
+				"%u-D: the same seed and counter give another packing", it->dim);
+		}
+	check_expect(&t->self, !memcmp(before, it->self, size), "%u-D: self changes", it->dim);
+	free(before);
+}
+
+static bool sane(const check *c, const check_instance *it, const char **why) {
+	packing *p = malloc(sizeof *p);
+	if (!p) abort();
+	begin(it->dim, EMPTY, 5, 20, p);
+	pack(c, it, p);
+	const bool good = !p->overlaps && !p->outside && !p->other_radius && !p->after_end;
+	free(p);
+	*why = "a placed grain";
+	return good;
+}
+
+static void law(const check *c) {
+	tallies t = { { .name = "no overlap" }, { .name = "inside the region" },
+		{ .name = "the radius that waits" }, { .name = "enough is enough" }, { .name = "the same again" },
+		{ .name = "places grains" }, { .name = "self" } };
+	packing *p = malloc(2 * sizeof *p);
+	if (!p) abort();
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		check_instance it;
+		if (!check_has_dim(c, dim)) continue;
+		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, p, &t);
+		check_instance_finish(c, &it);
+	}
+	free(p);
+	check_tell(c, &t.grains, NULL);
+	check_tell(c, &t.overlap, "none above 1e-9 of a radius");
+	check_tell(c, &t.inside, NULL);
+	check_tell(c, &t.radius, NULL);
+	check_tell(c, &t.end, NULL);
+	check_tell(c, &t.again, NULL);
+	check_tell(c, &t.self, "self is left alone");
+}
+
+const check_kind check_packer = { .sane = sane, .law = law };

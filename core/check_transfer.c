@@ -1,0 +1,165 @@
+/* check_transfer - from grid to particles and back, on a line of nodes: uniform motion stays, momentum is kept */
+#include "check.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PIC, CHANGE, ECHO, SEND, OLD, VELOCITY };
+
+static void call(const check_kernel *k, const check_batch *b) {
+	const quern_transfer_ops *ops = k->ops;
+	quern_column use[CHECK_ROWS];
+	quern_transfer_batch batch = { .n = b->n, .cap = b->cap, .pass = k->pass, .dt = k->dt, .use = use };
+	CHECK_VECTOR(batch.pic, k, b, PIC, k->dim);
+	CHECK_VECTOR(batch.change, k, b, CHANGE, k->dim);
+	CHECK_VECTOR(batch.echo, k, b, ECHO, k->dim);
+	CHECK_VECTOR(batch.send, k, b, SEND, k->dim);
+	CHECK_VECTOR(batch.velocity, k, b, VELOCITY, k->dim);
+	check_columns(k, b, k->use, use);
+	ops->gather[k->dim - 2](k->instance->self, &batch);
+}
+
+/* Before the last pass a transfer sends and leaves velocities alone. */
+static void create(const check *c, const check_instance *it, uint32_t pass, uint32_t n, check_kernel *k) {
+	const quern_transfer_ops *ops = c->file->plugin.ops;
+	const bool last = pass == ops->passes;
+	check_kernel_init(k, c, it, last ? "gather, last pass" : "gather", n);
+	k->call = call;
+	k->pass = pass;
+	k->dt = 1e-3;
+	check_add(k, PIC, "pic", CHECK_IN, k->dim);
+	check_add(k, CHANGE, "change", CHECK_IN, k->dim);
+	if (pass) check_add(k, ECHO, "echo", CHECK_IN, k->dim);
+	if (!last) check_add(k, SEND, "send", CHECK_OUT, k->dim);
+	check_add(k, VELOCITY, "velocity", last ? CHECK_CHANGED : CHECK_IN, k->dim);
+	check_add_uses(k, 0, true, false);
+}
+
+static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
+	const quern_transfer_ops *ops = c->file->plugin.ops;
+	static const int names[] = { PIC, CHANGE, ECHO, VELOCITY };
+	if (variant > ops->passes) return false;
+	create(c, it, variant, n, k);
+	for (int i = 0; i < 4; i++)
+		if (k->at[names[i]] >= 0) check_fill(k, names[i], k->dim, 90 + (uint64_t)i, -1, 1);
+	return true;
+}
+
+/* ---- particles on a line of nodes ---- */
+
+enum { PARTICLES = 400, NODES = 41 };
+
+typedef struct {
+	double x[PARTICLES], m[PARTICLES], v[PARTICLES][3], send[PARTICLES][3], echo[PARTICLES][3];
+	double mass[NODES], old[NODES][3], now[NODES][3];
+} line;
+
+/* Mass-weighted means of `what` at the nodes. */
+static void to_nodes(const line *l, double (*what)[3], double (*nodes)[3]) {
+	memset(nodes, 0, NODES * sizeof *nodes);
+	for (int p = 0; p < PARTICLES; p++) {
+		const int i = (int)l->x[p];
+		for (int c = 0; c < 3; c++) {
+			nodes[i][c] += (i + 1 - l->x[p]) * l->m[p] * what[p][c];
+			nodes[i + 1][c] += (l->x[p] - i) * l->m[p] * what[p][c];
+		}
+	}
+	for (int i = 0; i < NODES; i++)
+		for (int c = 0; c < 3; c++) nodes[i][c] = l->mass[i] > 0 ? nodes[i][c] / l->mass[i] : 0;
+}
+
+static double from_nodes(const line *l, double (*nodes)[3], int p, int c) {
+	const int i = (int)l->x[p];
+	return (i + 1 - l->x[p]) * nodes[i][c] + (l->x[p] - i) * nodes[i + 1][c];
+}
+
+static void begin_line(line *l, bool uniform) {
+	memset(l, 0, sizeof *l);
+	for (int p = 0; p < PARTICLES; p++) {
+		l->x[p] = check_uniform(95, (uint64_t)p, 0, NODES - 1.001);
+		l->m[p] = check_uniform(96, (uint64_t)p, 0.5, 2);
+		for (int c = 0; c < 3; c++)
+			l->v[p][c] = uniform ? 1 + c : check_uniform(97, (uint64_t)(p * 4 + c), -1, 1);
+		const int i = (int)l->x[p];
+		l->mass[i] += (i + 1 - l->x[p]) * l->m[p];
+		l->mass[i + 1] += (l->x[p] - i) * l->m[p];
+	}
+	to_nodes(l, l->v, l->old);
+	for (int i = 0; i < NODES; i++)
+		for (int c = 0; c < 3; c++) {
+			const double kick = uniform ? 0 : check_uniform(98, (uint64_t)(i * 4 + c), -0.5, 0.5);
+			l->now[i][c] = l->old[i][c] + kick;
+		}
+}
+
+/* All passes; new velocities in l->v. */
+static void gather(const check *c, const check_instance *it, line *l) {
+	const quern_transfer_ops *ops = c->file->plugin.ops;
+	double(*nodes)[3] = malloc(NODES * sizeof *nodes);
+	check_kernel *k = malloc(sizeof *k);
+	if (!k || !nodes) abort();
+	for (uint32_t pass = 0; pass <= ops->passes; pass++) {
+		create(c, it, pass, PARTICLES, k);
+		for (uint32_t a = 0; a < k->dim; a++)
+			for (int p = 0; p < PARTICLES; p++) {
+				const double pic = from_nodes(l, l->now, p, (int)a);
+				check_given(k, PIC, a)[p] = pic;
+				check_given(k, CHANGE, a)[p] = pic - from_nodes(l, l->old, p, (int)a);
+				check_given(k, VELOCITY, a)[p] = l->v[p][a];
+				if (k->at[ECHO] >= 0) check_given(k, ECHO, a)[p] = l->echo[p][a];
+			}
+		check_run(k, 64, NULL);
+		for (uint32_t a = 0; a < k->dim; a++)
+			for (int p = 0; p < PARTICLES; p++) {
+				if (pass == ops->passes) l->v[p][a] = check_found(k, VELOCITY, a)[p];
+				else l->send[p][a] = check_found(k, SEND, a)[p];
+			}
+		to_nodes(l, l->send, nodes);
+		for (int p = 0; p < PARTICLES; p++)
+			for (int a = 0; a < 3; a++) l->echo[p][a] = from_nodes(l, nodes, p, a);
+		check_kernel_finish(k);
+	}
+	free(nodes);
+	free(k);
+}
+
+static void check_momentum(const check *c, const check_instance *it, line *l, check_tally *t) {
+	begin_line(l, false);
+	gather(c, it, l);
+	for (uint32_t a = 0; a < it->dim; a++) {
+		double particles = 0, nodes = 0, scale = 0;
+		for (int i = 0; i < NODES; i++) nodes += l->mass[i] * l->now[i][a];
+		for (int p = 0; p < PARTICLES; p++)
+			particles += l->m[p] * l->v[p][a], scale += l->m[p] * fabs(l->v[p][a]);
+		check_measure(t, fabs(particles - nodes) / scale, 1e-12,
+			"%u-D: nodes carry a momentum of %.9g, particles take up %.9g kg m/s", it->dim, nodes, particles);
+	}
+}
+
+static void law(const check *c) {
+	check_tally uniform = { .name = "uniform motion" }, momentum = { .name = "momentum" };
+	const quern_transfer_ops *ops = c->file->plugin.ops;
+	line *l = malloc(sizeof *l);
+	if (!l) abort();
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		if (!check_has_dim(c, dim)) continue;
+		for (uint64_t setting = 0; setting < check_settings(c); setting++) {
+			check_instance it;
+			if (check_instance_create(c, dim, setting, &it) == CHECK_READY) {
+				begin_line(l, true);
+				gather(c, &it, l);
+				for (int p = 0; p < PARTICLES; p++)
+					for (uint32_t a = 0; a < dim; a++)
+						check_measure(&uniform, fabs(l->v[p][a] - 1 - a), 1e-13,
+							"%u-D: a uniform velocity of %u m/s becomes %.15g", dim, a + 1, l->v[p][a]);
+				check_momentum(c, &it, l, &momentum);
+			}
+			check_instance_finish(c, &it);
+		}
+	}
+	free(l);
+	check_tell(c, &uniform, NULL);
+	check_tell(c, &momentum, "after %u extra round trips", ops->passes);
+}
+
+const check_kind check_transfer = { .make = make, .law = law };
