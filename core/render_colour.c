@@ -107,7 +107,7 @@ static bool takes_prefix(const char *unit) {
 static void set_label(render_range *range, const render_frame *f) {
 	static const char *const prefixes[] = { "n", "µ", "m", "", "k", "M", "G" };
 	const double size = fmax(fabs(range->low), fabs(range->high));
-	const int third = (int)floor(log10(size * 1.0001) / 3);
+	const int third = size >= 0.1 && size < 1 ? 0 : (int)floor(log10(size * 1.0001) / 3);
 	const bool prefix = takes_prefix(f->unit) && third >= -3 && third <= 3;
 	char unit[64] = "";
 	const char *name = f->field;

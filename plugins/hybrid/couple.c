@@ -304,7 +304,7 @@ static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool l
 }
 
 /* The impulse is spread over the substeps: the path of a grain is moved by (n + 1)/(2 n) dt dv. With the whole dt dv
- * the scheme is unstable: docs/theory/hybrid.md, section 3. */
+ * the scheme is unstable: docs/theory/hybrid.md, section 2. */
 static void move_grains(const back_work *w, back_memory *m, uint32_t b, uint32_t n) {
 	const quern_column *u = w->s->use;
 	const quern_real share = 0.5 * (w->h->substeps + 1) / w->h->substeps * w->s->dt;

@@ -52,7 +52,7 @@ BROKEN = [
     ("is silent", LINEAR, [("return QUERN_OK;", "return law->friction > 1 ? QUERN_E_PARAM : QUERN_OK;")], "parameters"),
     ("divides by zero", LINEAR, [(FORCE, "b->force[0][i] += f.x / (law.friction > 0 ? 1 : 0);")], "finite"),
     ("says nothing", LINEAR, [('"Normal spring k_n."', '""')], "parameter rows"),
-    ("has no unit", LINEAR, [('"N/m", "Normal', '"N per m", "Normal')], "parameter rows"),
+    ("has no unit", LINEAR, [('"N/m", "Normal', '"newtonn/m", "Normal')], "parameter rows"),
     ("starts outside", LINEAR, [(".def = 0.5, .max = 10", ".def = 11, .max = 10")], "parameter rows"),
     ("uses nobody's field", LINEAR, [('.field = "contact.slip"', '.field = "slip"')], "uses"),
     ("does not turn", "mpm_hypo/material.elastic.c", [
@@ -101,8 +101,7 @@ def check_broken():
 
 
 def check_crashes():
-    ends = [("*(volatile int *)0 = b->n == 7 ? 1 : *(volatile int *)&b->n;", "n = "),
-            ("if (b->n == 7) *(volatile int *)0 = 1;", "contact.linear: crashed (SIGSEGV) in linear.force, 2-D, while n = 7"),
+    ends = [("if (b->n == 7) *(volatile int *)0 = 1;", "contact.linear: crashed (SIGSEGV) in linear.force, 2-D, while n = 7"),
             ("if (b->n == 7) __builtin_trap();", "contact.linear: crashed (SIGILL) in linear.force, 2-D, while n = 7"),
             ("while (b->n == 7) __asm__ volatile(\"\");",
              "contact.linear: did not come back within 2 s from linear.force, 2-D, while n = 7")]

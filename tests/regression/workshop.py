@@ -10,15 +10,18 @@ FLAGS = ["-std=c17", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off",
          "-fno-trapping-math", "-fopenmp-simd"]
 
 
-def compile(text, name, folder, *flags, beside=""):
-    """An object `name` in `folder` from C text; `beside`: the folder its own includes are relative to."""
-    path = pathlib.Path(folder) / (name + ".c")
-    path.write_text(text)
-    command = ["cc", *FLAGS, "-shared", "-I", SOURCE / "include", "-I", SOURCE / "plugins" / beside, path,
-               "-o", pathlib.Path(folder) / (name + ".so"), "-lm", *flags]
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-    assert done.returncode == 0, f"{name} does not compile:\n{done.stderr}"
-    return str(pathlib.Path(folder) / (name + ".so"))
+def compile(text, name, folder, *link, beside=""):
+    """An object `name`.so in `folder` from C text; `link`: more flags for the linker, `beside`: the folder that its own
+    includes are relative to."""
+    stem = pathlib.Path(folder) / name
+    stem.with_name(name + ".c").write_text(text)
+    steps = [["cc", *FLAGS, "-c", "-I", SOURCE / "include", "-I", SOURCE / "plugins" / beside, f"{stem}.c",
+              "-o", f"{stem}.o"],
+             ["cc", "-shared", f"{stem}.o", "-o", f"{stem}.so", "-lm", *link]]
+    for step in steps:
+        done = subprocess.run(list(map(str, step)), capture_output=True, text=True)
+        assert done.returncode == 0, f"{name} does not compile:\n{done.stderr}"
+    return f"{stem}.so"
 
 
 def source(path, *changes):
