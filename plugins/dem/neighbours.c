@@ -79,22 +79,34 @@ static quern_status sort_grains(listing *l) {
 
 /* ---- pairs ---- */
 
-static int by_place(const void *pa, const void *pb) {
-	const quern_pair *a = pa, *b = pb;
-	if (a->first != b->first) return a->first < b->first ? -1 : 1;
-	return a->second < b->second ? -1 : a->second > b->second;
+/* One of the two passes of a sort by two numbers: by the id of the second grains, then, keeping that order among equals,
+ * of the first. */
+static void sort_by_id(const listing *l, quern_pair *pair, uint32_t n, bool second, uint64_t *memory) {
+	uint64_t *key = memory, *work = key + n;
+	int32_t *from = (int32_t *)(void *)(work + quern_sort_bytes(n) / sizeof *work + 1);
+	quern_pair *copy = (quern_pair *)(void *)(from + n + n % 2);
+	for (uint32_t i = 0; i < n; i++) key[i] = (uint64_t)l->id[second ? pair[i].second : pair[i].first];
+	quern_sort_order(n, key, from, work);
+	memcpy(copy, pair, n * sizeof *pair);
+	for (uint32_t i = 0; i < n; i++) pair[i] = copy[from[i]];
 }
 
-/* In the order of (grain of this block, partner): the order in which forces are added, the same for any search. */
-static void sort_pairs(quern_pair *pair, uint32_t n) {
-	bool sorted = true;
-	for (uint32_t i = 1; i < n && sorted; i++) sorted = by_place(&pair[i - 1], &pair[i]) < 0;
-	if (!sorted) qsort(pair, n, sizeof *pair, by_place);
+/* The first of a pair is the one of lower id, for ever. In the order of ids, every grain adds up its forces in the order
+ * of its partners' ids: sums have the same bits for any search, in whatever order it keeps the grains. */
+static bool sort_pairs(const listing *l, quern_pair *pair, uint32_t n, uint32_t worker) {
+	const size_t bytes = quern_sort_bytes(n) + (n + 2) * (sizeof(uint64_t) + sizeof(int32_t) + sizeof *pair);
+	uint64_t *memory = l->s->host->scratch(l->s->run, worker, bytes);
+	if (!memory) return false;
+	for (uint32_t i = 0; i < n; i++)
+		if (l->id[pair[i].first] > l->id[pair[i].second])
+			pair[i] = (quern_pair) { pair[i].second, pair[i].first };
+	sort_by_id(l, pair, n, true, memory);
+	sort_by_id(l, pair, n, false, memory);
+	return true;
 }
 
 static void find_pairs(void *arg, uint32_t b, uint32_t worker) {
 	listing *l = arg;
-	(void)worker;
 	const uint32_t begin = l->job.block[b], end = l->job.block[b + 1];
 	const uint32_t cap = (end - begin) * l->cap;
 	quern_pair *out = l->pair + (size_t)begin * l->cap;
@@ -104,17 +116,9 @@ static void find_pairs(void *arg, uint32_t b, uint32_t worker) {
 		return;
 	}
 	uint32_t kept = 0;
-	for (uint32_t i = 0; i < n; i++) {
-		quern_pair p = out[i];
-		if (l->fixed && l->fixed[p.first] && l->fixed[p.second]) continue;
-		const bool inside = (uint32_t)p.second >= begin && (uint32_t)p.second < end;
-		if (inside && p.second < p.first) p = (quern_pair) { p.second, p.first };
-		out[kept++] = p;
-	}
-	sort_pairs(out, kept);
-	for (uint32_t i = 0; i < kept; i++) /* the first is the one of lower id, for ever */
-		if (l->id[out[i].first] > l->id[out[i].second]) out[i] = (quern_pair) { out[i].second, out[i].first };
-	l->found[b] = kept;
+	for (uint32_t i = 0; i < n; i++)
+		if (!l->fixed || !l->fixed[out[i].first] || !l->fixed[out[i].second]) out[kept++] = out[i];
+	l->found[b] = sort_pairs(l, out, kept, worker) ? kept : UINT32_MAX;
 }
 
 /* Entries of the old list by their first grain: an entry across blocks stands there twice, with equal contents. */
@@ -161,6 +165,8 @@ static quern_status search_pairs(listing *l) {
 		l->pair = s->host->memory(s->run, ((size_t)l->job.n * l->cap + 1) * sizeof(quern_pair));
 		if (!l->pair) return QUERN_E_MEMORY;
 		s->host->parallel(s->run, l->job.n_blocks, find_pairs, l);
+		for (uint32_t b = 0; b < l->job.n_blocks; b++)
+			if (l->found[b] == UINT32_MAX) return QUERN_E_MEMORY;
 		for (uint32_t b = 0; b < l->job.n_blocks; b++)
 			enough = enough && l->found[b] <= (l->job.block[b + 1] - l->job.block[b]) * l->cap;
 		if (enough) break;

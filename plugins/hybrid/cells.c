@@ -57,11 +57,19 @@ static void *take(update *d, size_t count, size_t size) {
 	return memory;
 }
 
+static bool owes(const quern_column *u, int mass, int momentum, uint32_t dim, uint32_t k) {
+	bool any = u[mass].real[0][k] != 0;
+	for (uint32_t a = 0; a < dim; a++) any = any || u[momentum].real[a][k] != 0;
+	return any;
+}
+
 /* Blocks whose cells owe or are owed something stay, wherever the material has gone. */
 static bool holds(const void *arg, uint32_t block) {
-	const quern_column *u = ((const quern_step *)arg)->use;
+	const quern_step *s = arg;
 	for (uint32_t k = block * N; k < (block + 1) * N; k++)
-		if (u[U_GRAIN_OWED].real[0][k] != 0 || u[U_POINT_OWED].real[0][k] != 0) return true;
+		if (owes(s->use, U_GRAIN_OWED, U_GRAIN_OWED_MOMENTUM, s->dim, k) ||
+			owes(s->use, U_POINT_OWED, U_POINT_OWED_MOMENTUM, s->dim, k))
+			return true;
 	return false;
 }
 

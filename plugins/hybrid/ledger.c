@@ -24,6 +24,12 @@ static void shift(entry e, uint32_t to, entry from, uint32_t c, uint32_t dim) {
 	}
 }
 
+static bool is_empty(entry e, uint32_t c, uint32_t dim) {
+	bool any = e.mass[c] != 0;
+	for (uint32_t k = 0; k < dim; k++) any = any || e.momentum[k][c] != 0;
+	return !any;
+}
+
 /* ---- entries move with the material ---- */
 
 typedef struct {
@@ -87,7 +93,9 @@ void quern_hybrid_move_entries(update *d) {
 			const int32_t now = clouds[cloud].now[i],
 						  home = now < 0 ? -1 : home_entry(d, clouds[cloud].home[i]);
 			if (home < 0 || home == now || !(of_home[home] > 0)) continue;
-			if (old_grains.mass[home] == 0 && old_points.mass[home] == 0) continue;
+			if (is_empty(old_grains, (uint32_t)home, d->s->dim) &&
+				is_empty(old_points, (uint32_t)home, d->s->dim))
+				continue;
 			const quern_real share = clouds[cloud].weight[i] * clouds[cloud].mass[i] / of_home[home];
 			give_share(d, grains, old_grains, (uint32_t)home, (uint32_t)now, share);
 			give_share(d, points, old_points, (uint32_t)home, (uint32_t)now, share);
@@ -161,13 +169,13 @@ quern_status quern_hybrid_hand_over(update *d) {
 	if (!source || !nearest) return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		source[c] = d->zone[c] == QUERN_HYBRID;
-		any = any || (d->zone[c] == QUERN_DISCRETE && grains.mass[c] != 0);
+		any = any || (d->zone[c] == QUERN_DISCRETE && !is_empty(grains, c, d->s->dim));
 	}
 	if (!any) return QUERN_OK;
 	const quern_status status = quern_hybrid_nearest(d, source, nearest);
 	if (status != QUERN_OK) return status;
 	for (uint32_t c = 0; c < d->n_cells; c++)
-		if (d->zone[c] == QUERN_DISCRETE && grains.mass[c] != 0 && nearest[c] >= 0)
+		if (d->zone[c] == QUERN_DISCRETE && !is_empty(grains, c, d->s->dim) && nearest[c] >= 0)
 			shift(grains, (uint32_t)nearest[c], grains, c, d->s->dim);
 	return QUERN_OK;
 }

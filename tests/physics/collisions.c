@@ -40,7 +40,8 @@ static quern_run *open_scene(const collision *c, int n, const char *step, double
 	text_add(&t, "{quern: 1, dimension: %u, gravity: [0, 0%s], ", c->dim, more);
 	text_add(&t, "domain: {lower: [-0.1, -0.1%s], upper: [0.1, 3%s]},\n", low, high);
 	text_add(&t, "time: {end: %.17g, step: %s}, output: {every: %.17g},\n", 1000 * dt, step, dt);
-	if (c->with == WALL) text_add(&t, "bodies: [{plane: {point: [0, 0%s], normal: [-1, 0%s]}}],\n", more, more);
+	if (c->with == WALL)
+		text_add(&t, "bodies: [{plane: {point: [0, 0%s], normal: [-1, 0%s]}}],\n", more, more);
 	text_add(&t, "grains:\n  {material: {density: 2500, radius: {mean: %.17g}},\n", radius);
 	if (c->hertz)
 		text_add(&t, "  contact: {hertz: {young: 1e8, poisson: 0.25, friction: 0, restitution: %.17g, ",
@@ -116,15 +117,18 @@ static void linear_with_verlet(void **unused) {
 }
 static void hertz_with_euler(void **unused) {
 	(void)unused;
-	assert_true(collide("hertz, symplectic_euler", (collision) { .hertz = true, .integrator = "symplectic_euler" }));
+	assert_true(
+		collide("hertz, symplectic_euler", (collision) { .hertz = true, .integrator = "symplectic_euler" }));
 }
 static void hertz_with_verlet(void **unused) {
 	(void)unused;
-	assert_true(collide("hertz, velocity_verlet", (collision) { .hertz = true, .integrator = "velocity_verlet" }));
+	assert_true(
+		collide("hertz, velocity_verlet", (collision) { .hertz = true, .integrator = "velocity_verlet" }));
 }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(linear_with_euler), cmocka_unit_test(linear_with_verlet),
-		cmocka_unit_test(hertz_with_euler), cmocka_unit_test(hertz_with_verlet) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(linear_with_euler),
+		cmocka_unit_test(linear_with_verlet), cmocka_unit_test(hertz_with_euler),
+		cmocka_unit_test(hertz_with_verlet) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
