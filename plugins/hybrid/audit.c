@@ -117,8 +117,10 @@ quern_status quern_hybrid_audit(const void *self, const quern_step *s) {
 	if (!u[A_AUDITS].index[0]) {
 		u[A_AUDITS].index[0] = 1;
 		u[A_MASS].real[0][0] = now.mass;
-		for (uint32_t k = 0; k < s->dim; k++)
+		for (uint32_t k = 0; k < s->dim; k++) {
 			u[A_MOMENTUM].real[k][0] = now.momentum[k] + now.owed_momentum[k] - impulse(s, k);
+			u[A_LEFT].real[k][0] = 0;
+		}
 	} else
 		for (uint32_t k = 0; k < s->dim; k++) u[A_GRAVITY].real[k][0] += now.carried * s->gravity[k] * s->dt;
 	return judge(s, &now);
