@@ -231,9 +231,18 @@ static void check_sections(quern_scene *s, quern_mark mark) {
 			"scene: grains and continuum do not feel each other without a section hybrid; add it, or keep "
 			"one of them "
 			"with 'model: grains' or 'model: continuum'");
-	else if (hybrid && !(grains && continuum))
-		quern_report_add(s->report, hybrid->mark,
-			"scene: hybrid needs both grains and continuum; %s is missing", grains ? "continuum" : "grains");
+}
+
+/* A hybrid lives on what the other two publish; without them only their absence is worth a message. */
+static bool lacks_a_side(quern_scene *s, const quern_section_name *name, const quern_entry *entry) {
+	if (strcmp(name->section, "hybrid") != 0) return false;
+	const char *missing = !quern_scene_section(s, "grains")      ? "grains"
+						  : !quern_scene_section(s, "continuum") ? "continuum"
+																 : NULL;
+	if (missing)
+		quern_report_add(
+			s->report, entry->mark, "scene: hybrid needs both grains and continuum; %s is missing", missing);
+	return missing != NULL;
 }
 
 static void resolve(quern_scene *s) {
@@ -251,7 +260,7 @@ static void resolve(quern_scene *s) {
 		const quern_entry *entry = quern_node_entry(root, names->section);
 		if (!entry || quern_node_is_null(entry->value) || !wanted(s, names->section)) continue;
 		const size_t before = s->n_sections;
-		quern_section_read(s, names, entry);
+		if (failed || !lacks_a_side(s, names, entry)) quern_section_read(s, names, entry);
 		failed = failed || s->n_sections == before;
 	}
 	if (!failed) check_sections(s, root->mark);

@@ -247,7 +247,7 @@ static void every_step(void **unused) {
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (int which = 0; which < 4; which++) {
 			const heap h = { dim, which & 1, which >> 1, dim == 2 ? 0.2 : 0.08, dim == 2 ? 0.2 : 0.1,
-				"1.25e-5" };
+				"auto" };
 			gap worst = { 0, 0 };
 			quern_run *run = open_scene(&h);
 			harness_until(run, 0.1);
@@ -290,7 +290,7 @@ static void whole_collapse(void **unused) {
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (int which = 0; which < 4; which++) {
 			const heap h = { dim, which & 1, which >> 1, dim == 2 ? 0.2 : 0.08, dim == 2 ? 0.3 : 0.16,
-				"1.25e-5" };
+				"auto" };
 			double begin[KINDS + 1], end[KINDS + 1];
 			quern_run *run = open_scene(&h);
 			harness_steps(run, 1);

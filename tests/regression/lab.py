@@ -1,0 +1,167 @@
+"""Runs to experiment with: small columns that convert within a second, runs stopped on the way, folders compared."""
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy
+
+QUERN = os.environ["QUERN"]
+SOURCE = pathlib.Path(os.environ["QUERN_SOURCE"])
+
+
+def sets(**values):
+    """--set options; `__` in a name stands for a dot."""
+    return [f"--set={key.replace('__', '.')}={value}" for key, value in values.items()]
+
+
+# The columns of configs/, smaller, softer and shallower, so that every one of their parts is at work within a second.
+SMALL = {
+    "column": sets(
+        domain__upper="[0.2, 0.32]", time__end="60 ms", output__every="5 ms", hybrid__update=100,
+        grains__fill__0__region__box="{lower: [0, -0.7 mm], upper: [0.2, -0.7 mm]}",
+        grains__fill__1__region__box="{lower: [0.001, 0.001], upper: [0.039, 0.045]}",
+        bodies__2__plane__point="[0.04, 0]", grains__contact__linear__stiffness="1e5 N/m",
+        grains__settle__energy=1e-3, hybrid__oracle="[{packing_fraction: {depth: 8 mm, half_width: 4 mm}}]"),
+    "column_3d": sets(
+        domain__upper="[0.1, 0.008, 0.16]", time__end="30 ms", output__every="5 ms", hybrid__update=100,
+        grains__fill__0__region__box="{lower: [0, 0, -0.7 mm], upper: [0.1, 0.008, -0.7 mm]}",
+        grains__fill__1__region__box="{lower: [0.001, 0, 0.001], upper: [0.019, 0.008, 0.04]}",
+        bodies__2__plane__point="[0.02, 0, 0]", grains__contact__linear__stiffness="100 N/m",
+        continuum__fill__region__box__upper="[0.084, 0.008, 0.124]", grains__settle__energy=1e-3,
+        hybrid__oracle="[{packing_fraction: {depth: 8 mm, half_width: 4 mm}}]")}
+
+
+def scene(name):
+    return str(SOURCE / "configs" / (name + ".yaml"))
+
+
+def command(name, folder, *options, threads=1, program=QUERN):
+    return [program, "run", scene(name), "--quiet", "--threads", str(threads), "-o", str(folder), *options]
+
+
+def run(name, folder, *options, status=0, threads=1, program=QUERN, resume=False, timeout=3600, **environment):
+    """A run to its end; returns what it says on the way."""
+    words = command(name, folder, *options, *(["--resume"] if resume else []), threads=threads, program=program)
+    done = subprocess.run(words, capture_output=True, text=True, timeout=timeout, env={**os.environ, **environment})
+    assert done.returncode == status, f"{words}: exit status {done.returncode}, not {status}\n{done.stderr}"
+    return done.stderr
+
+
+def summary(folder):
+    return json.loads((pathlib.Path(folder) / "summary.json").read_text())
+
+
+def plan(name, *options):
+    done = subprocess.run([QUERN, "plan", "--json", scene(name), *options], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+# ---- stopping a run on the way ----
+
+def start(name, folder, *options, threads=1, resume=False):
+    words = command(name, folder, *options, *(["--resume"] if resume else []), threads=threads)
+    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def wait_for(path, process, newer=0.0, timeout=600):
+    """Until there is such a file, or a newer one; False if the run ends before."""
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        try:
+            if os.stat(path).st_mtime_ns > newer:
+                return True
+        except FileNotFoundError:
+            pass
+        if process.poll() is not None:
+            return False
+        time.sleep(0.002)
+    raise AssertionError(f"{path} does not come")
+
+
+def stop(process, number=signal.SIGKILL):
+    process.send_signal(number)
+    return process.wait(timeout=600)
+
+
+# ---- looking into what a run left ----
+
+def frames(folder):
+    return sorted((pathlib.Path(folder) / "frames").glob("*.h5"))
+
+
+def contents(path):
+    """Every dataset and every attribute of an HDF5 file, by path."""
+    found = {}
+    with h5py.File(path, "r") as file:
+        def note(name, thing):
+            if isinstance(thing, h5py.Dataset):
+                found[name] = thing[()]
+            for key, value in thing.attrs.items():
+                found[f"{name}@{key}"] = value
+        note("", file)
+        file.visititems(note)
+    return found
+
+
+# What the run was made with, or how long it took; all the rest is the result.
+PROVENANCE = {"@compiler", "@flags", "@scene_hash", "@program", "@wall", "@settle_wall", "@key"}
+
+
+def differences(one, two):
+    """Names of what is not the same to the bit in two files."""
+    a, b = contents(one), contents(two)
+    names = [name for name in sorted(set(a) ^ set(b)) if name not in PROVENANCE]
+    for name in sorted(set(a) & set(b)):
+        if name in PROVENANCE:
+            continue
+        x, y = numpy.asarray(a[name]), numpy.asarray(b[name])
+        if x.dtype != y.dtype or x.shape != y.shape or x.tobytes() != y.tobytes():
+            names.append(name)
+    return names
+
+
+def same(one, two, what, checkpoint=True):
+    """Two runs left the same frames, series and checkpoint, to the bit; returns (frames, datasets, bytes)."""
+    first, second = frames(one), frames(two)
+    assert first and [p.name for p in first] == [p.name for p in second], \
+        f"{what}: {len(first)} and {len(second)} frames"
+    pairs = list(zip(first, second))
+    if checkpoint:
+        pairs.append((one / "checkpoint.h5", two / "checkpoint.h5"))
+    size = count = 0
+    for a, b in pairs:
+        names = differences(a, b)
+        assert not names, f"{what}: {a.name} differs in {', '.join(names[:12])}"
+        arrays = [v for name, v in contents(a).items() if "@" not in name]
+        count += len(arrays)
+        size += sum(v.nbytes for v in arrays)
+    assert (one / "series.csv").read_bytes() == (two / "series.csv").read_bytes(), f"{what}: series.csv differs"
+    print(f"  {what}: {len(first)} frames, {count} datasets, {size} bytes the same", flush=True)
+    return len(first), count, size
+
+
+def whole(path):
+    """Reads every byte of an HDF5 file; fails if it is not whole."""
+    try:
+        return contents(path)
+    except (OSError, RuntimeError) as why:
+        raise AssertionError(f"{path} is not whole: {why}") from None
+
+
+def series(folder):
+    """The header and the rows of series.csv; fails if a row is not whole."""
+    text = (pathlib.Path(folder) / "series.csv").read_text()
+    assert text.endswith("\n"), f"{folder}: series.csv ends within a row"
+    lines = [line.split(",") for line in text.splitlines()]
+    assert all(len(line) == len(lines[0]) for line in lines), f"{folder}: series.csv has a row of another length"
+    return lines[0], [[float(word) for word in line] for line in lines[1:]]
+
+
+def seeded(seed=20260101):
+    return random.Random(seed)
