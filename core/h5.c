@@ -71,25 +71,33 @@ bool quern_save_bytes(const char *path, const void *data, size_t size, char why[
 	return good;
 }
 
-bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
-	char *image = NULL;
-	ssize_t size = -1;
-	if (!h->failed && H5Fflush(h->file, H5F_SCOPE_GLOBAL) >= 0) size = H5Fget_file_image(h->file, NULL, 0);
-	if (size > 0) image = malloc((size_t)size);
-	if (image && H5Fget_file_image(h->file, image, (size_t)size) != size) size = -1;
-	quern_h5_discard(h);
-	if (size <= 0 || !image) {
-		snprintf(why, 256, "%.180s cannot be made: out of memory, or HDF5 refuses", path);
+/* HDF5 gives the image without the user block, which goes in front of it. */
+static char *take_image(quern_h5 *h, size_t *size) {
+	ssize_t n = -1;
+	if (!h->failed && H5Fflush(h->file, H5F_SCOPE_GLOBAL) >= 0) n = H5Fget_file_image(h->file, NULL, 0);
+	char *image = n > 0 ? calloc(1, h->user_block + (size_t)n) : NULL;
+	if (image && H5Fget_file_image(h->file, image + h->user_block, (size_t)n) != n) {
 		free(image);
+		image = NULL;
+	}
+	*size = image ? h->user_block + (size_t)n : 0;
+	quern_h5_discard(h);
+	return image;
+}
+
+bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
+	size_t size;
+	char *image = take_image(h, &size);
+	if (!image) {
+		snprintf(why, 256, "%.180s cannot be made: out of memory, or HDF5 refuses", path);
 		return false;
 	}
 	if (h->user_block) {
-		const uint64_t sum = quern_hash(image + h->user_block, (size_t)size - h->user_block);
-		memset(image, 0, h->user_block);
+		const uint64_t sum = quern_hash(image + h->user_block, size - h->user_block);
 		memcpy(image, magic, sizeof magic);
 		memcpy(image + sizeof magic, &sum, sizeof sum);
 	}
-	const bool good = quern_save_bytes(path, image, (size_t)size, why);
+	const bool good = quern_save_bytes(path, image, size, why);
 	free(image);
 	return good;
 }
@@ -150,7 +158,7 @@ static char *read_bytes(const char *path, size_t *size, char why[256]) {
 	const int fd = open(path, O_RDONLY);
 	char *data = NULL;
 	if (fd < 0 || fstat(fd, &s) || !S_ISREG(s.st_mode)) {
-		snprintf(why, 256, "%.180s cannot be opened: %s", path, strerror(errno));
+		snprintf(why, 256, "it cannot be opened: %s", strerror(errno));
 		if (fd >= 0) close(fd);
 		return NULL;
 	}
@@ -164,7 +172,7 @@ static char *read_bytes(const char *path, size_t *size, char why[256]) {
 	}
 	close(fd);
 	if (n == *size && data) return data;
-	snprintf(why, 256, "%.180s cannot be read", path);
+	snprintf(why, 256, "it cannot be read");
 	free(data);
 	return NULL;
 }
@@ -179,7 +187,7 @@ bool quern_h5_open(quern_h5 *h, const char *path, char why[256]) {
 	const bool sealed = size > 512 && !memcmp(image, magic, sizeof magic);
 	if (sealed) memcpy(&sum, image + sizeof magic, sizeof sum);
 	if (!sealed || quern_hash(image + 512, size - 512) != sum) {
-		snprintf(why, 256, "%.180s is damaged or not of this program: its checksum does not hold", path);
+		snprintf(why, 256, "it is damaged or not of this program: its checksum does not hold");
 		free(image);
 		return false;
 	}
@@ -189,7 +197,7 @@ bool quern_h5_open(quern_h5 *h, const char *path, char why[256]) {
 	h->file = H5Fopen("memory", H5F_ACC_RDONLY, access);
 	H5Pclose(access);
 	free(image);
-	if (h->file < 0) snprintf(why, 256, "%.180s is no HDF5 file", path);
+	if (h->file < 0) snprintf(why, 256, "it is no HDF5 file");
 	return h->file >= 0;
 }
 
