@@ -66,10 +66,10 @@ static double mean(quern_run *run, const char *field, int k) {
 static motion slide(const incline *c, double angle) {
 	const int axis = c->dim == 3 ? 2 : 0;
 	quern_run *run = open_scene(c, angle);
-	harness_until(run, 0.04);
+	harness_until(run, 0.03);
 	const double v = mean(run, "grain.velocity", 0), w = mean(run, "grain.spin", axis);
 	const double begin = quern_run_time(run);
-	harness_until(run, 0.1);
+	harness_until(run, 0.07);
 	const double span = quern_run_time(run) - begin;
 	motion m = { (mean(run, "grain.velocity", 0) - v) / span,
 		(mean(run, "grain.spin", axis) - w) * radius / span, 0 };
@@ -81,7 +81,7 @@ static motion slide(const incline *c, double angle) {
 /* The angle in degrees above which the contact slides faster and faster. */
 static double threshold(const incline *c) {
 	double low = 0, high = 89 * degree;
-	while (high - low > 0.02 * degree) {
+	while (high - low > 0.04 * degree) {
 		const double middle = 0.5 * (low + high);
 		if (slide(c, middle).slip > 1e-3 * gravity) high = middle;
 		else low = middle;

@@ -286,16 +286,16 @@ static void whole_collapse(void **unused) {
 	(void)unused;
 	bool good = true;
 	char what[80];
-	table_head("a collapse of 0.6 s: change over the potential energy released");
+	table_head("a collapse of 0.5 s: change over the potential energy released");
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (int which = 0; which < 4; which++) {
-			const heap h = { dim, which & 1, which >> 1, dim == 2 ? 0.2 : 0.08, dim == 2 ? 0.3 : 0.16,
+			const heap h = { dim, which & 1, which >> 1, dim == 2 ? 0.2 : 0.08, dim == 2 ? 0.26 : 0.13,
 				"auto" };
 			double begin[KINDS + 1], end[KINDS + 1];
 			quern_run *run = open_scene(&h);
 			harness_steps(run, 1);
 			read_books(run, begin);
-			harness_until(run, 0.6);
+			harness_until(run, 0.5);
 			read_books(run, end);
 			const double released = begin[POTENTIAL] - end[POTENTIAL];
 			snprintf(what, sizeof what, "%s, %s, %uD, %u grains: sum", h.hertz ? "hertz" : "linear",

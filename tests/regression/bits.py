@@ -35,58 +35,61 @@ def instructions(name, base, folder, options):
         out = folder / level
         lab.run(name, out, *options, f"--set=run.instructions={level}")
         files = {plugin["file"] for plugin in lab.summary(out)["provenance"]["plugins"]}
-        taken = {level if f".{level}.so" in file else "lower" for level in ("v4", "v3") for file in files
-                 if f".{level}.so" in file} or {"v1"}
+        taken = {file.split(".")[-2] if file.split(".")[-2] in ("v3", "v4") else "v1" for file in files}
         assert len(taken) == 1, f"{level}: objects of several levels: {taken}"
         seen[level] = taken.pop()
         lab.same(base, out, f"run.instructions: {level} (objects of {seen[level]})")
     assert seen["v1"] == "v1"
 
 
+def moments_of(base, moments):
+    """Three frames of a run and, for each, how long to wait after it: up to two intervals."""
+    n, s = len(lab.frames(base)), lab.summary(base)
+    interval = (s["wall_seconds"] - s["settle_seconds"]) / n
+    return [(frame, moments.uniform(0, 2 * interval)) for frame in (0, n // 3, 2 * n // 3 - 1)]
+
+
 def stopped(name, base, folder, options, moments):
-    """Ctrl-C at three arbitrary steps of one run, the first within the first interval."""
+    """Ctrl-C while the grains settle and at three arbitrary steps."""
     out = folder / "stopped"
     steps = []
-    for moment in (0, len(lab.frames(base)) // 3, 2 * len(lab.frames(base)) // 3):
-        for attempt in range(20):
-            process = lab.start(name, out, *options, resume=bool(steps))
-            if lab.wait_for(out / "frames" / f"{moment:06d}.h5", process):
-                time.sleep(moments.uniform(0, 0.05))
-            status = lab.stop(process, signal.SIGINT)
-            assert status == 130, f"{name}: exit status {status} after Ctrl-C"
-            assert lab.summary(out)["status"] == "interrupted"
-            break
+
+    def settling(process):
+        lab.wait_for(out / "log.txt", process)
+        time.sleep(moments.uniform(0, 0.8) * lab.summary(base)["settle_seconds"])
+
+    lab.on_the_way(name, out, options, signal.SIGINT, settling)
+    settled = lab.summary(out)["settle_steps"]
+    for frame, delay in moments_of(base, moments):
+        def later(process):
+            lab.wait_for(out / "frames" / f"{frame:06d}.h5", process)
+            time.sleep(delay)
+
+        lab.on_the_way(name, out, options, signal.SIGINT, later)
+        assert lab.summary(out)["status"] == "interrupted"
         steps.append(lab.summary(out)["steps"])
     lab.run(name, out, *options, resume=True)
-    lab.same(base, out, f"Ctrl-C at the steps {', '.join(map(str, steps))}, resumed")
-
-
-def stopped_settling(name, base, folder, options, moments):
-    out = folder / "settling"
-    process = lab.start(name, out, *options)
-    assert lab.wait_for(out / "log.txt", process)
-    time.sleep(moments.uniform(0, 0.1))
-    assert lab.stop(process, signal.SIGINT) == 130
-    before = lab.summary(out)
-    lab.run(name, out, *options, resume=True)
-    lab.same(base, out, f"Ctrl-C at step {before['settle_steps']} of settling, resumed")
+    lab.same(base, out, f"Ctrl-C after {settled} steps of settling and at the steps {', '.join(map(str, steps))}")
 
 
 def killed(name, base, folder, options, moments):
     """kill -9 some time after a checkpoint, thrice in one run."""
     out = folder / "killed"
     checkpoint = out / "checkpoint.h5"
-    lost = []
-    for moment in (0, len(lab.frames(base)) // 3, 2 * len(lab.frames(base)) // 3):
+    often = [*options, "--set=checkpoint.every=0.02"]
+    steps = []
+    for frame, delay in moments_of(base, moments):
         before = checkpoint.stat().st_mtime_ns if checkpoint.exists() else 0
-        process = lab.start(name, out, *options, "--set=checkpoint.every=0.02", resume=before > 0)
-        lab.wait_for(out / "frames" / f"{moment:06d}.h5", process)
-        lab.wait_for(checkpoint, process, newer=before)
-        time.sleep(moments.uniform(0, 0.05))
-        assert lab.stop(process) == -signal.SIGKILL, f"{name}: ended before it was killed"
-        lost.append(int(lab.whole(checkpoint)["@step"]))
+
+        def later(process):
+            lab.wait_for(out / "frames" / f"{frame:06d}.h5", process)
+            lab.wait_for(checkpoint, process, newer=before)
+            time.sleep(delay)
+
+        lab.on_the_way(name, out, often, signal.SIGKILL, later)
+        steps.append(int(lab.whole(checkpoint)["@step"]))
     lab.run(name, out, *options, resume=True)
-    lab.same(base, out, f"kill -9, resumed from the steps {', '.join(map(str, lost))}")
+    lab.same(base, out, f"kill -9 thrice, resumed from the steps {', '.join(map(str, steps))}")
 
 
 def check(name, options, folder):
@@ -94,11 +97,9 @@ def check(name, options, folder):
     base = folder / "base"
     lab.run(name, base, *options)
     converts(name, base)
-    for threads in (2,):
-        out = folder / "threads"
-        lab.run(name, out, *options, threads=threads)
-        assert lab.summary(out)["threads"] == threads
-        lab.same(base, out, f"{threads} threads")
+    lab.run(name, folder / "threads", *options, threads=2)
+    assert lab.summary(folder / "threads")["threads"] == 2
+    lab.same(base, folder / "threads", "2 threads")
     for batch in (8, 96):
         out = folder / f"batch{batch}"
         lab.run(name, out, *options, f"--set=run.batch={batch}")
@@ -117,7 +118,6 @@ def check(name, options, folder):
     else:
         print("  QUERN_OTHER names no program of another compiler: not compared")
     stopped(name, base, folder, options, moments)
-    stopped_settling(name, base, folder, options, moments)
     killed(name, base, folder, options, moments)
 
 

@@ -3,6 +3,7 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -10,8 +11,10 @@ import time
 import h5py
 import numpy
 
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # threads that spin are very slow where others work too
 QUERN = os.environ["QUERN"]
 SOURCE = pathlib.Path(os.environ["QUERN_SOURCE"])
+PLUGINS = pathlib.Path(os.environ["QUERN_PLUGINS_DIR"])
 
 
 def sets(**values):
@@ -19,16 +22,19 @@ def sets(**values):
     return [f"--set={key.replace('__', '.')}={value}" for key, value in values.items()]
 
 
+FIELDS = "[grain.velocity, grain.spin, grain.weight, point.velocity, point.stress, point.volume, point.weight, " \
+    "cell.zone, cell.packing_fraction, contact.force, contact.slip]"
 # The columns of configs/, smaller, softer and shallower, so that every one of their parts is at work within a second.
 SMALL = {
     "column": sets(
-        domain__upper="[0.2, 0.32]", time__end="60 ms", output__every="5 ms", hybrid__update=100,
+        domain__upper="[0.2, 0.32]", time__end="80 ms", output__every="5 ms", hybrid__update=100, output__fields=FIELDS,
         grains__fill__0__region__box="{lower: [0, -0.7 mm], upper: [0.2, -0.7 mm]}",
         grains__fill__1__region__box="{lower: [0.001, 0.001], upper: [0.039, 0.045]}",
         bodies__2__plane__point="[0.04, 0]", grains__contact__linear__stiffness="1e5 N/m",
         grains__settle__energy=1e-3, hybrid__oracle="[{packing_fraction: {depth: 8 mm, half_width: 4 mm}}]"),
     "column_3d": sets(
-        domain__upper="[0.1, 0.008, 0.16]", time__end="30 ms", output__every="5 ms", hybrid__update=100,
+        domain__upper="[0.1, 0.008, 0.16]", time__end="20 ms", output__every="5 ms", hybrid__update=100,
+        output__fields=FIELDS,
         grains__fill__0__region__box="{lower: [0, 0, -0.7 mm], upper: [0.1, 0.008, -0.7 mm]}",
         grains__fill__1__region__box="{lower: [0.001, 0, 0.001], upper: [0.019, 0.008, 0.04]}",
         bodies__2__plane__point="[0.02, 0, 0]", grains__contact__linear__stiffness="100 N/m",
@@ -66,7 +72,7 @@ def plan(name, *options):
 
 def start(name, folder, *options, threads=1, resume=False):
     words = command(name, folder, *options, *(["--resume"] if resume else []), threads=threads)
-    return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(words, stdout=subprocess.DEVNULL)
 
 
 def wait_for(path, process, newer=0.0, timeout=600):
@@ -84,9 +90,36 @@ def wait_for(path, process, newer=0.0, timeout=600):
     raise AssertionError(f"{path} does not come")
 
 
+def mapped(process):
+    """Ids of the plugins whose objects a running process has mapped."""
+    lines = pathlib.Path(f"/proc/{process.pid}/maps").read_text().splitlines()
+    files = {pathlib.Path(line.split(maxsplit=5)[5]) for line in lines if line.endswith(".so")}
+    return {".".join(file.name.split(".")[:2]) for file in files if file.parent == PLUGINS.resolve()}
+
+
 def stop(process, number=signal.SIGKILL):
     process.send_signal(number)
     return process.wait(timeout=600)
+
+
+def on_the_way(name, folder, options, number, wait, threads=1):
+    """Starts or resumes a run and stops it with a signal once wait(process) is over. A run that has ended by then is
+    put back and tried again."""
+    aside = folder.with_name(folder.name + ".before")
+    if folder.exists():
+        shutil.copytree(folder, aside)
+    for _ in range(20):
+        process = start(name, folder, *options, threads=threads, resume=aside.exists())
+        wait(process)
+        status = stop(process, number)
+        if status == (130 if number == signal.SIGINT else -number):
+            shutil.rmtree(aside, ignore_errors=True)
+            return
+        assert status == 0, f"{name}: exit status {status} after signal {number}"
+        shutil.rmtree(folder)
+        if aside.exists():
+            shutil.copytree(aside, folder)
+    raise AssertionError(f"{name}: twenty times over before signal {number}")
 
 
 # ---- looking into what a run left ----
@@ -110,7 +143,7 @@ def contents(path):
 
 
 # What the run was made with, or how long it took; all the rest is the result.
-PROVENANCE = {"@compiler", "@flags", "@scene_hash", "@program", "@wall", "@settle_wall", "@key"}
+PROVENANCE = {"@compiler", "@flags", "@scene_hash", "@program", "@wall", "@settle_wall"}
 
 
 def differences(one, two):
