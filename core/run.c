@@ -193,6 +193,10 @@ quern_status quern_run_interval(quern_run *run) {
 				"(time.force: true takes it "
 				"all the same)",
 				g->step, hard, hard_reason, limit);
+		if (g->step > hard && run->log && c->step == 0)
+			quern_log_add(run->log, 2,
+				"time.step of %.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s", g->step,
+				hard, hard_reason, limit);
 		limit = g->step;
 		snprintf(run->limit_reason, sizeof run->limit_reason, "the scene's time.step");
 	}

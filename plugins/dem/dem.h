@@ -87,7 +87,8 @@ enum {
 	FORCE_SHEARED,
 	FORCE_DAMPED,
 	FORCE_RUBBED,
-	FORCE_ID
+	FORCE_ID,
+	FORCE_TREMBLING
 };
 
 /* disc or sphere */

@@ -178,9 +178,10 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * 3 * sizeof(quern_real));
 	sh->sums = s->host->memory(s->run, (size_t)grains.n_blocks * N_ENERGIES * sizeof(quern_real));
 	sh->farthest = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(quern_real));
+	sh->turned = s->host->memory(s->run, (size_t)grains.n_blocks * 2 * sizeof(quern_real));
 	sh->bad = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(int32_t));
 	for (uint32_t b = 0; b < grains.n_blocks && sh->bad; b++) sh->bad[b] = -1;
-	return sh->impulse && sh->sums && sh->farthest && sh->bad;
+	return sh->impulse && sh->sums && sh->farthest && sh->turned && sh->bad;
 }
 
 /* Blocks in order, so that sums do not depend on who did what. */
@@ -224,6 +225,26 @@ static quern_status lost(const forces_shared *sh, int32_t i) {
 		sqrt(v2), sqrt(v2) * s->dt / u[FORCE_RADIUS].real[0][i], s->dt, law);
 }
 
+/* A step within the limit turns a contact's motion in three steps at the least, so that the velocities of a whole set
+ * point back in fewer than every second one. A step too long turns them in every one, and where dashpots and friction
+ * eat what it makes the grains tremble for ever, without a blow-up. docs/stability.md, section 1 */
+static quern_status look_for_trembling(const forces_shared *sh, uint32_t n_blocks) {
+	enum { MOST = 200 };
+	const quern_step *s = sh->s;
+	int32_t *score = sh->use[FORCE_TREMBLING].index;
+	quern_real turned = 0, mass = 0;
+	for (uint32_t b = 0; b < n_blocks; b++) turned += sh->turned[2 * b], mass += sh->turned[2 * b + 1];
+	const quern_real way = 1e-9 * sh->d->radii.mean; /* below that it may be round-off */
+	if (-turned * s->dt * s->dt > mass * way * way) ++*score;
+	else if (*score) --*score;
+	if (*score < MOST) return QUERN_OK;
+	return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", -1,
+		"most steps of %.3g s turn back the velocities of all grains: they tremble, since the step is too "
+		"long for "
+		"their contacts (%s)",
+		s->dt, sh->n_laws ? s->slot[SLOT_CONTACT][0].id : "gravity");
+}
+
 quern_status quern_dem_forces(const void *self, const quern_step *s) {
 	forces_shared sh = { .d = self, .s = s };
 	const quern_set_view grains = s->host->set(s->run, "grain");
@@ -233,5 +254,5 @@ quern_status quern_dem_forces(const void *self, const quern_step *s) {
 	for (uint32_t b = 0; b < grains.n_blocks; b++)
 		if (sh.bad[b] >= 0) return lost(&sh, sh.bad[b]);
 	collect(&sh, grains.n_blocks);
-	return QUERN_OK;
+	return look_for_trembling(&sh, grains.n_blocks);
 }

@@ -20,6 +20,7 @@ typedef struct forces_shared {
 	quern_real *impulse;  /* [block][body + 1][dim]: on the material, by bodies and by fixed grains */
 	quern_real *sums;     /* [block][N_ENERGIES] */
 	quern_real *farthest; /* [block] square of the way since the last list */
+	quern_real *turned;   /* [block][2] sums of m v.v', of old and new velocity, and of m */
 	int32_t *bad;         /* [block] first grain that is lost, or -1 */
 } forces_shared;
 

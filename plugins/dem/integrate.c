@@ -17,6 +17,21 @@ enum {
 	G_DRAG_TORQUE = 26
 };
 
+/* How much of the old velocity the new one keeps. */
+static void compare_velocities(const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n) {
+	const quern_column *u = sh->use;
+	const quern_real *restrict mass = u[FORCE_MASS].real[0] + begin;
+	quern_real turned = 0, whole = 0;
+	for (uint32_t k = 0; k < sh->s->dim; k++) {
+		const quern_real *restrict old = u[FORCE_OLD_VELOCITY].real[k] + begin;
+		const quern_real *restrict now = u[FORCE_VELOCITY].real[k] + begin;
+		for (uint32_t i = 0; i < n; i++) turned += mass[i] * old[i] * now[i];
+	}
+	for (uint32_t i = 0; i < n; i++) whole += mass[i];
+	sh->turned[2 * b] += turned;
+	sh->turned[2 * b + 1] += whole;
+}
+
 /* What leaves this stage must be finite, and slower than a radius per step. */
 static void check_grains(
 	const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
@@ -156,5 +171,6 @@ void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, qu
 		hold_fixed(sh, w, b, begin, n);
 		if (sh->energy) energies(sh, w, begin, n, sums);
 		check_grains(sh, b, begin, n, w);
+		compare_velocities(sh, b, begin, n);
 	}
 }

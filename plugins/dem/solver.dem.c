@@ -148,6 +148,8 @@ static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUE
 	ENERGY("sheared", QUERN_WRITE, "In tangential springs."),
 	ENERGY("damped", QUERN_UPDATE, "Lost in dashpots so far."),
 	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."), F("grain.id", "1", QUERN_READ, QUERN_ID),
+	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
+		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
 	QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "dem.fill",

@@ -123,7 +123,7 @@ static void finish_chunk(
 	const gather_work *w, const gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
 	const quern_column *u = w->s->use;
 	const uint32_t dim = w->s->dim;
-	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, most = 0.5 * w->g->cell / w->s->dt;
+	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, most = w->g->cell / w->s->dt;
 	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin;
 	for (uint32_t i = 0; i < n; i++) volume[i] = mass[i] / m->density[i];
 	for (int row = GATHER_GRADIENT; row <= GATHER_AFFINE; row++)
@@ -222,18 +222,31 @@ static quern_status round_trip(gather_work *w, quern_row *trip, quern_row *echo)
 static quern_status lost(const gather_work *w, int32_t i) {
 	const quern_step *s = w->s;
 	const quern_column *u = s->use;
-	quern_real v2 = 0;
+	const quern_real volume = u[GATHER_VOLUME].real[0][i], x = u[GATHER_POSITION].real[0][i],
+					 y = u[GATHER_POSITION].real[1][i];
+	const char *material = s->slot[SLOT_MATERIAL][0].id;
+	quern_real v2 = 0, stress = 0;
 	for (uint32_t k = 0; k < s->dim; k++) v2 += u[GATHER_VELOCITY].real[k][i] * u[GATHER_VELOCITY].real[k][i];
-	if (isfinite(v2))
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, s->dim); k++)
+		stress += fabs(u[GATHER_STRESS].real[k][i]);
+	if (!isfinite(v2))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
-			"point.velocity of %.3g m/s at (%.4g, %.4g) m crosses half a cell in one step of %.3g s, or its "
-			"stress is not a number "
-			"(%s): unstable, or the step is too long",
-			sqrt(v2), u[GATHER_POSITION].real[0][i], u[GATHER_POSITION].real[1][i], s->dt,
-			s->slot[SLOT_MATERIAL][0].id);
+			"point.velocity is not a number after %s: is the step of %.3g s too long?", material, s->dt);
+	if (!isfinite(stress))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
+			"point.stress at (%.4g, %.4g) m is not a number after %s: is the step of %.3g s too long?", x, y,
+			material, s->dt);
+	if (!(volume > 0 && volume < INFINITY))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
+			"point.volume at (%.4g, %.4g) m is turned inside out by one step of %.3g s (%s): unstable, or "
+			"the step is "
+			"too long",
+			x, y, s->dt, material);
 	return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
-		"point.velocity is not a number after %s: is the step of %.3g s too long?",
-		s->slot[SLOT_MATERIAL][0].id, s->dt);
+		"at (%.4g, %.4g) m, point.velocity %.3g m/s, goes farther than a cell in one step of %.3g s (%s): "
+		"unstable, or "
+		"the step is too long",
+		x, y, sqrt(v2), s->dt, material);
 }
 
 quern_status quern_mpm_gather(const void *self, const quern_step *s) {

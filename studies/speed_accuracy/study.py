@@ -56,7 +56,7 @@ def write_grains(frame, path):
 def profile(out):
     """kg in each bin along the floor, at the end: of grains and points, by their shares."""
     last = sorted((out / "frames").glob("*.h5"))[-1]
-    mass = np.zeros(64)
+    mass = np.zeros(80)
     with h5py.File(last) as file:
         for group in ("grains", "points"):
             if group not in file or not len(file[group]["position"]):
@@ -65,7 +65,7 @@ def profile(out):
             m = np.pi * g["radius"][:] ** 2 * 2500 * (g["fixed"][:] == 0) if group == "grains" else g["mass"][:]
             if "weight" in g:
                 m = m * g["weight"][:]
-            np.add.at(mass, np.clip((g["position"][:, 0] / BIN).astype(int), 0, 63), m)
+            np.add.at(mass, np.clip((g["position"][:, 0] / BIN).astype(int), 0, 79), m)
     return mass
 
 

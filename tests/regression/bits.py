@@ -8,7 +8,6 @@ import os
 import pathlib
 import signal
 import sys
-import tempfile
 import time
 
 import lab
@@ -124,5 +123,5 @@ def check(name, options, folder):
 if __name__ == "__main__":
     more = [word for word in sys.argv[1:] if word != "--main"]
     for name, small in lab.SMALL.items():
-        with tempfile.TemporaryDirectory() as place:
+        with lab.workplace() as place:
             check(name, ([] if "--main" in sys.argv else small) + more, pathlib.Path(place))

@@ -6,6 +6,7 @@ import random
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
 
 import h5py
@@ -194,6 +195,12 @@ def series(folder):
     lines = [line.split(",") for line in text.splitlines()]
     assert all(len(line) == len(lines[0]) for line in lines), f"{folder}: series.csv has a row of another length"
     return lines[0], [[float(word) for word in line] for line in lines[1:]]
+
+
+def workplace():
+    """A folder for a while, in memory where that can be: on a disk every file that is flushed takes its time."""
+    memory = "/dev/shm"
+    return tempfile.TemporaryDirectory(dir=memory if os.access(memory, os.W_OK) else None)
 
 
 def seeded(seed=20260101):
