@@ -300,6 +300,7 @@ int quern_command_run(int argc, char **argv) {
 	else {
 		signal(SIGINT, on_signal);
 		signal(SIGTERM, on_signal);
+		signal(SIGXFSZ, SIG_IGN); /* a file beyond the limit is a fault of writing, with its message */
 		run->folder = folder_of(&o);
 		status = drive(&s, &o, until);
 	}

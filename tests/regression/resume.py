@@ -1,0 +1,83 @@
+"""kill -9 at any moment: what is there is whole, and the run goes on to the same end.
+
+`resume.py [KILLS]`, 50 by default.
+"""
+import pathlib
+import re
+import shutil
+import sys
+import time
+
+import lab
+
+OPTIONS = [*lab.SMALL["column"], "--set=time.end=20 ms", "--set=output.every=2 ms", "--set=checkpoint.every=0.02",
+           "--set=grains.settle.energy=0.02"]
+
+
+def look(folder):
+    """Everything that a killed run left is whole; returns frames, rows of the series and the checkpoint's step."""
+    frames = lab.frames(folder)
+    assert [frame.name for frame in frames] == [f"{k:06d}.h5" for k in range(len(frames))], frames
+    for frame in frames:
+        lab.whole(frame)
+    header, rows = lab.series(folder) if (folder / "series.csv").exists() else ([], [])
+    times = [row[0] for row in rows]
+    assert times == sorted(set(times)), f"series.csv: times {times}"
+    known = [float(lab.contents(frame)["@time"]) for frame in frames]
+    # what stands beyond the checkpoint in one of them is computed again
+    assert known == times[:len(known)] or times == known[:len(times)], f"frames at {known}, rows at {times}"
+    sidecar = folder / "run.xdmf"
+    if sidecar.exists():
+        named = set(re.findall(r"frames/\d+\.h5", sidecar.read_text()))
+        there = {f"frames/{frame.name}" for frame in frames}
+        assert named <= there, f"run.xdmf names {sorted(named - there)}, which is not there"
+    checkpoint = folder / "checkpoint.h5"
+    step = None
+    if checkpoint.exists():
+        state = lab.whole(checkpoint)
+        step = int(state["@step"]) if state["@settled"] else -int(state["@settle_step"])
+        assert state["@rows"] <= len(rows), "the checkpoint counts rows that series.csv does not hold"
+        assert state["@frame"] < len(frames), "the checkpoint counts frames that are not there"
+    return len(frames), len(rows), step
+
+
+def kill(folder, moment):
+    """True if the run was killed, False if it had ended."""
+    process = lab.start("column", folder, *OPTIONS)
+    time.sleep(moment)
+    return lab.stop(process) != 0
+
+
+def check(kills, place):
+    base = place / "base"
+    begin = time.monotonic()
+    lab.run("column", base, *OPTIONS)
+    length = time.monotonic() - begin
+    moments, out, done = lab.seeded(), place / "run", []
+    while len(done) < kills:
+        shutil.rmtree(out, ignore_errors=True)
+        if not kill(out, moments.uniform(0, length)):
+            continue
+        if out.exists():
+            done.append(look(out))
+        else:
+            done.append((0, 0, None))
+        lab.run("column", out, *OPTIONS, resume=True)
+        look(out)
+        left = [str(path) for path in out.rglob("*.part")]
+        assert not left, f"left behind: {left}"
+        last = lab.frames(base)[-1].name
+        assert len(lab.frames(out)) == len(lab.frames(base))
+        names = lab.differences(base / "frames" / last, out / "frames" / last)
+        assert not names, f"kill {len(done)}, resumed at {done[-1]}: the last frame differs in {', '.join(names)}"
+        assert (out / "series.csv").read_bytes() == (base / "series.csv").read_bytes(), "series.csv differs"
+        lab.differences(base / "checkpoint.h5", out / "checkpoint.h5")
+    steps = [step for _, _, step in done if step is not None]
+    print(f"{kills} kills in a run of {length:.2f} s: {sum(n for n, _, _ in done)} frames left, all whole; "
+          f"{len(done) - len(steps)} before a checkpoint, {sum(s <= 0 for s in steps)} while settling, "
+          f"{len({s for s in steps if s > 0})} different steps after; each went on to the same bits")
+
+
+if __name__ == "__main__":
+    with lab.workplace() as name:
+        check(int(sys.argv[1]) if len(sys.argv) > 1 else 50, pathlib.Path(name))
