@@ -1,0 +1,70 @@
+/* The same bits with one worker and with many, in process: what a thread sanitizer looks at. Conversions happen. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include <stdlib.h>
+#include <string.h>
+
+static quern_run *column(uint32_t workers, int dim) {
+	const bool flat = dim == 2;
+	return harness_open(workers,
+		"quern: 1\ndimension: %d\ngravity: %s\ndomain: {lower: %s, upper: %s, periodic: %s}\ntime: {end: "
+		"0.05}\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
+		"  contact: {linear: {stiffness: 1e5, friction: 0.4}},\n"
+		"  fill: {region: {box: {lower: %s, upper: %s}}, velocity: %s}}\n"
+		"bodies:\n  - plane: {point: %s, normal: %s, boundary: sticky}\n"
+		"continuum: {cell: 4 mm, material: mu_i}\n"
+		"hybrid: {oracle: [{packing_fraction: {depth: 6 mm, half_width: 3 mm}}], substeps: 4, update: 20}\n"
+		"observe: [energy, mass]\n",
+		dim, flat ? "[0, -9.81]" : "[0, 0, -9.81]", flat ? "[0, 0]" : "[0, 0, 0]",
+		flat ? "[0.16, 0.08]" : "[0.08, 0.02, 0.06]", flat ? "[false, false]" : "[false, true, false]",
+		flat ? "[0.01, 0.001]" : "[0.01, 0, 0.001]", flat ? "[0.09, 0.06]" : "[0.05, 0.02, 0.03]",
+		flat ? "[0.5, 0]" : "[0.5, 0.1, 0]", flat ? "[0, 0]" : "[0, 0, 0]", flat ? "[0, 1]" : "[0, 0, 1]");
+}
+
+static void compare(quern_run *a, quern_run *b) {
+	const quern_store *p = &a->plan->store, *q = &b->plan->store;
+	assert_int_equal(p->n_fields, q->n_fields);
+	for (size_t k = 0; k < p->n_fields; k++) {
+		const quern_field *f = &p->fields[k], *g = &q->fields[k];
+		const quern_set_store *set = &p->sets[f->set];
+		assert_int_equal(set->n, q->sets[g->set].n);
+		if (f->local || set->rows) continue;
+		for (uint8_t c = 0; c < f->n_components; c++)
+			if (memcmp(f->data[f->now][c], g->data[g->now][c], set->n * quern_field_bytes(f)) != 0)
+				fail_msg("%s differs after %lld steps", f->name, (long long)a->clock.step);
+	}
+}
+
+static void the_same_bits(int dim, int64_t steps) {
+	quern_run *one = column(1, dim);
+	for (uint32_t workers = 2; workers <= 3; workers++) {
+		quern_run *many = column(workers, dim);
+		harness_steps(many, steps);
+		if (one->clock.step == 0) harness_steps(one, steps);
+		assert_true(harness_count(one, "point") > 100);
+		compare(one, many);
+		harness_close(many);
+	}
+	harness_close(one);
+}
+
+static void in_a_plane(void **state) {
+	(void)state;
+	the_same_bits(2, 60);
+}
+static void in_space(void **state) {
+	(void)state;
+	the_same_bits(3, 30);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(in_a_plane), cmocka_unit_test(in_space) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
