@@ -23,6 +23,7 @@ typedef struct {
 	size_t length;
 	anchor *anchors;
 	size_t n_anchors, anchors_capacity, n_nodes;
+	quern_node dropped; /* values of keys that stand twice: an anchor in them may still be named */
 	bool failed;
 } reader;
 
@@ -143,6 +144,11 @@ static bool duplicate(reader *r, const quern_node *map, const char *key, quern_m
 	return false;
 }
 
+static void keep(quern_node *node, char *key, quern_mark mark, quern_node *child) {
+	node->entries = quern_grow(node->entries, node->n, &node->capacity, sizeof(quern_entry));
+	node->entries[node->n++] = (quern_entry) { key, mark, child };
+}
+
 static bool children(reader *r, quern_node *node, int depth) {
 	const bool map = node->kind == QUERN_NODE_MAP;
 	for (;;) {
@@ -166,11 +172,10 @@ static bool children(reader *r, quern_node *node, int depth) {
 		if (!child) return free(key), false;
 		if (map && duplicate(r, node, key, mark)) {
 			free(key);
-			quern_node_destroy(child);
+			keep(&r->dropped, NULL, mark, child);
 			continue;
 		}
-		node->entries = quern_grow(node->entries, node->n, &node->capacity, sizeof(quern_entry));
-		node->entries[node->n++] = (quern_entry) { key, mark, child };
+		keep(node, key, mark, child);
 	}
 }
 
@@ -250,6 +255,8 @@ static quern_node *document(reader *r) {
 	}
 	for (size_t i = 0; i < r->n_anchors; i++) free(r->anchors[i].name);
 	free(r->anchors);
+	for (size_t i = 0; i < r->dropped.n; i++) quern_node_destroy(r->dropped.entries[i].value);
+	free(r->dropped.entries);
 	if (r->failed) {
 		quern_node_destroy(root);
 		root = NULL;

@@ -117,18 +117,19 @@ typedef struct bed {
 
 static quern_run *open_bed(const bed *b) {
 	const char *zero = b->dim == 3 ? "0, " : "", *deep = b->dim == 3 ? "0.01, " : "";
-	const char *periodic = b->dim == 3 ? "true, " : "";
+	const char *wide = b->dim == 3 ? "0.012" : "0.03", *periodic = b->dim == 3 ? "true, " : "";
 	return harness_open(1,
 		"{quern: 1, dimension: %u, seed: 3, gravity: [0, %s-9.81],\n"
-		"domain: {lower: [0, %s0], upper: [0.03, %s0.2], periodic: [true, %sfalse]},\n"
+		"domain: {lower: [0, %s0], upper: [%s, %s0.2], periodic: [true, %sfalse]},\n"
 		"time: {end: 1000}, output: {every: 1000, fields: [total.kinetic, total.potential]},\n"
 		"bodies: [{plane: {point: [0, %s0], normal: [0, %s1]}}, {plane: {point: [0, %s0.2], normal: [0, "
 		"%s-1]}}],\n"
 		"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 0.2}}, contact: {%s}, integrator: "
 		"%s,\n"
-		"  fill: [{region: {box: {lower: [0, %s0.001], upper: [0.03, %s0.02]}}, settle: true}]}, observe: "
+		"  fill: [{region: {box: {lower: [0, %s0.001], upper: [%s, %s0.02]}}, settle: true}]}, observe: "
 		"[energy]}\n",
-		b->dim, zero, zero, deep, periodic, zero, zero, zero, zero, b->contact, b->integrator, zero, deep);
+		b->dim, zero, zero, wide, deep, periodic, zero, zero, zero, zero, b->contact, b->integrator, zero,
+		wide, deep);
 }
 
 static void bed_row(const bed *b, double factor) {
@@ -160,7 +161,7 @@ static const bed beds[] = { { "linear, e = 0.5", LINEAR(0.5), "symplectic_euler"
 	{ "hertz, e = 0.5", "hertz: {young: 1e8, friction: 0.5}", "symplectic_euler", 2, 1, 2.5 } };
 static const bed more_beds[] = { { "linear, e = 0.9", LINEAR(0.9), "symplectic_euler", 2, 1, 4 },
 	{ "linear, e = 0.5, Verlet", LINEAR(0.5), "velocity_verlet", 2, 0.75, 4 },
-	{ "linear, e = 0.5, 3-D", LINEAR(0.5), "symplectic_euler", 3, 1, 3 },
+	{ "linear, e = 0.5, 3-D", LINEAR(0.5), "symplectic_euler", 3, 1, 4 },
 	{ "hertz, e = 0.5, 3-D", "hertz: {young: 1e8, friction: 0.5}", "symplectic_euler", 3, 1, 4 } };
 
 static void bed_at_rest(void **unused) {
