@@ -7,12 +7,13 @@
 #include <string.h>
 
 typedef struct {
-	char *at;
+	char *base; /* NULL: only measured */
+	size_t used;
 } carver;
 
 static void *carve(carver *c, size_t bytes) {
-	void *memory = c->at;
-	c->at += (bytes + 127) & ~(size_t)63;
+	void *memory = c->base ? c->base + c->used : NULL;
+	c->used += (bytes + 127) & ~(size_t)63;
 	return memory;
 }
 
@@ -22,7 +23,7 @@ static void carve_columns(carver *c, quern_real **column, uint32_t n, uint32_t c
 
 /* Lays the columns out from `base`; with base NULL it only measures. Returns the bytes. */
 static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
-	carver c = { base };
+	carver c = { base, 0 };
 	const uint32_t cap = sh->cap, dim = sh->s->dim;
 	*w = (forces_work) { 0 };
 	carve_columns(&c, &w->overlap, 1, cap);
@@ -60,7 +61,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	carve_columns(&c, w->grains, 34, GRAINS);
 	w->row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	if (sh->energy) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
-	return (size_t)(c.at - base) + 64;
+	return c.used + 64;
 }
 
 /* ---- forces_shared by pairs and touches ---- */

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""chart - draws chart.svg and writes table.md from the study's results: chart.py results.json"""
+"""chart - draws docs/speed_accuracy.svg and writes the table of docs/speed_accuracy.md: chart.py results.json"""
 import json
 import pathlib
 import sys
 
 import numpy as np
 
-HERE = pathlib.Path(__file__).resolve().parent
+DOCS = pathlib.Path(__file__).resolve().parent.parent.parent / "docs"
+BEGIN, END = "<!-- written by chart.py -->", "<!-- end -->"
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 900, 560, 80, 190, 40, 60
 
 
@@ -95,8 +96,10 @@ def table(results, rows, scatter, cost):
 def main():
     results = json.loads(pathlib.Path(sys.argv[1]).read_text())
     rows, scatter, cost = errors(results)
-    (HERE / "chart.svg").write_text(draw(rows, scatter))
-    (HERE / "table.md").write_text(table(results, rows, scatter, cost))
+    (DOCS / "speed_accuracy.svg").write_text(draw(rows, scatter))
+    page = (DOCS / "speed_accuracy.md").read_text()
+    before, after = page[:page.index(BEGIN)], page[page.index(END):]
+    (DOCS / "speed_accuracy.md").write_text(f"{before}{BEGIN}\n{table(results, rows, scatter, cost)}\n{after}")
     print(table(results, rows, scatter, cost))
 
 

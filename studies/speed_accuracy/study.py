@@ -5,8 +5,8 @@
 
 Settles the column of configs/column.yaml once for each seed, runs pure grains from there, and every setting of study.yaml from
 the first seed's grains. Cost is processor time on one thread; error is that of the final profile, the sum of |difference| over the
-sum, against the mean over seeds of pure grains. Writes DIR/results.json, and chart.svg and table.md beside this file. Runs that are
-in DIR already are not repeated."""
+sum, against the mean over seeds of pure grains. Writes DIR/results.json, docs/speed_accuracy.svg and the table of
+docs/speed_accuracy.md. Runs that are in DIR already are not repeated."""
 import argparse
 import json
 import os

@@ -1,0 +1,186 @@
+/* The continuum with steps beyond its limit: a block that is shaken, a column at rest, nodes with hardly any mass.
+ * docs/stability.md, section 2 */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "beyond.h"
+#include "harness.h"
+#include <math.h>
+
+static const double cell = 0.1, bulk = 1e6, density = 1500, gravity = 9.81;
+
+typedef struct material {
+	const char *name, *parameters;
+} material;
+static const material materials[] = { { "elastic",
+										  "elastic: {bulk_modulus: 1e6, poisson: 0.3, density: 1500}" },
+	{ "drucker_prager", "drucker_prager: {bulk_modulus: 1e6, poisson: 0.3, density: 1500}" },
+	{ "mu_i",
+		"mu_i: {bulk_modulus: 1e6, poisson: 0.3, diameter: 5e-3, grain_density: 2450, critical_density: "
+		"1500}" } };
+enum { ELASTIC, DRUCKER_PRAGER, MU_I, MATERIALS };
+
+static double pressure_wave(uint32_t dim) {
+	const double shear = dim == 2 ? bulk * 0.7 / 1.3 : 3 * bulk * 0.4 / 2.6;
+	return sqrt((bulk + 2.0 * (dim - 1) / dim * shear) / density);
+}
+
+static double hard_limit(quern_run *run) {
+	double hard;
+	char reason[200], hard_reason[200];
+	quern_run_limit(run, &hard, reason, hard_reason);
+	return hard;
+}
+
+static double fastest(quern_run *run, uint32_t dim) {
+	const quern_column v = harness_field(run, "point.velocity");
+	double most = 0;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		double v2 = 0;
+		for (uint32_t k = 0; k < dim; k++) v2 += v.real[k][i] * v.real[k][i];
+		most = fmax(most, sqrt(v2));
+	}
+	return most;
+}
+
+/* ==== a block of points, shaken ==== */
+
+typedef struct block {
+	const char *name, *shape;
+	uint32_t dim;
+	bool random;    /* points anywhere in their quarter of a cell */
+	double failing; /* from this factor on the run must end */
+} block;
+
+/* No gravity, no contact with walls; FLIP keeps every motion that the grid can carry. */
+static quern_run *open_block(const block *b, double speed) {
+	const bool deep = b->dim == 3;
+	return harness_open(1,
+		"{quern: 1, dimension: %u, gravity: [0, %s0], domain: {lower: [0, %s0], upper: [1, %s1.4]},\n"
+		"time: {end: 1000}, output: {every: 1000},\n"
+		"continuum: {cell: %g, material: {%s}, shape: %s, transfer: {picflip: {rate: 0}},\n"
+		"  fill: [{region: {box: {lower: [0.2, %s0.4], upper: [0.8, %s1]}}, velocity: [%.17g, %s0]}]}}\n",
+		b->dim, deep ? "0, " : "", deep ? "0, " : "", deep ? "1, " : "", cell, materials[ELASTIC].parameters,
+		b->shape, deep ? "0.2, " : "", deep ? "0.8, " : "", speed, deep ? "0, " : "");
+}
+
+/* Every point its own velocity, a thousandth of the wave speed at most. */
+static void shake(quern_run *run, const block *b) {
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		for (uint32_t k = 0; k < b->dim; k++) {
+			double random[2];
+			quern_host_table.random(1, k, i, random);
+			if (b->random) x.real[k][i] += 0.49 * cell / 2 * (2 * random[0] - 1);
+			v.real[k][i] = 1e-3 * pressure_wave(b->dim) * (2 * random[1] - 1);
+		}
+	harness_field(run, "total.unsorted").index[0] = 1;
+}
+
+static void block_row(const block *b, double factor) {
+	quern_run *run = open_block(b, 0);
+	double most = 0, speed = 0;
+	shake(run, b);
+	beyond_force_step(run, factor * hard_limit(run));
+	const double before = quern_run_account(run).kinetic;
+	for (int64_t i = beyond_is_long() ? 20000 : 2000; i > 0 && harness_try(run, 1) == QUERN_OK; i--) {
+		most = fmax(most, quern_run_account(run).kinetic);
+		speed = fmax(speed, fastest(run, b->dim));
+	}
+	beyond_row("%s | %.3g | %.3g | %.2g | %lld | %s", b->name, factor, most / before,
+		speed / pressure_wave(b->dim), (long long)run->clock.step, beyond_message(run));
+	if (factor <= 0.9 && (run->status != QUERN_OK || most > 1.05 * before))
+		fail_msg("%s: energy at the recommended step", b->name);
+	if (factor >= b->failing) beyond_expect_culprit(run, "mpm.gather", "point");
+	harness_close(run);
+}
+
+static void shaken_block(void **unused) {
+	static const block blocks[] = { { "2-D, lattice", "gimp", 2, false, 2 },
+		{ "2-D, random points", "gimp", 2, true, 1.5 }, { "3-D, random points", "gimp", 3, true, 2 } };
+	static const double factors[] = { 0.5, 0.9, 1, 1.1, 1.2, 1.3, 1.5, 2, 2.5, 4 };
+	(void)unused;
+	beyond_table("An elastic block, shaken", "block | step over hard limit | largest kinetic energy over "
+											 "first | fastest point over wave | steps | what "
+											 "Quern says");
+	for (size_t k = 0; k < (beyond_is_long() ? 3 : 2); k++)
+		for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) block_row(&blocks[k], factors[i]);
+}
+
+/* Hats have no limit that holds for all places of points: a point just over a cell's face feeds a node of no mass. */
+static void light_nodes(void **unused) {
+	static const block shapes[] = { { "gimp", "gimp", 2, true, INFINITY },
+		{ "linear", "linear", 2, true, INFINITY } };
+	(void)unused;
+	beyond_table("Nodes that hardly have mass: random points at half of the recommended step",
+		"shape | steps | largest kinetic energy over first | what Quern says");
+	for (size_t k = 0; k < 2; k++) {
+		quern_run *run = open_block(&shapes[k], 0);
+		double most = 0;
+		shake(run, &shapes[k]);
+		beyond_force_step(run, 0.45 * hard_limit(run));
+		const double before = quern_run_account(run).kinetic;
+		for (int64_t i = 0; i < 4000 && harness_try(run, 1) == QUERN_OK; i++)
+			most = fmax(most, quern_run_account(run).kinetic);
+		beyond_row("%s | %lld | %.3g | %s", shapes[k].name, (long long)run->clock.step, most / before,
+			beyond_message(run));
+		if (!k && (run->status != QUERN_OK || most > 1.05 * before)) fail_msg("gimp gains energy");
+		if (k) beyond_expect_culprit(run, "mpm.gather", "point");
+		harness_close(run);
+	}
+}
+
+/* Points may fly faster than their waves: the recommended step knows, and nothing is taken for a blow-up. */
+static void faster_than_waves(void **unused) {
+	static const block fast = { "fast", "gimp", 2, false, INFINITY };
+	(void)unused;
+	quern_run *run = open_block(&fast, 10 * pressure_wave(2));
+	const double before = quern_run_account(run).momentum[0];
+	harness_until(run, 0.1 / (10 * pressure_wave(2)));
+	assert_true(fabs(quern_run_account(run).momentum[0] / before - 1) < 1e-12);
+	harness_close(run);
+}
+
+/* ==== a column at rest ==== */
+
+static void column_row(const material *m, double factor) {
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [1, 1.5]},\n"
+		"time: {end: 1000}, output: {every: 1000},\n"
+		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: sticky}}],\n"
+		"continuum: {cell: %g, material: {%s}, transfer: {picflip: {rate: 0}},\n"
+		"  fill: [{region: {box: {lower: [0, 0], upper: [1, 1]}}, stress: at_rest}]}}\n",
+		cell, m->parameters);
+	const double unit = density * gravity * cell; /* m g h of one cubic metre */
+	double most = 0;
+	beyond_force_step(run, factor * hard_limit(run));
+	for (int64_t i = beyond_is_long() ? 20000 : 2000; i > 0 && harness_try(run, 1) == QUERN_OK; i--)
+		most = fmax(most, quern_run_account(run).kinetic);
+	beyond_row("%s | %.3g | %.2g | %lld | %s", m->name, factor, most / unit, (long long)run->clock.step,
+		beyond_message(run));
+	if (factor <= 1 && (run->status != QUERN_OK || most > 1e-5 * unit)) fail_msg("%s moves", m->name);
+	if (factor >= 4) beyond_expect_culprit(run, "mpm.gather", "point");
+	harness_close(run);
+}
+
+static void column_at_rest(void **unused) {
+	static const double factors[] = { 0.9, 1, 1.25, 1.5, 2, 2.5, 4 };
+	(void)unused;
+	beyond_table("A column at rest",
+		"material | step over hard limit | largest kinetic energy over m g h | steps | what Quern says");
+	for (size_t k = 0; k < MATERIALS; k++)
+		for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) column_row(&materials[k], factors[i]);
+}
+
+int main(int argc, char **argv) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(shaken_block), cmocka_unit_test(light_nodes),
+		cmocka_unit_test(faster_than_waves), cmocka_unit_test(column_at_rest) };
+	if (!beyond_begin(argc, argv, "continuum")) return 2;
+	const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+	beyond_end();
+	return failed;
+}
