@@ -135,6 +135,15 @@ static bool indices_hold(const quern_store *store, const quern_field *field, uin
 	return true;
 }
 
+/* A run with such a number would have stopped; where NaN is what a new entry begins with, it may stand. */
+static bool numbers_hold(const quern_field *field, const void *column, uint32_t n) {
+	const double *number = column;
+	if (field->shape == QUERN_INDEX || field->shape == QUERN_ID) return true;
+	for (uint32_t i = 0; i < n; i++)
+		if (!isfinite(number[i]) && !(isnan(number[i]) && isnan(field->initial))) return false;
+	return true;
+}
+
 static bool read_fields(quern_run *run, hid_t group, int s, char why[256]) {
 	quern_store *store = &run->plan->store;
 	for (size_t k = 0; k < store->n_fields; k++) {
@@ -145,7 +154,22 @@ static bool read_fields(quern_run *run, hid_t group, int s, char why[256]) {
 			snprintf(name, sizeof name, "%s.%d", strchr(field->name, '.') + 1, c);
 			if (!quern_h5_read(group, name, type_of(field), store->sets[s].n, 1, field->data[field->now][c]))
 				return fault(why, name, store->sets[s].name);
+			if (!numbers_hold(field, field->data[field->now][c], store->sets[s].n))
+				return fault(why, "a number that is not finite", field->name);
 		}
+	}
+	return true;
+}
+
+/* Memory is taken only for what the file does hold. */
+static bool sizes_hold(const quern_store *store, hid_t group, int s, int64_t n) {
+	for (size_t k = 0; k < store->n_fields; k++) {
+		const quern_field *field = &store->fields[k];
+		char name[64];
+		size_t rows = 0, columns = 0;
+		if (field->set != s || !is_kept(store, field)) continue;
+		snprintf(name, sizeof name, "%s.0", strchr(field->name, '.') + 1);
+		if (!quern_h5_read_size(group, name, &rows, &columns) || rows != (size_t)n) return false;
 	}
 	return true;
 }
@@ -159,6 +183,7 @@ static bool read_set(quern_run *run, quern_h5 *h, int s, char why[256]) {
 	bool good = quern_h5_read_integer(group, "n", &n) && quern_h5_read_integer(group, "next_id", &next_id) &&
 				n >= 0 && n <= MOST_ENTRIES && next_id >= 0;
 	if (good && store->sets[s].grid) good = n == (int64_t)run->grid.view.n_blocks * 64 || n == 0;
+	good = good && sizes_hold(store, group, s, n);
 	if (!good) fault(why, "the size", store->sets[s].name);
 	good = good && quern_store_fill(store, s, (uint32_t)n) == QUERN_OK &&
 		   read_partition(run, group, s, (uint32_t)n, why) && read_fields(run, group, s, why);

@@ -3,7 +3,7 @@
 
     studies/speed_accuracy/study.py [--out DIR] [--seeds 3] [--only NAME]...
 
-Settles the column of configs/column.yaml once for each seed, runs pure grains from there, and every setting of study.yaml from
+Settles the column of study.yaml once for each seed, runs pure grains from there, and every setting of study.yaml from
 the first seed's grains. Cost is processor time on one thread; error is that of the final profile, the sum of |difference| over the
 sum, against the mean over seeds of pure grains. Writes DIR/results.json, docs/speed_accuracy.svg and the table of
 docs/speed_accuracy.md. Runs that are in DIR already are not repeated."""
@@ -76,19 +76,20 @@ def measure(out, summary):
             "defect": summary["invariant_defect"], "profile": profile(out).tolist()}
 
 
-def settle(work, seed):
+def settle(work, seed, column):
     """The settled column of a seed as a table of grains."""
     table = work / f"settled_{seed}.txt"
     if not table.exists():
         settled = work / f"settle_{seed}"
-        if run(settled, [f"seed={seed}", "model=grains"], until="0 s") is None:
+        if run(settled, column + [f"seed={seed}", "model=grains"], until="0 s") is None:
             sys.exit("the column does not settle")
         write_grains(settled / "frames/000000.h5", table)
     return table
 
 
-def from_grains(table):
-    return ["grains.fill=null", f"grains.file={table}", "output.fields=[grain.velocity, point.mass]"]
+def from_grains(table, column):
+    """The column without its fills, begun from a table of grains."""
+    return [one for one in column if not one.startswith("grains.fill")] + ["grains.fill=null", f"grains.file={table}", "output.fields=[grain.velocity, point.mass]"]
 
 
 def main():
@@ -99,20 +100,21 @@ def main():
     args = parser.parse_args()
     work = pathlib.Path(args.out).resolve()
     work.mkdir(parents=True, exist_ok=True)
-    settings = yaml.safe_load((HERE / "study.yaml").read_text())["settings"]
+    study = yaml.safe_load((HERE / "study.yaml").read_text())
+    column = study["column"]
     results = {"grains": [], "settings": {}, "repeats": []}
     for seed in range(1, args.seeds + 1):
-        table = settle(work, seed)
+        table = settle(work, seed, column)
         out = work / f"grains_{seed}"
-        results["grains"].append(measure(out, run(out, from_grains(table) + ["model=grains"])))
+        results["grains"].append(measure(out, run(out, from_grains(table, column) + ["model=grains"])))
         out = work / f"hybrid_{seed}"
-        results["repeats"].append(measure(out, run(out, from_grains(table))))
+        results["repeats"].append(measure(out, run(out, from_grains(table, column))))
         print(f"seed {seed}: done", flush=True)
-    for name, sets in settings.items():
+    for name, sets in study["settings"].items():
         if args.only and name not in args.only:
             continue
         out = work / "".join(c if c.isalnum() else "_" for c in name)
-        summary = run(out, from_grains(settle(work, 1)) + sets)
+        summary = run(out, from_grains(settle(work, 1, column), column) + sets)
         if summary:
             results["settings"][name] = measure(out, summary)
         print(f"{name}: {'done' if summary else 'FAILED'}", flush=True)

@@ -1,0 +1,117 @@
+/* A hybrid column at rest whose zone is swept down by ten diameters and back, four times: grains become continuum and
+ * continuum grains, and nothing else may happen. docs/stability.md, section 4 */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "beyond.h"
+#include "harness.h"
+#include "held.h"
+#include <math.h>
+#include <string.h>
+
+static const double diameter = 2e-3, start = 14e-3;
+enum { CYCLES = 4, STRIDES = 20, STRIDE_UPDATES = 1 }; /* half a diameter per update */
+
+/* The oracle's parameter in the running scene. */
+static double *depth_of(quern_run *run) {
+	const quern_scene *scene = run->scene;
+	for (size_t i = 0; i < scene->n_instances; i++) {
+		const quern_instance *one = scene->instances[i];
+		if (strcmp(one->file->plugin.id, "oracle.packing_fraction") != 0) continue;
+		const quern_param *row = quern_param_find(one->file->plugin.params, "depth");
+		assert_non_null(row);
+		return (double *)(void *)((char *)one->self + row->offset);
+	}
+	fail_msg("there is no oracle");
+	return NULL;
+}
+
+typedef struct book {
+	double kinetic, lowest,
+		highest;             /* largest over m g d; floor's push over the weight, means over an update */
+	double carried, entries; /* worst of the carried mass over that at the start, minus one; ledger */
+} book;
+
+static double entries(quern_run *run, double mass) {
+	const quern_column grain = harness_field(run, "cell.grain_owed"),
+					   point = harness_field(run, "cell.point_owed");
+	double sum = 0;
+	for (uint32_t c = 0; c < harness_count(run, "cell"); c++)
+		sum += fabs(grain.real[0][c]) + fabs(point.real[0][c]);
+	return sum / mass;
+}
+
+/* Long steps until the next update of the zones, and what happened on the way. */
+static void go_on(const held *h, double mass, book *b) {
+	const int32_t updates = harness_field(h->run, "total.updates").index[0];
+	const double before = held_support(h), begin = quern_run_time(h->run);
+	while (harness_field(h->run, "total.updates").index[0] == updates) {
+		harness_steps(h->run, 1);
+		b->kinetic = fmax(b->kinetic, held_kinetic(h));
+	}
+	const double push = (held_support(h) - before) / ((quern_run_time(h->run) - begin) * h->weight);
+	const double carried = quern_run_account(h->run).mass / mass - 1;
+	b->lowest = fmin(b->lowest, push);
+	b->highest = fmax(b->highest, push);
+	b->carried = fabs(carried) > fabs(b->carried) ? carried : b->carried;
+	b->entries = fmax(b->entries, entries(h->run, mass));
+}
+
+static void put(const held *h, const char *packer, const char *when, const book *b, double top, double mass) {
+	const quern_account a = quern_run_account(h->run);
+	beyond_row("%s | %s | %.1e | %.2f ... %.2f | %+.2f | %+.4f | %+.4f | %.3f | %.0e | %u, %u", packer, when,
+		b->kinetic, b->lowest, b->highest, (held_top(h) - top) / diameter, b->carried, a.mass / mass - 1,
+		b->entries, a.defect, harness_count(h->run, "grain"), harness_count(h->run, "point"));
+}
+
+static void sweep(const char *packer, double most_kinetic, double most_carried, double most_left) {
+	const held h = held_open(0.04, 0.06, 20, packer);
+	double *depth = depth_of(h.run);
+	assert_true(fabs(*depth - start) < 1e-12);
+	harness_steps(h.run, 2);
+	const double mass = h.weight / 9.81, top = held_top(&h);
+	const int strides = STRIDES, each = beyond_is_long() ? 5 : STRIDE_UPDATES;
+	book rest = { .lowest = INFINITY, .highest = -INFINITY };
+	for (int i = 0; i < 5 * each; i++) go_on(&h, mass, &rest);
+	put(&h, packer, "at rest", &rest, top, mass);
+	for (int cycle = 1; cycle <= CYCLES; cycle++) {
+		book b = { .lowest = INFINITY, .highest = -INFINITY };
+		char when[24];
+		for (int way = 0; way < 2 * strides; way++) {
+			*depth += (way < strides ? 0.5 : -0.5) * diameter;
+			for (int i = 0; i < each; i++) go_on(&h, mass, &b);
+		}
+		snprintf(when, sizeof when, "cycle %d", cycle);
+		put(&h, packer, when, &b, top, mass);
+		if (!(b.kinetic < most_kinetic)) fail_msg("%s: kinetic energy %g", packer, b.kinetic);
+		if (!(fabs(b.carried) < most_carried)) fail_msg("%s: carried mass %g", packer, b.carried);
+		if (!(quern_run_account(h.run).defect <= 1e-12)) fail_msg("%s: the ledger is off", packer);
+	}
+	book last = { .lowest = INFINITY, .highest = -INFINITY };
+	for (int i = 0; i < 10 * each; i++) go_on(&h, mass, &last);
+	put(&h, packer, "at rest again", &last, top, mass);
+	if (!(fabs(quern_run_account(h.run).mass / mass - 1) < most_left))
+		fail_msg("%s: carried mass does not come back", packer);
+	harness_close(h.run);
+}
+
+static void zone_swept(void **unused) {
+	(void)unused;
+	beyond_table("A zone swept by ten diameters and back, four times",
+		"packer | when | largest kinetic energy over m g d | floor's push over the weight | top, diameters | "
+		"carried mass, worst | carried mass, last | entries over the mass | ledger | grains, points");
+	sweep("two_point_tangent", 10, 0.05, 0.02);
+	sweep("random", 100, 0.2, 0.2);
+}
+
+int main(int argc, char **argv) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(zone_swept) };
+	if (!beyond_begin(argc, argv, "sweep")) return 2;
+	const int failed = cmocka_run_group_tests(tests, NULL, NULL);
+	beyond_end();
+	return failed;
+}
