@@ -1,4 +1,5 @@
 #include "placer.h"
+#include "../bodies/bodies.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -89,24 +90,8 @@ static bool overlaps(const placer *p, const quern_spot *a, const quern_spot *b) 
 }
 
 static bool meets_body(const placer *p, const quern_spot *s) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
-	_Alignas(64) quern_real x[3][QUERN_LANES] = { { 0 } }, radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES],
-							normal[3][QUERN_LANES], velocity[3][QUERN_LANES];
-	for (uint32_t k = 0; k < 3; k++) x[k][0] = s->x[k];
-	radius[0] = s->radius;
-	for (uint32_t b = 0; b < p->n_bodies; b++) {
-		const quern_body_batch batch = { .n = 1,
-			.cap = QUERN_LANES,
-			.dim = p->dim,
-			.pose = &still,
-			.position = { x[0], x[1], x[2] },
-			.radius = radius,
-			.gap = gap,
-			.normal = { normal[0], normal[1], normal[2] },
-			.velocity = { velocity[0], velocity[1], velocity[2] } };
-		((const quern_body_ops *)p->body[b].ops)->closest(p->body[b].self, &batch);
-		if (gap[0] < -1e-9 * s->radius) return true;
-	}
+	for (uint32_t b = 0; b < p->n_bodies; b++)
+		if (quern_body_gap(&p->body[b], p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
 	return false;
 }
 

@@ -98,35 +98,23 @@ static void sample_contacts(sampling *p) {
 
 /* Touches with bodies: the branch goes from the surface to the grain's centre. */
 static void sample_touches(sampling *p) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
 	const quern_step *s = p->s;
 	const quern_column *u = s->use;
-	_Alignas(64) quern_real at[3][QUERN_LANES] = { { 0 } }, radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES],
-							normal[3][QUERN_LANES] = { { 0 } }, velocity[3][QUERN_LANES];
 	for (uint32_t q = 0; q < s->host->set(s->run, "touch").n; q++) {
 		const int32_t i = u[S_TOUCH_GRAIN].index[q];
 		const quern_bound *body = &s->slot[SLOT_BODIES][u[S_TOUCH_BODY].index[q]];
-		quern_real f[3] = { 0 }, x[3] = { 0 }, branch[3] = { 0 }, force2 = 0;
+		const quern_real radius = u[S_RADIUS].real[0][i];
+		quern_real f[3] = { 0 }, x[3] = { 0 }, branch[3], force2 = 0;
 		for (uint32_t k = 0; k < s->dim; k++) {
 			f[k] = u[S_TOUCH_FORCE].real[k][q];
-			at[k][0] = u[S_POSITION].real[k][i];
+			x[k] = u[S_POSITION].real[k][i];
 			force2 += f[k] * f[k];
 		}
 		if (!(force2 > 0)) continue;
-		radius[0] = u[S_RADIUS].real[0][i];
-		const quern_body_batch batch = { .n = 1,
-			.cap = QUERN_LANES,
-			.dim = s->dim,
-			.pose = &still,
-			.position = { at[0], at[1], at[2] },
-			.radius = radius,
-			.gap = gap,
-			.normal = { normal[0], normal[1], normal[2] },
-			.velocity = { velocity[0], velocity[1], velocity[2] } };
-		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
+		const quern_real gap = quern_body_gap(body, s->dim, x, radius, branch);
 		for (uint32_t k = 0; k < s->dim; k++) {
-			branch[k] = (radius[0] + gap[0]) * normal[k][0];
-			x[k] = at[k][0] - branch[k];
+			branch[k] *= radius + gap;
+			x[k] -= branch[k];
 		}
 		add(p, x, f, branch);
 	}

@@ -138,25 +138,10 @@ typedef struct {
 
 /* A place is behind a body if it lies in one that is there now. */
 static bool in_body(const update *d, const quern_real x[3]) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
-	_Alignas(64) quern_real position[3][QUERN_LANES], radius[QUERN_LANES] = { 0 }, gap[QUERN_LANES],
-													  n[3][QUERN_LANES], v[3][QUERN_LANES];
-	for (uint32_t k = 0; k < 3; k++)
-		for (uint32_t i = 0; i < QUERN_LANES; i++) position[k][i] = x[k];
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
-		const quern_body_batch batch = { .n = 1,
-			.cap = QUERN_LANES,
-			.dim = d->s->dim,
-			.pose = &still,
-			.position = { position[0], position[1], position[2] },
-			.radius = radius,
-			.gap = gap,
-			.normal = { n[0], n[1], n[2] },
-			.velocity = { v[0], v[1], v[2] } };
-		if (!quern_body_is_there(body, d->s->settling)) continue;
-		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
-		if (gap[0] < 0) return true;
+		if (quern_body_is_there(body, d->s->settling) && quern_body_gap(body, d->s->dim, x, 0, NULL) < 0)
+			return true;
 	}
 	return false;
 }

@@ -17,8 +17,9 @@ quern: 1
 dimension: 2
 gravity: [0, -9.81]
 domain: {lower: [0, 0], upper: [0.02, 0.2]}
-time: {end: 1, step: %s, force: true, checkpoint: 1 ms}
+time: {end: 1, step: %s, force: true}
 output: {every: 5 ms}
+checkpoint: {every: 1 ms}
 bodies: [{plane: {point: [0, 0], normal: [0, 1]}}]
 grains:
   material: {density: 2500, radius: {mean: 1 mm}}
@@ -32,8 +33,9 @@ quern: 1
 dimension: 2
 gravity: [0, -9.81]
 domain: {lower: [0, 0], upper: [1, 1.5]}
-time: {end: 5, step: %s, force: true, checkpoint: 1 ms}
+time: {end: 5, step: %s, force: true}
 output: {every: 50 ms}
+checkpoint: {every: 1 ms}
 bodies: [{plane: {point: [0, 0], normal: [0, 1]}}]
 continuum:
   cell: 0.1
@@ -45,8 +47,9 @@ quern: 1
 dimension: 2
 gravity: [0, -9.81]
 domain: {lower: [0, 0], upper: [0.04, 0.12]}
-time: {end: 0.3, step: %s, force: true, checkpoint: 1 ms}
-output: {every: 1 ms}
+time: {end: 0.3, step: %s, force: true}
+output: {every: 3 ms}
+checkpoint: {every: 0.1 s}
 bodies:
   - plane: {point: [0, 0], normal: [0, 1], boundary: sticky}
   - plane: {point: [0, 0], normal: [1, 0]}
