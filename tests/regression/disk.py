@@ -23,9 +23,10 @@ def look(folder):
     return len(lab.frames(folder))
 
 
-def refused(folder, reason, **options):
-    """The run ends with exit status 4 and names a file; returns that file."""
-    words = lab.command("column", folder, *OPTIONS, "--set=checkpoint.every=0.02", "--resume")
+def refused(folder, reason, every=0.02, **options):
+    """The run, with a checkpoint every so many seconds on the clock, ends with exit status 4 and names a file; returns
+    that file."""
+    words = lab.command("column", folder, *OPTIONS, f"--set=checkpoint.every={every}", "--resume")
     done = subprocess.run(words, capture_output=True, text=True, timeout=300, **options)
     assert done.returncode == 4, f"exit status {done.returncode}, not 4\n{done.stderr}"
     lines = [line for line in done.stderr.splitlines() if "error:" in line]
@@ -89,7 +90,7 @@ def with_limit(place, base):
                         ("frames", sizes["frames"] * 3 // 4), ("scene.yaml", 1024)):
         out = place / "limit"
         begin(out)
-        file = refused(out, "File too large",
+        file = refused(out, "File too large", 0.02 if name == "checkpoint.h5" else 0,
                        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
         assert file.startswith(name), f"with {limit} bytes {file} is refused, not {name}"
         look(out)

@@ -10,7 +10,7 @@ import time
 
 import lab
 
-OPTIONS = [*lab.SMALL["column"], "--set=time.end=20 ms", "--set=output.every=2 ms", "--set=checkpoint.every=0.02",
+OPTIONS = [*lab.SMALL["column"], "--set=time.end=12 ms", "--set=output.every=2 ms", "--set=checkpoint.every=0.02",
            "--set=grains.settle.energy=0.02"]
 
 
