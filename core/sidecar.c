@@ -107,8 +107,10 @@ static void xdmf_set(quern_text *out, const entry *e, const set *s) {
 	if (!position || !s->n) return;
 	quern_text_add(out,
 		"<Grid Name=\"%s\"><Topology TopologyType=\"Polyvertex\" NumberOfElements=\"%zu\" "
-		"NodesPerElement=\"1\"/>\n<Geometry GeometryType=\"XYZ\">",
-		s->name, s->n);
+		"NodesPerElement=\"1\"><DataItem Dimensions=\"%zu\" NumberType=\"Int\" Precision=\"8\" "
+		"Format=\"HDF\">"
+		"views/%s_%06lld.hdf:/VTKHDF/Connectivity</DataItem></Topology>\n<Geometry GeometryType=\"XYZ\">",
+		s->name, s->n, s->n, s->name, (long long)e->number);
 	data_item(out, e, s, position);
 	quern_text_add(out, "</Geometry>\n");
 	for (int k = 0; k < s->n_fields; k++) {

@@ -15,12 +15,11 @@
 
 static const double diameter = 2e-3, gravity = 9.81;
 
-static double recommended(quern_run *run, const char *section) {
+static double step_limit(quern_run *run, const char *section, double *hard) {
 	const quern_section *s = quern_scene_section(run->scene, section);
 	const quern_step step = quern_run_record(run, s);
 	char reason[160];
-	double hard;
-	return s->ops->limit(s->solver->self, &step, &hard, reason);
+	return s->ops->limit(s->solver->self, &step, hard, reason);
 }
 
 held held_open(double width, double height, int substeps, const char *packer) {
@@ -44,7 +43,9 @@ held held_open(double width, double height, int substeps, const char *packer) {
 	harness_settle(h.run);
 	h.weight = quern_run_account(h.run).mass * gravity;
 	h.unit = h.weight * diameter;
-	h.grain_step = recommended(h.run, "grains");
+	double hard;
+	h.grain_step = step_limit(h.run, "grains", &hard);
+	step_limit(h.run, "continuum", &h.continuum_limit);
 	beyond_force_step(h.run, substeps * h.grain_step);
 	return h;
 }

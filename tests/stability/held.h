@@ -4,9 +4,9 @@
 
 typedef struct held {
 	quern_run *run;
-	double width;        /* m */
-	double grain_step;   /* s, recommended */
-	double unit, weight; /* J: m g d of all grains; N: of the whole column */
+	double width;                       /* m */
+	double grain_step, continuum_limit; /* s: recommended; hard */
+	double unit, weight;                /* J: m g d of all grains; N: of the whole column */
 } held;
 
 /* Settled; a long step is `substeps` recommended grain steps from now on, whatever the continuum says of it. */
