@@ -135,15 +135,6 @@ static bool indices_hold(const quern_store *store, const quern_field *field, uin
 	return true;
 }
 
-/* A run with such a number would have stopped; where NaN is what a new entry begins with, it may stand. */
-static bool numbers_hold(const quern_field *field, const void *column, uint32_t n) {
-	const double *number = column;
-	if (field->shape == QUERN_INDEX || field->shape == QUERN_ID) return true;
-	for (uint32_t i = 0; i < n; i++)
-		if (!isfinite(number[i]) && !(isnan(number[i]) && isnan(field->initial))) return false;
-	return true;
-}
-
 static bool read_fields(quern_run *run, hid_t group, int s, char why[256]) {
 	quern_store *store = &run->plan->store;
 	for (size_t k = 0; k < store->n_fields; k++) {
@@ -154,8 +145,6 @@ static bool read_fields(quern_run *run, hid_t group, int s, char why[256]) {
 			snprintf(name, sizeof name, "%s.%d", strchr(field->name, '.') + 1, c);
 			if (!quern_h5_read(group, name, type_of(field), store->sets[s].n, 1, field->data[field->now][c]))
 				return fault(why, name, store->sets[s].name);
-			if (!numbers_hold(field, field->data[field->now][c], store->sets[s].n))
-				return fault(why, "a number that is not finite", field->name);
 		}
 	}
 	return true;

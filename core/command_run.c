@@ -287,6 +287,8 @@ int quern_command_run(int argc, char **argv) {
 	options o = { 0 };
 	int status = parse(&o, argc, argv);
 	if (status != QUERN_EXIT_DONE) return free(o.sets), status;
+	signal(SIGINT, on_signal);
+	signal(SIGTERM, on_signal);
 	quern_scene *scene = quern_scene_read(o.scene, o.sets, &quern_host_table);
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, o.threads);
 	quern_report_print(scene->report, stderr);
@@ -298,8 +300,6 @@ int quern_command_run(int argc, char **argv) {
 		status = QUERN_EXIT_SCENE;
 	} else if (!parse_until(&o, run, &until)) status = QUERN_EXIT_USAGE;
 	else {
-		signal(SIGINT, on_signal);
-		signal(SIGTERM, on_signal);
 		signal(SIGXFSZ, SIG_IGN); /* a file beyond the limit is a fault of writing, with its message */
 		run->folder = folder_of(&o);
 		status = drive(&s, &o, until);
