@@ -106,11 +106,13 @@ def stop(process, number=signal.SIGKILL):
 def on_the_way(name, folder, options, number, wait, threads=1):
     """Starts or resumes a run and stops it with a signal once wait(process) is over. A run that has ended by then is
     put back and tried again."""
-    aside = folder.with_name(folder.name + ".before")
+    aside, begun = folder.with_name(folder.name + ".before"), folder / "scene.yaml"
     if folder.exists():
         shutil.copytree(folder, aside)
     for _ in range(20):
+        before = begun.stat().st_mtime_ns if begun.exists() else 0
         process = start(name, folder, *options, threads=threads, resume=aside.exists())
+        wait_for(begun, process, newer=before)  # from here on Ctrl-C is waited for
         wait(process)
         status = stop(process, number)
         if status == (130 if number == signal.SIGINT else -number):
