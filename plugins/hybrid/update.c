@@ -82,8 +82,12 @@ quern_status quern_hybrid_update(const void *self, const quern_step *s) {
 	const hybrid *h = self;
 	const quern_column *u = s->use;
 	uint32_t changed = 0;
-	if (s->step == 0) u[U_MASS].real[0][0] = carried_mass(s);
-	if (s->step < 1 || (s->step - 1) % h->every) return QUERN_OK;
+	if (s->step == 0) {
+		update d = { .h = h, .s = s };
+		u[U_MASS].real[0][0] = carried_mass(s);
+		return quern_hybrid_sort(&d); /* so that there are cells to gather stress in */
+	}
+	if ((s->step - 1) % h->every) return QUERN_OK;
 	quern_status status = once(h, s, &changed);
 	if (status == QUERN_OK && s->step == 1) status = once(h, s, &changed);
 	if (status != QUERN_OK) return status;

@@ -67,7 +67,7 @@ hybrid: {oracle: [{packing_fraction: {depth: 10 mm, half_width: 4 mm}}], substep
 CASES = {
     "grains": (GRAINS % "0.4 ms", r"dem\.forces, at t = [0-9.e-]+ s \(step \d+\): grain( \d+)?: ", 3),
     "continuum": (CONTINUUM % "8 ms", r"mpm\.gather, at t = [0-9.e-]+ s \(step \d+\): point \d+: ", 3),
-    "hybrid": (HYBRID % ("2.8 ms", 280), r"(mpm\.\w+|dem\.\w+|hybrid\.\w+), at t = [0-9.e-]+ s \(step \d+\): ", 2),
+    "hybrid": (HYBRID % ("3 ms", 300), r"(mpm\.\w+|dem\.\w+|hybrid\.\w+), at t = [0-9.e-]+ s \(step \d+\): ", 2),
 }
 
 
