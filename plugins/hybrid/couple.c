@@ -39,13 +39,14 @@ static bool find_residents(const quern_step *s, const quern_column *x, const int
 	return true;
 }
 
-/* Seen from a grain: whether any node that it reaches holds continuum, and whether all do. */
+/* Seen from a grain: whether any node that it reaches holds continuum, and whether all hold more than the least. A node that
+ * only the rim of a point reaches may move at any speed, and a grain would take its gradient from it with full weight. */
 typedef struct {
 	bool any, all;
 } company;
 
 QUERN_INLINE company company_of(
-	const stencil *s, uint32_t i, const quern_row *tile, const int dim, int32_t span) {
+	const stencil *s, uint32_t i, const quern_row *tile, const int dim, int32_t span, quern_real least) {
 	company c = { false, true };
 	for (int z = 0; z < (dim == 3 ? 3 : 1); z++)
 		for (int y = 0; y < 3; y++)
@@ -53,9 +54,9 @@ QUERN_INLINE company company_of(
 				const quern_real w =
 					s->value[0][x][i] * s->value[1][y][i] * (dim == 3 ? s->value[2][z][i] : 1);
 				if (!(w > 0)) continue;
-				const bool there = tile[s->node[i] + (z * span + y) * span + x][0] > 0;
-				c.any = c.any || there;
-				c.all = c.all && there;
+				const quern_real mass = tile[s->node[i] + (z * span + y) * span + x][0];
+				c.any = c.any || mass > 0;
+				c.all = c.all && mass > least;
 			}
 	return c;
 }
@@ -102,6 +103,7 @@ QUERN_INLINE sent send_grain(
 
 QUERN_INLINE void raster_block(const raster_work *w, raster_memory *m, uint32_t b, const int dim) {
 	const uint32_t begin = w->at.begin[b], end = w->at.begin[b + 1];
+	const quern_real h = w->g->cell, least = 0.01 * w->h->packed * (dim == 2 ? h * h : h * h * h);
 	if (begin == end) return;
 	quern_tile_load(w->g, w->node, b, m->mass);
 	if (!has_continuum(m->mass, w->g->tile_size)) return;
@@ -113,7 +115,7 @@ QUERN_INLINE void raster_block(const raster_work *w, raster_memory *m, uint32_t 
 		stencil_make(
 			w->g, &w->s->slot[SLOT_SHAPE][0], b, w->s->use[R_POSITION].real, 0, grain, n, &m->stencil);
 		for (uint32_t k = 0; k < n; k++) {
-			const company c = company_of(&m->stencil, k, m->mass, dim, (int32_t)w->g->span);
+			const company c = company_of(&m->stencil, k, m->mass, dim, (int32_t)w->g->span, least);
 			if (!c.any || !(w->s->use[R_WEIGHT].real[0][grain[k]] > 0)) continue;
 			const sent p = send_grain(w, m, k, grain[k], w->h->affine && c.all, dim);
 			stencil_scatter(
@@ -261,7 +263,7 @@ QUERN_INLINE uint32_t load_coupled(
 		w->g, &w->s->slot[SLOT_SHAPE][0], b, u[B_POSITION].real, 0, w->at.grain + begin, n, &m->stencil);
 	for (uint32_t k = 0; k < n; k++) {
 		const int32_t i = w->at.grain[begin + k];
-		if (company_of(&m->stencil, k, m->mass, dim, span).any && u[B_WEIGHT].real[0][i] > 0)
+		if (company_of(&m->stencil, k, m->mass, dim, span, 0).any && u[B_WEIGHT].real[0][i] > 0)
 			m->grain[kept++] = i;
 	}
 	stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[B_POSITION].real, 0, m->grain, kept, &m->stencil);
