@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""numbers - the key numbers of a run's summary, and where its files are: tools/numbers.py DIR..."""
+"""report - the key numbers of a run's summary, and where its files are: tools/report.py DIR..."""
 import json
 import sys
 
