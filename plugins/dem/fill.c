@@ -188,7 +188,18 @@ static quern_status fill_all(filling *f) {
 	return store(f);
 }
 
+/* The hybrid books an impulse for each force; an integrator that acts in two steps gives half of it later. */
+static quern_status refuse_two_steps(const quern_step *s) {
+	const quern_bound *integrator = &s->slot[SLOT_INTEGRATOR][0];
+	if (!s->use[FILL_WEIGHT].real[0] || !((const quern_integrator_ops *)integrator->ops)->open[s->dim - 2])
+		return QUERN_OK;
+	return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
+		"grains.integrator: %s acts in two steps, and the books of a hybrid take one: use symplectic_euler",
+		integrator->id);
+}
+
 quern_status quern_dem_fill(const void *self, const quern_step *s) {
+	if (refuse_two_steps(s) != QUERN_OK) return QUERN_E_PARAM;
 	filling f = { .d = self, .step = s };
 	quern_status status =
 		quern_placer_init(&f.placer, f.d->dim, s->lower, s->upper, s->periodic, widest(f.d));
