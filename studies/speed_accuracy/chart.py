@@ -63,17 +63,16 @@ def draw(rows, scatter):
     out.append(f'<path d="{path}" fill="none" stroke="#c0392b" stroke-width="1.5" stroke-dasharray="5 3"/>')
     names = {n for _, _, n in best}
     taken = []
-    for n, r in sorted(rows.items(), key=lambda i: i[1][1]):
-        px, py = x(r[0]), y(r[1])
-        out.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="5" fill="{"#c0392b" if n in names else "#2c6e9b"}"/>')
-        ly = py + 4
-        while any(abs(ly - t) < 13 and abs(px - q) < 130 for q, t in taken):
-            ly -= 13
-        taken.append((px, ly))
-        if abs(ly - py - 4) > 1:
-            line(px + 5, py, px + 9, ly - 4, 'stroke="#999" stroke-width="0.7"')
-        text(px + 10, ly, n, more='font-weight="bold"' if n == "column.yaml" else "")
-    out.append('<circle cx="%g" cy="%g" r="5" fill="#c0392b"/><text x="%g" y="%g">Pareto front</text></svg>' % (WIDTH - RIGHT + 20, TOP + 6, WIDTH - RIGHT + 31, TOP + 10))
+    text(WIDTH - RIGHT + 24, TOP + 14, "by error of the profile", more='fill="#666"')
+    for k, (n, r) in enumerate(sorted(rows.items(), key=lambda i: i[1][1]), 1):
+        px, py, bold = x(r[0]), y(r[1]), 'font-weight="bold"' if n == "column.yaml" else ""
+        out.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="4.5" fill="{"#c0392b" if n in names else "#2c6e9b"}"/>')
+        places = [(px + a, py + b) for a, b in ((8, 4), (-16, 4), (-4, -8), (-4, 18), (8, -8), (8, 16), (-18, -8), (-18, 16))]
+        lx, ly = next((q for q in places if all(abs(q[0] - t[0]) > 13 or abs(q[1] - t[1]) > 11 for t in taken)), places[0])
+        taken += [(lx, ly), (px - 4, py + 4)]
+        text(lx, ly, k, more=f'font-size="10" {bold}')
+        text(WIDTH - RIGHT + 24, TOP + 16 + 17 * k, f"{k}  {n}", more=bold)
+    out.append('<circle cx="%g" cy="%g" r="5" fill="#c0392b"/><text x="%g" y="%g">Pareto front</text></svg>' % (LEFT + 20, TOP + 6, LEFT + 31, TOP + 10))
     return "\n".join(out)
 
 
