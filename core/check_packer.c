@@ -75,7 +75,7 @@ static void begin(uint32_t dim, uint32_t shape, uint64_t key, uint32_t limit, pa
 			p->spot[s].radius = mean;
 			for (uint32_t k = 0; k < dim; k++) p->spot[s].x[k] = at[s][k] * side;
 		}
-		p->job.n_seed = 3, p->job.n_own = 1;
+		p->job.n_seed = 3;
 	}
 	p->limit = p->n + limit;
 }

@@ -7,6 +7,11 @@ typedef quern_real quern_row __attribute__((vector_size(64)));
 
 enum { QUERN_BLOCK_CELLS = 64, QUERN_TILE_MOST = 512 };
 
+/* Volume of a cell, m^3; in 2-D its area times a metre. */
+QUERN_INLINE quern_real quern_grid_cell_volume(const quern_grid_view *g) {
+	return g->dim == 2 ? g->cell * g->cell : g->cell * g->cell * g->cell;
+}
+
 /* Cell of a position along one axis, counted from the domain's lower corner. */
 QUERN_INLINE int32_t quern_grid_cell(const quern_grid_view *g, uint32_t axis, quern_real x) {
 	const quern_real t = (x - g->lower[axis]) * (1 / g->cell);
