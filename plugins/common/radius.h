@@ -2,6 +2,12 @@
 #pragma once
 #include <quern/abi.h>
 
+/* kg of a sphere of that radius; in 2-D of a disc one metre deep. */
+QUERN_INLINE quern_real quern_radius_mass(quern_real radius, quern_real density, uint32_t dim) {
+	const quern_real area = 3.141592653589793 * radius * radius;
+	return density * (dim == 2 ? area : 4.0 / 3 * area * radius);
+}
+
 enum { RADIUS_NORMAL, RADIUS_UNIFORM };
 
 typedef struct radius_law {

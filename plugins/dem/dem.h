@@ -91,11 +91,6 @@ enum {
 	FORCE_TREMBLING
 };
 
-/* disc or sphere */
-QUERN_INLINE quern_real dem_mass(quern_real density, quern_real radius, uint32_t dim) {
-	const quern_real area = 3.141592653589793 * radius * radius;
-	return density * (dim == 2 ? area : 4.0 / 3 * area * radius);
-}
 /* moment of inertia over mass times radius squared */
 QUERN_INLINE quern_real dem_inertia(uint32_t dim) { return dim == 2 ? 0.5 : 0.4; }
 

@@ -2,6 +2,7 @@
 #include "../common/placer.h"
 #include "dem.h"
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -113,19 +114,49 @@ static void fill_region(filling *f, const dem_fill *item, const quern_bound *pac
 			}
 }
 
-static quern_status read_file(filling *f) {
-	char why[200];
-	grain_table table = { 0 };
-	if (!quern_grain_table_load(f->d->file, f->d->dim, &table, why)) {
-		quern_grain_table_finish(&table);
-		return f->step->host->stop(f->step->run, QUERN_E_PARAM, NULL, -1, "%s: %s", f->d->file, why);
+/* True if the grain lies in the domain; a fixed one may lie beyond it, by the domain's own width at most. */
+static bool is_near(const quern_step *s, const dem_place *grain) {
+	bool near = true;
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real slack = grain->fixed ? s->upper[k] - s->lower[k] : 0, x = grain->position[k];
+		near = near && x >= s->lower[k] - slack && x <= s->upper[k] + slack;
 	}
-	for (uint32_t i = 0; i < table.n; i++) {
-		if (isnan(table.grain[i].radius)) table.grain[i].radius = f->d->radii.mean;
-		add(f, &table.grain[i]);
-	}
-	quern_grain_table_finish(&table);
+	return near;
+}
+
+/* A grain that somebody has placed, number k; `param` is where: no law has a direction for grains whose centres coincide. */
+static quern_status add_given(filling *f, const dem_place *given, const char *param, uint32_t k) {
+	const quern_step *s = f->step;
+	dem_place grain = *given;
+	const char *wrong = NULL;
+	if (isnan(grain.radius)) grain.radius = f->d->radii.mean;
+	quern_spot centre = { .radius = 1e-3 * grain.radius };
+	memcpy(centre.x, grain.position, sizeof centre.x);
+	if (!is_near(s, &grain)) wrong = "lies outside of the domain";
+	else if (!grain.fixed && !quern_placer_free(&f->placer, &centre))
+		wrong = "has its centre within another grain";
+	if (wrong)
+		return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "grain %u at (%g, %g, %g) m %s", k,
+			centre.x[0], centre.x[1], centre.x[2], wrong);
+	add(f, &grain);
 	return QUERN_OK;
+}
+
+static quern_status add_all(filling *f, const dem_place *grain, uint32_t n, const char *param, bool of_list) {
+	quern_status status = QUERN_OK;
+	f->placer.n_bodies = 0; /* a grain may start behind a wall that it shall be pushed out of */
+	for (uint32_t i = 0; i < n && status == QUERN_OK; i++) {
+		char item[40];
+		snprintf(item, sizeof item, "%s.%u", param, i);
+		status = add_given(f, &grain[i], of_list ? item : param, i);
+	}
+	return status;
+}
+
+static quern_status read_file(const dem *d, const quern_step *s, grain_table *table) {
+	char why[200];
+	if (!d->file || quern_grain_table_load(d->file, d->dim, table, why)) return QUERN_OK;
+	return s->host->stop(s->run, QUERN_E_PARAM, "file", -1, "%s: %s", d->file, why);
 }
 
 static quern_status store(filling *f) {
@@ -146,44 +177,67 @@ static quern_status store(filling *f) {
 		for (uint32_t k = 0; use[FILL_SPIN].real[0] && k < (dim == 3 ? 3u : 1u); k++)
 			use[FILL_SPIN].real[k][i] = g->fixed ? 0 : g->spin[k];
 		use[FILL_RADIUS].real[0][i] = g->radius;
-		use[FILL_MASS].real[0][i] = dem_mass(f->d->density, g->radius, dim);
+		use[FILL_MASS].real[0][i] = quern_radius_mass(g->radius, f->d->density, dim);
 		if (use[FILL_FIXED].index) use[FILL_FIXED].index[i] = g->fixed;
 	}
 	use[FILL_DISPLACEMENT].real[0][0] = INFINITY;
 	return QUERN_OK;
 }
 
-/* Widest radius that any source of grains may bring: the cells of the placer must hold it. */
-static quern_real widest(const dem *d) {
-	quern_real most = quern_radius_most(&d->radii);
-	const dem_place *place = d->place.items;
-	for (uint32_t i = 0; i < d->place.n; i++)
-		if (place[i].radius > most) most = place[i].radius;
+static quern_real widest_of(const dem_place *grain, uint32_t n, quern_real most) {
+	for (uint32_t i = 0; i < n; i++)
+		if (grain[i].radius > most) most = grain[i].radius;
 	return most;
 }
 
-static quern_status fill_all(filling *f) {
+/* The placer's cells hold the widest grain that any source may bring. */
+static quern_status open_placer(filling *f, const grain_table *table) {
+	const quern_step *s = f->step;
+	quern_real most = quern_radius_most(&f->d->radii);
+	most = widest_of(f->d->place.items, f->d->place.n, most);
+	most = widest_of(table->grain, table->n, most);
+	for (uint32_t k = 0; k < s->dim; k++)
+		if (!((s->upper[k] - s->lower[k]) / most < 0x1p30))
+			return s->host->stop(s->run, QUERN_E_PARAM, "material", -1,
+				"the domain is %g m wide along axis %u, more than 2^29 of the widest grains",
+				s->upper[k] - s->lower[k], k);
+	const quern_status status = quern_placer_init(&f->placer, s->dim, s->lower, s->upper, s->periodic, most);
+	f->placer.body = s->slot[SLOT_BODIES];
+	return status;
+}
+
+/* Regions that cannot be meant: more grains than a run can number. */
+static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
+	const dem_fill *item = (const dem_fill *)d->fill.items + i;
+	char param[40];
+	quern_real grains = 1;
+	for (uint32_t k = 0; k < d->dim; k++) {
+		const quern_real across = (item->upper[k] - item->lower[k]) / (2 * d->radii.mean);
+		grains *= across > 1 ? across : 1;
+	}
+	if (grains <= 0x1p30) return QUERN_OK;
+	snprintf(param, sizeof param, "fill.%u", i);
+	return s->host->stop(s->run, QUERN_E_PARAM, param, -1,
+		"the region holds about %.2g grains of radius %g m; more than %.2g cannot be numbered", grains,
+		d->radii.mean, 0x1p30);
+}
+
+static quern_status fill_all(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
 	const dem *d = f->d;
-	const dem_place *place = d->place.items;
 	const dem_fill *item = d->fill.items;
-	for (uint32_t i = 0; i < d->place.n; i++) {
-		dem_place grain = place[i];
-		if (isnan(grain.radius)) grain.radius = d->radii.mean;
-		add(f, &grain);
-	}
-	if (d->file) {
-		const quern_status status = read_file(f);
-		if (status != QUERN_OK) return status;
-	}
+	quern_status status = add_all(f, d->place.items, d->place.n, "place", true);
+	if (status == QUERN_OK) status = add_all(f, table->grain, table->n, "file", false);
+	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = check_fill(d, s, i);
+	if (status != QUERN_OK) return status;
 	for (int fixed = 1; fixed >= 0; fixed--) /* floors first: what falls must find them */
 		for (uint32_t i = 0; i < d->fill.n; i++)
 			if (item[i].fixed == fixed)
 				fill_region(f, &item[i], &s->slot[SLOT_PACKER][i], (uint64_t)(i + 1) << 40);
 	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
 	if (!f->n)
-		return s->host->stop(
-			s->run, QUERN_E_PARAM, NULL, -1, "the fill places no grain: is its region too small?");
+		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
+			"no grain has room: is the region too small, or a body in it?");
 	s->host->log(s->run, 0, "%u grains placed", f->n);
 	return store(f);
 }
@@ -193,20 +247,19 @@ static quern_status refuse_two_steps(const quern_step *s) {
 	const quern_bound *integrator = &s->slot[SLOT_INTEGRATOR][0];
 	if (!s->use[FILL_WEIGHT].real[0] || !((const quern_integrator_ops *)integrator->ops)->open[s->dim - 2])
 		return QUERN_OK;
-	return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
-		"grains.integrator: %s acts in two steps, and the books of a hybrid take one: use symplectic_euler",
-		integrator->id);
+	return s->host->stop(s->run, QUERN_E_PARAM, "integrator", -1,
+		"%s acts in two steps, and the books of a hybrid take one: use symplectic_euler", integrator->id);
 }
 
 quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	if (refuse_two_steps(s) != QUERN_OK) return QUERN_E_PARAM;
 	filling f = { .d = self, .step = s };
-	quern_status status =
-		quern_placer_init(&f.placer, f.d->dim, s->lower, s->upper, s->periodic, widest(f.d));
-	f.placer.body = s->slot[SLOT_BODIES];
-	f.placer.n_bodies = s->n_slot[SLOT_BODIES];
-	if (status == QUERN_OK) status = fill_all(&f);
+	grain_table table = { 0 };
+	quern_status status = read_file(f.d, s, &table);
+	if (status == QUERN_OK) status = open_placer(&f, &table);
+	if (status == QUERN_OK) status = fill_all(&f, &table);
 	quern_placer_finish(&f.placer);
+	quern_grain_table_finish(&table);
 	free(f.grain);
 	return status;
 }

@@ -57,12 +57,14 @@ static const quern_set sets[] = { { .name = "grain", .doc = "Discs or spheres, s
 	{ .name = "touch", .doc = "Grains near bodies, by block, body and grain.", .slot = "bodies" },
 	{ .name = NULL } };
 
-static const quern_slot slots[] = { { .name = "contact",
-										.doc = "contact laws; the forces of a list add up",
-										.kind = QUERN_CONTACT,
-										.list = 1,
-										.stage = { "dem.forces" },
-										.repeat = "touch" },
+static const quern_slot slots[] = {
+	{ .name = "contact",
+		.doc = "a contact law, such as {linear: {stiffness: 1e6 N/m}}; forces of a list add up, [] is none",
+		.kind = QUERN_CONTACT,
+		.list = 1,
+		.required = 1,
+		.stage = { "dem.forces" },
+		.repeat = "touch" },
 	{ .name = "neighbours",
 		.doc = "the search for near pairs",
 		.kind = QUERN_NEIGHBOURS,
@@ -79,7 +81,8 @@ static const quern_slot slots[] = { { .name = "contact",
 		.kind = QUERN_PACKER,
 		.def = "two_point_tangent",
 		.stage = { "dem.fill" } },
-	{ .name = NULL } };
+	{ .name = NULL }
+};
 
 #define DISPLACEMENT                                                                                         \
 	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR,                                                 \
@@ -188,7 +191,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 					"the region's upper corner must not be below the lower "
 					"one; axis %u is",
 					k);
-			if (!fill[i].fixed && (fill[i].lower[k] < setup->lower[k] || fill[i].upper[k] > setup->upper[k]))
+			/* a rough floor may be let into a wall */
+			const quern_real slack = fill[i].fixed ? setup->upper[k] - setup->lower[k] : 0;
+			if (fill[i].lower[k] < setup->lower[k] - slack || fill[i].upper[k] > setup->upper[k] + slack)
 				return setup->host->fail(
 					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
 			const quern_real extent = fill[i].upper[k] - fill[i].lower[k];
@@ -260,7 +265,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	}
 	if (!isfinite(least[0])) { /* none yet: what the distribution may bring */
 		small = quern_radius_least(&d->radii);
-		least[0] = least[1] = dem_mass(d->density, small, d->dim);
+		least[0] = least[1] = quern_radius_mass(small, d->density, d->dim);
 	}
 	const quern_real pair = isfinite(least[1]) ? least[0] * least[1] / (least[0] + least[1]) : least[0];
 	const quern_bound *law = s->slot[SLOT_CONTACT];
@@ -269,7 +274,9 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		if (!ops->period) continue;
 		quern_real t = ops->period(law[l].self, d->dim, pair, 0.5 * small);
 		if (t < shortest)
-			shortest = t, snprintf(reason, 160, "%s between the two lightest grains", law[l].id);
+			shortest = t,
+			snprintf(reason, 160, "%s %s", law[l].id,
+				isfinite(least[1]) ? "between the two lightest grains" : "on the lightest grain");
 		for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
 			t = ops->period(law[l].n_variant ? law[l].variant[b] : law[l].self, d->dim, least[0], small);
 			if (t < shortest)

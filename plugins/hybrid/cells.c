@@ -21,13 +21,23 @@ void quern_hybrid_centre(const update *d, const int32_t cell[3], quern_real x[3]
 	for (uint32_t a = 0; a < 3; a++) x[a] = a < d->g->dim ? d->g->lower[a] + (cell[a] + 0.5) * d->g->cell : 0;
 }
 
+int32_t quern_hybrid_entry(const update *d, int32_t cell[3]) {
+	for (uint32_t k = 0; k < d->g->dim; k++) {
+		const int32_t n = d->g->cells[k];
+		if (d->g->periodic[k]) cell[k] = (cell[k] % n + n) % n;
+		if (cell[k] < 0 || cell[k] >= n) return -2;
+	}
+	return quern_grid_entry(d->g, cell);
+}
+
+int32_t quern_hybrid_number(const update *d, const int32_t cell[3]) {
+	return (cell[2] * d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0];
+}
+
 int32_t quern_hybrid_beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]) {
 	memcpy(out, cell, 3 * sizeof(int32_t));
 	out[axis] += step;
-	if (d->g->periodic[axis]) {
-		out[axis] = (out[axis] + d->g->cells[axis]) % d->g->cells[axis];
-	} else if (out[axis] < 0 || out[axis] >= d->g->cells[axis]) return -2;
-	return quern_grid_entry(d->g, out);
+	return quern_hybrid_entry(d, out);
 }
 
 /* ---- sorting ---- */
@@ -83,6 +93,9 @@ quern_status quern_hybrid_sort(update *d) {
 	const quern_status status = quern_cover_sort(s, &c);
 	if (status != QUERN_OK) return status;
 	d->g = s->host->grid(s->run);
+	if ((double)d->g->cells[0] * d->g->cells[1] * d->g->cells[2] > INT32_MAX)
+		return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
+			"the domain has more than 2^31 cells: a hybrid cannot number them");
 	d->u = s->use;
 	d->n_cells = d->g->n_blocks * N;
 	d->n_grains = s->host->set(s->run, "grain").n;
@@ -155,7 +168,7 @@ void quern_hybrid_fractions(update *d) {
 	const quern_column *u = d->u;
 	quern_real *fraction = u[U_FRACTION].real[0];
 	const uint32_t dim = d->s->dim;
-	const quern_real h = d->g->cell, volume = dim == 2 ? h * h : h * h * h;
+	const quern_real h = d->g->cell, volume = quern_grid_cell_volume(d->g);
 	if (!fraction) return;
 	memset(fraction, 0, d->n_cells * sizeof(quern_real));
 	for (uint32_t i = 0; i < d->n_grains; i++) {
@@ -173,17 +186,14 @@ void quern_hybrid_fractions(update *d) {
 				for (int32_t x = first[0]; x <= last[0]; x++) {
 					int32_t cell[3] = { x, y, z };
 					quern_real part = 1;
-					bool inside = true;
 					for (uint32_t k = 0; k < dim; k++) {
 						const quern_real low = d->g->lower[k] + cell[k] * h,
 										 at = u[U_GRAIN_POSITION].real[k][i];
 						const quern_real from = at - half > low ? at - half : low,
 										 to = at + half < low + h ? at + half : low + h;
 						part *= to > from ? to - from : 0;
-						if (d->g->periodic[k]) cell[k] = (cell[k] + d->g->cells[k]) % d->g->cells[k];
-						inside = inside && cell[k] >= 0 && cell[k] < d->g->cells[k];
 					}
-					const int32_t c = inside ? quern_grid_entry(d->g, cell) : -1;
+					const int32_t c = quern_hybrid_entry(d, cell);
 					if (c >= 0) fraction[c] += part / volume;
 				}
 	}
@@ -297,8 +307,7 @@ static void put_homes(
 		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i);
 		int32_t cell[3];
 		home[i] = -1;
-		if (c >= 0 && quern_hybrid_cell(d, (uint32_t)c, cell))
-			home[i] = (cell[2] * d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0];
+		if (c >= 0 && quern_hybrid_cell(d, (uint32_t)c, cell)) home[i] = quern_hybrid_number(d, cell);
 	}
 }
 

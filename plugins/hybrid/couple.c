@@ -103,7 +103,7 @@ QUERN_INLINE sent send_grain(
 
 QUERN_INLINE void raster_block(const raster_work *w, raster_memory *m, uint32_t b, const int dim) {
 	const uint32_t begin = w->at.begin[b], end = w->at.begin[b + 1];
-	const quern_real h = w->g->cell, least = 0.01 * w->h->packed * (dim == 2 ? h * h : h * h * h);
+	const quern_real least = 0.01 * w->h->packed * quern_grid_cell_volume(w->g);
 	if (begin == end) return;
 	quern_tile_load(w->g, w->node, b, m->mass);
 	if (!has_continuum(m->mass, w->g->tile_size)) return;

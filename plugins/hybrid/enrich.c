@@ -19,10 +19,7 @@ typedef struct {
 	uint32_t first;                /* of its grains among the new ones */
 } enriching;
 
-static quern_real mass_of(const hybrid *h, quern_real r) {
-	const quern_real area = 3.141592653589793 * r * r;
-	return h->density * (h->dim == 2 ? area : 4.0 / 3 * area * r);
-}
+static quern_real mass_of(const hybrid *h, quern_real r) { return quern_radius_mass(r, h->density, h->dim); }
 
 static quern_real waiting(const enriching *e) {
 	return quern_radius_draw(&e->d->h->radii, e->d->s->host, e->draws);
@@ -122,13 +119,7 @@ static void look_around(const update *d, const quern_real at[3], surroundings *s
 	for (int32_t z = low[2]; z <= high[2]; z++)
 		for (int32_t y = low[1]; y <= high[1]; y++)
 			for (int32_t x = low[0]; x <= high[0]; x++) {
-				int32_t cell[3] = { x, y, z };
-				bool inside = true;
-				for (uint32_t k = 0; k < d->s->dim; k++) {
-					if (d->g->periodic[k]) cell[k] = (cell[k] + d->g->cells[k]) % d->g->cells[k];
-					inside = inside && cell[k] >= 0 && cell[k] < d->g->cells[k];
-				}
-				const int32_t c = inside ? quern_grid_entry(d->g, cell) : -1;
+				const int32_t c = quern_hybrid_entry(d, (int32_t[3]) { x, y, z });
 				if (c >= 0) look_into(d, (uint32_t)c, at, sum);
 			}
 }
@@ -205,7 +196,7 @@ static void enrich_cell(enriching *e, uint32_t c) {
 	quern_pack_job job = { .dim = d->s->dim,
 		.stream = d->h->radii.stream + 1,
 		.host = d->s->host,
-		.key = (uint64_t)((cell[2] * (int64_t)d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0]),
+		.key = (uint64_t)quern_hybrid_number(d, cell),
 		.counter = (uint64_t)d->u[U_UPDATES].index[0] << 32,
 		.seed = e->seed,
 		.radius = job_radius,

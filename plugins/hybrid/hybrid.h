@@ -11,7 +11,6 @@ typedef struct hybrid {
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
-	quern_real cell;
 	bool affine;
 } hybrid;
 

@@ -1,4 +1,5 @@
 /* points - mass owed to the continuum becomes points, or joins those that are there; few are split, many are merged */
+#include "../common/stressed.h"
 #include "update.h"
 #include <math.h>
 #include <stdlib.h>
@@ -7,26 +8,11 @@
 /* ---- state from stress ---- */
 
 void quern_hybrid_assign(const update *d, uint32_t begin, uint32_t n) {
-	enum { CHUNK = 64, MOST_ROWS = 8 };
-	const quern_bound *material = &d->s->slot[SLOT_MATERIAL][0];
 	const quern_column *u = d->u;
-	_Alignas(64) quern_real density[CHUNK], wave[CHUNK], energy[CHUNK];
-	for (uint32_t i = begin; i < begin + n; i += CHUNK) {
-		quern_column own[MOST_ROWS];
-		const uint32_t m = begin + n - i < CHUNK ? begin + n - i : CHUNK;
-		quern_material_batch b = {
-			.n = m, .cap = CHUNK, .density = density, .wave_speed = wave, .energy = energy, .use = own
-		};
-		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
-			b.stress[k] = u[U_POINT_STRESS].real[k] + i;
-		for (uint32_t r = 0; r < material->n_uses && r < MOST_ROWS; r++)
-			own[r] = quern_column_from(material->column[r], material->uses[r].shape, i);
-		for (uint32_t k = 0; k < m; k++)
-			density[k] = u[U_POINT_MASS].real[0][i + k] / u[U_POINT_VOLUME].real[0][i + k];
-		((const quern_material_ops *)material->ops)->assign[d->s->dim - 2](material->self, &b);
-		for (uint32_t k = 0; k < m; k++)
-			u[U_POINT_VOLUME].real[0][i + k] = u[U_POINT_MASS].real[0][i + k] / density[k];
-	}
+	const stressed_points points = {
+		.mass = u[U_POINT_MASS], .volume = u[U_POINT_VOLUME], .stress = u[U_POINT_STRESS]
+	};
+	quern_stressed_assign(&points, &d->s->slot[SLOT_MATERIAL][0], d->s->dim, begin, n);
 }
 
 /* ---- new ones ---- */

@@ -126,8 +126,7 @@ quern_status quern_hybrid_sample(const void *self, const quern_step *s) {
 	const bool first = s->step == 0 && s->substep + 1 == s->n_substeps;
 	if (s->settling || ((s->substep + 1) % h->sample_every && !first)) return QUERN_OK;
 	sampling p = { .s = s, .g = s->host->grid(s->run), .block = -1 };
-	const quern_real cell = p.g->cell;
-	p.one_over_volume = 1 / (s->dim == 2 ? cell * cell : cell * cell * cell);
+	p.one_over_volume = 1 / quern_grid_cell_volume(p.g);
 	sample_contacts(&p);
 	if (s->use[S_TOUCH_FORCE].real[0]) sample_touches(&p);
 	s->use[S_SAMPLES].real[0][0]++;

@@ -4,11 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static quern_real full_cell(const update *d) {
-	const quern_real h = d->g->cell;
-	return d->h->packed * (d->s->dim == 2 ? h * h : h * h * h);
-}
-
 /* Zones from the state as it is, then weights, then books, then material that comes and goes. */
 static quern_status reckon(update *d) {
 	quern_hybrid_move_entries(d);
@@ -40,7 +35,7 @@ static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed
 	update d = { .h = h, .s = s };
 	quern_status status = quern_hybrid_sort(&d);
 	if (status == QUERN_OK) {
-		d.full = full_cell(&d);
+		d.full = h->packed * quern_grid_cell_volume(d.g);
 		d.nominal = d.full / (s->dim == 2 ? 4 : 8);
 		status = reckon(&d);
 	}

@@ -87,14 +87,11 @@ static void spread(spreading *p, const bool *open) {
 					const int step[3] = { x, y, z };
 					int32_t to[3];
 					int16_t way[3];
-					bool inside = true;
 					for (uint32_t k = 0; k < 3; k++) {
 						to[k] = cell[k] + step[k];
 						way[k] = (int16_t)(p->way[e.cell][k] - step[k]);
-						if (p->d->g->periodic[k]) to[k] = (to[k] + p->d->g->cells[k]) % p->d->g->cells[k];
-						inside = inside && to[k] >= 0 && to[k] < p->d->g->cells[k];
 					}
-					const int32_t c = inside ? quern_grid_entry(p->d->g, to) : -1;
+					const int32_t c = quern_hybrid_entry(p->d, to);
 					if (c >= 0 && (!open || open[c])) offer(p, (uint32_t)c, way);
 				}
 	}
@@ -119,11 +116,8 @@ quern_status quern_hybrid_nearest(update *d, const bool *source, int32_t *neares
 		int32_t cell[3];
 		nearest[c] = -1;
 		if (!isfinite(distance[c]) || !quern_hybrid_cell(d, c, cell)) continue;
-		for (uint32_t k = 0; k < d->g->dim; k++) {
-			cell[k] += p.way[c][k];
-			if (d->g->periodic[k]) cell[k] = (cell[k] % d->g->cells[k] + d->g->cells[k]) % d->g->cells[k];
-		}
-		nearest[c] = quern_grid_entry(d->g, cell);
+		for (uint32_t k = 0; k < d->g->dim; k++) cell[k] += p.way[c][k];
+		nearest[c] = quern_hybrid_entry(d, cell);
 	}
 	free(p.heap);
 	return p.failed ? QUERN_E_MEMORY : QUERN_OK;

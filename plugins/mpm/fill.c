@@ -1,17 +1,21 @@
 /* fill - the first points: a lattice in each region, with the stress of the overburden if wished */
+#include "../common/stressed.h"
 #include "mpm.h"
 #include <math.h>
-#include <string.h>
+
+enum { MOST_POINTS = 1 << 30 };
 
 typedef struct {
 	uint32_t count[3], n;
-	quern_real spacing[3];
+	quern_real spacing[3], wanted; /* how many points it would be, whether or not they can be counted */
 } lattice;
 
 static lattice lattice_of(const mpm *p, const mpm_fill *item) {
-	lattice l = { .count = { 1, 1, 1 }, .n = 1 };
+	lattice l = { .count = { 1, 1, 1 }, .n = 1, .wanted = 1 };
 	for (uint32_t k = 0; k < p->dim; k++) {
 		const quern_real extent = item->upper[k] - item->lower[k], wanted = extent / p->cell * p->points;
+		l.wanted *= wanted > 1 ? wanted : 1;
+		if (l.wanted > MOST_POINTS) continue;
 		l.count[k] = wanted > 1 ? (uint32_t)(wanted + 0.5) : 1;
 		l.spacing[k] = extent / l.count[k];
 		l.n *= l.count[k];
@@ -54,62 +58,43 @@ static void place(const mpm *p, const quern_step *s, const mpm_fill *item, const
 	}
 }
 
-/* History and volume that go with the stress. */
-static quern_status assign(const quern_step *s, uint32_t n) {
-	enum { CHUNK = 64, MOST_ROWS = 8 };
-	const quern_bound *material = &s->slot[SLOT_MATERIAL][0];
-	const quern_material_ops *ops = material->ops;
-	const quern_column *u = s->use;
-	_Alignas(64) quern_real density[CHUNK], wave[CHUNK], energy[CHUNK];
-	for (uint32_t i = 0; i < n; i += CHUNK) {
-		quern_column own[MOST_ROWS];
-		const uint32_t m = n - i < CHUNK ? n - i : CHUNK;
-		quern_material_batch b = {
-			.n = m, .cap = CHUNK, .density = density, .wave_speed = wave, .energy = energy, .use = own
-		};
-		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, s->dim); k++)
-			b.stress[k] = u[FILL_STRESS].real[k] + i;
-		for (uint32_t r = 0; r < material->n_uses && r < MOST_ROWS; r++)
-			own[r] = quern_column_from(material->column[r], material->uses[r].shape, i);
-		for (uint32_t k = 0; k < m; k++)
-			density[k] = u[FILL_MASS].real[0][i + k] / u[FILL_VOLUME].real[0][i + k];
-		ops->assign[s->dim - 2](material->self, &b);
-		for (uint32_t k = 0; k < m; k++) {
-			u[FILL_VOLUME].real[0][i + k] = u[FILL_MASS].real[0][i + k] / density[k];
-			if (u[FILL_ENERGY].real[0]) u[FILL_ENERGY].real[0][i + k] = energy[k];
-		}
-	}
-	return QUERN_OK;
-}
-
 /* A hybrid starts from all grains: its oracle decides where points go. */
 quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 	const mpm *p = self;
 	const mpm_fill *item = p->fill.items;
-	uint64_t total = 0;
+	quern_real wanted = 0;
+	uint32_t total = 0;
 	s->use[FILL_UNSORTED].index[0] = 1;
 	if (s->use[FILL_WEIGHT].real[0]) return QUERN_OK;
 	for (uint32_t f = 0; f < p->fill.n; f++) {
 		quern_real g = 0;
-		total += lattice_of(p, &item[f]).n;
+		const lattice l = lattice_of(p, &item[f]);
+		wanted += l.wanted;
+		if (wanted > MOST_POINTS) break;
+		total += l.n;
 		if (item[f].stress == STRESS_AT_REST && gravity_axis(s, &g) < 0 && g != 0)
-			return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
-				"continuum.fill: stress at_rest needs gravity along an axis");
+			return s->host->stop(
+				s->run, QUERN_E_PARAM, "fill", -1, "stress at_rest needs gravity along an axis");
 	}
-	if (!total) return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "continuum: no points: give fill");
-	if (total > 1u << 30)
-		return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
-			"continuum.fill asks for %llu points: make cells larger", (unsigned long long)total);
-	int32_t *from = s->host->memory(s->run, (total + 1) * sizeof(int32_t));
+	if (wanted > MOST_POINTS)
+		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
+			"asks for about %.2g points, more than %d: make cells larger", wanted, MOST_POINTS);
+	if (!total) return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill");
+	int32_t *from = s->host->memory(s->run, ((size_t)total + 1) * sizeof(int32_t));
 	if (!from) return QUERN_E_MEMORY;
-	for (uint64_t i = 0; i < total; i++) from[i] = -1;
-	const quern_status status = s->host->remap(s->run, "point", (uint32_t)total, from, 0, NULL);
+	for (uint32_t i = 0; i < total; i++) from[i] = -1;
+	const quern_status status = s->host->remap(s->run, "point", total, from, 0, NULL);
 	if (status != QUERN_OK) return status;
 	for (uint32_t f = 0, first = 0; f < p->fill.n; f++) {
 		const lattice l = lattice_of(p, &item[f]);
 		place(p, s, &item[f], &l, first);
 		first += l.n;
 	}
-	s->host->log(s->run, 0, "%llu points placed", (unsigned long long)total);
-	return assign(s, (uint32_t)total);
+	s->host->log(s->run, 0, "%u points placed", total);
+	const quern_column *u = s->use;
+	const stressed_points points = {
+		.mass = u[FILL_MASS], .volume = u[FILL_VOLUME], .stress = u[FILL_STRESS], .energy = u[FILL_ENERGY]
+	};
+	quern_stressed_assign(&points, &s->slot[SLOT_MATERIAL][0], s->dim, 0, total);
+	return QUERN_OK;
 }

@@ -43,7 +43,7 @@ enum {
 	SCATTER_AFFINE,
 	SCATTER_NODE_MASS
 };
-enum { NODES_NODE, NODES_MOTION, NODES_IMPULSE, NODES_FACES, NODES_MIXTURE };
+enum { NODES_NODE, NODES_MOTION, NODES_IMPULSE, NODES_FACES };
 enum { WALLS_MOTION, WALLS_NODE, WALLS_IMPULSE, WALLS_FACES };
 enum {
 	GATHER_MOTION,
@@ -73,6 +73,3 @@ quern_status quern_mpm_scatter(const void *self, const quern_step *);
 quern_status quern_mpm_nodes(const void *self, const quern_step *);
 quern_status quern_mpm_walls(const void *self, const quern_step *);
 quern_status quern_mpm_gather(const void *self, const quern_step *);
-
-/* Sorts points by block and cell and covers them; `all` blocks that grains need are the hybrid's to add. */
-quern_status quern_mpm_sort_points(const quern_step *, quern_real *const *position);

@@ -151,8 +151,7 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 	const grid_work *w = arg;
 	const quern_step *s = w->s;
 	const uint32_t dim = s->dim;
-	const quern_real h = w->g->cell, volume = dim == 2 ? h * h : h * h * h,
-					 cut = w->p->cut * w->p->density * volume;
+	const quern_real volume = quern_grid_cell_volume(w->g), cut = w->p->cut * w->p->density * volume;
 	quern_real *left = w->impulse + ((size_t)b * (w->n_bodies + 1) + w->n_bodies) * 3;
 	for (uint32_t i = 0; i < N; i++) {
 		const quern_row row = w->node[(size_t)b * N + i];
