@@ -129,10 +129,29 @@ static bool read_partition(quern_run *run, hid_t group, int s, uint32_t n, char 
 /* Indices are followed blindly later on, so they are looked at now. */
 static bool indices_hold(const quern_store *store, const quern_field *field, uint32_t n) {
 	const int32_t *index = field->data[field->now][0];
-	if (field->shape != QUERN_INDEX || field->target < 0) return true;
 	for (uint32_t i = 0; i < n; i++)
 		if (index[i] < 0 || (uint32_t)index[i] >= store->sets[field->target].n) return false;
 	return true;
+}
+
+/* No state of a run that goes on is infinite or undefined, but for sums of the run as a whole. */
+static bool numbers_hold(const quern_store *store, const quern_field *field, uint32_t n) {
+	const bool whole = !strcmp(store->sets[field->set].name, "total");
+	for (uint8_t c = 0; c < field->n_components; c++) {
+		const quern_real *value = field->data[field->now][c];
+		for (uint32_t i = 0; i < n; i++)
+			if (isnan(value[i]) || (!whole && isinf(value[i]))) return false;
+	}
+	return true;
+}
+
+static bool values_hold(const quern_store *store, const quern_field *field, char why[256]) {
+	const uint32_t n = store->sets[field->set].n;
+	if (!is_kept(store, field) || field->shape == QUERN_ID) return true;
+	if (field->shape != QUERN_INDEX)
+		return numbers_hold(store, field, n) || fault(why, "a number that is not finite", field->name);
+	return field->target < 0 || indices_hold(store, field, n) ||
+		   fault(why, "an index out of its set", field->name);
 }
 
 static bool read_fields(quern_run *run, hid_t group, int s, char why[256]) {
@@ -238,9 +257,7 @@ static bool read_all(quern_run *run, quern_h5 *h, int64_t *rows, char why[256]) 
 	for (int s = 0; s < (int)store->n_sets; s++)
 		if (!read_set(run, h, s, why)) return false;
 	for (size_t k = 0; k < store->n_fields; k++)
-		if (is_kept(store, &store->fields[k]) &&
-			!indices_hold(store, &store->fields[k], store->sets[store->fields[k].set].n))
-			return fault(why, "an index out of its set", store->fields[k].name);
+		if (!values_hold(store, &store->fields[k], why)) return false;
 	return true;
 }
 

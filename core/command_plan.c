@@ -167,6 +167,13 @@ static void print(const json_t *root) {
 		number_of(root, "steps"), number_of(root, "substeps"), number_of(root, "estimated_core_seconds"));
 }
 
+static quern_status check_step(quern_run *run) {
+	char reason[200], hard_reason[200];
+	double hard;
+	const double limit = quern_run_limit(run, &hard, reason, hard_reason);
+	return quern_run_check_step(run, hard, hard_reason, limit);
+}
+
 int quern_command_plan(int argc, char **argv) {
 	const char *path = NULL;
 	const char **sets = quern_take((size_t)argc + 1, sizeof(char *));
@@ -186,8 +193,8 @@ int quern_command_plan(int argc, char **argv) {
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, 0);
 	quern_report_print(scene->report, stderr);
 	if (!run || quern_report_errors(scene->report)) status = QUERN_EXIT_SCENE;
-	else if (quern_run_setup(run) != QUERN_OK) {
-		fprintf(stderr, "quern: error: %s\n", run->message);
+	else if (quern_run_setup(run) != QUERN_OK || check_step(run) != QUERN_OK) {
+		quern_run_complain(run, stderr);
 		status = run->status == QUERN_E_PARAM ? QUERN_EXIT_SCENE : QUERN_EXIT_FAILED;
 	} else {
 		json_t *root = whole(run);

@@ -224,7 +224,7 @@ static int finish(session *s) {
 	if (run->status == QUERN_OK) checkpoint(s);
 	report_end(s, run->status == QUERN_OK ? status : "failed");
 	if (run->status != QUERN_OK) {
-		fprintf(stderr, "quern: error: %s\n", run->message ? run->message : "the run failed");
+		quern_run_complain(run, stderr);
 		if (run->log) quern_log_add(run->log, 0, "error: %s", run->message ? run->message : "the run failed");
 		return exit_status(run);
 	}
@@ -266,7 +266,7 @@ static int drive(session *s, const options *o, double until) {
 		quern_series_init(&s->series, run, rows);
 	}
 	if (run->status != QUERN_OK) {
-		fprintf(stderr, "quern: error: %s\n", run->message);
+		quern_run_complain(run, stderr);
 		return exit_status(run);
 	}
 	if (!again && quern_run_setup(run) == QUERN_OK) run->mass_initial = quern_run_account(run).mass;

@@ -52,6 +52,11 @@ static quern_status host_stop(
 	va_start(list, fmt);
 	quern_text_addv(&text, fmt, list);
 	va_end(list);
+	if (status == QUERN_E_PARAM) {
+		quern_run_refuse(run, set, "%s", quern_text_string(&text));
+		quern_text_finish(&text);
+		return status;
+	}
 	char number[40] = "";
 	if (id >= 0) snprintf(number, sizeof number, " %lld", (long long)id);
 	quern_run_stop(

@@ -33,9 +33,26 @@ static const quern_entry *walk(const quern_node *map, const char *name) {
 	}
 }
 
+/* One part of a path: a key of a map, or the number of a list's item. */
+static const quern_entry *step_into(const quern_node *node, const char *part) {
+	if (!node || node->kind != QUERN_NODE_LIST) return quern_node_entry(node, part);
+	char *end;
+	const unsigned long k = strtoul(part, &end, 10);
+	return *part && !*end && k < node->n ? &node->entries[k] : NULL;
+}
+
 quern_mark quern_param_mark(const quern_node *map, const char *name, quern_mark fallback) {
-	const quern_entry *entry = name ? walk(map, name) : NULL;
-	return entry ? entry->value->mark : fallback;
+	char part[64];
+	while (name && map) {
+		const size_t n = strcspn(name, ".");
+		snprintf(part, sizeof part, "%.*s", (int)n, name);
+		const quern_entry *entry = step_into(map, part);
+		if (!entry || quern_node_is_null(entry->value)) break;
+		fallback = entry->value->mark;
+		map = entry->value;
+		name = name[n] ? name + n + 1 : NULL;
+	}
+	return fallback;
 }
 
 double quern_param_default(const quern_param *row, uint32_t dim) {

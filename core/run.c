@@ -20,6 +20,36 @@ quern_status quern_run_stop(quern_run *run, quern_status status, const char *fmt
 	return status;
 }
 
+quern_status quern_run_refuse(quern_run *run, const char *param, const char *fmt, ...) {
+	if (run->status != QUERN_OK) return QUERN_E_PARAM;
+	const quern_section *section = run->stage ? run->section : NULL;
+	quern_text text = { 0 };
+	va_list list;
+	if (section) quern_text_add(&text, "%s: ", section->name);
+	if (param) quern_text_add(&text, "%s: ", param);
+	va_start(list, fmt);
+	quern_text_addv(&text, fmt, list);
+	va_end(list);
+	run->fault = quern_param_mark(section ? section->node : run->scene->tree->root, param,
+		section ? section->mark : (quern_mark) { 0 });
+	run->status = QUERN_E_PARAM;
+	free(run->message);
+	run->message = text.data;
+	return QUERN_E_PARAM;
+}
+
+void quern_run_complain(const quern_run *run, FILE *out) {
+	const char *message = run->message ? run->message : "the run failed";
+	if (!run->fault.file) {
+		fprintf(out, "quern: error: %s\n", message);
+		return;
+	}
+	quern_report *report = quern_report_create();
+	quern_report_add(report, run->fault, "%s", message);
+	quern_report_print(report, out);
+	quern_report_destroy(report);
+}
+
 static void arena_reset(quern_arena *a) {
 	for (size_t i = 0; i < a->n_extra; i++) free(a->extra[i]);
 	if (a->n_extra) {
@@ -179,6 +209,16 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 	return least;
 }
 
+quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_reason, double recommended) {
+	const quern_general *g = &run->scene->general;
+	if (g->force || !(g->step > hard)) return QUERN_OK;
+	return quern_run_refuse(run, "time.step",
+		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it all "
+		"the "
+		"same)",
+		g->step, hard, hard_reason, recommended);
+}
+
 quern_status quern_run_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
@@ -186,13 +226,8 @@ quern_status quern_run_interval(quern_run *run) {
 	double hard;
 	char hard_reason[200];
 	double limit = quern_run_limit(run, &hard, run->limit_reason, hard_reason);
+	if (quern_run_check_step(run, hard, hard_reason, limit) != QUERN_OK) return QUERN_E_PARAM;
 	if (g->step > 0) {
-		if (g->step > hard && !g->force)
-			return quern_run_stop(run, QUERN_E_PARAM,
-				"time.step of %.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s "
-				"(time.force: true takes it "
-				"all the same)",
-				g->step, hard, hard_reason, limit);
 		if (g->step > hard && run->log && c->step == 0)
 			quern_log_add(run->log, 2,
 				"time.step of %.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s", g->step,
@@ -234,6 +269,7 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 	step.dt = dt;
 	step.use = stage->column;
 	run->stage = stage->name;
+	run->section = stage->section;
 	quern_status status = stage->stage->run(stage->section->solver->self, &step);
 	arena_reset(&run->arena);
 	if (status == QUERN_OK) status = run->status;

@@ -36,6 +36,8 @@ struct quern_run {
 	const char *stage; /* the one that runs, for messages */
 	quern_status status;
 	char *message;                   /* why the run stopped */
+	const quern_section *section;    /* whose stage runs */
+	quern_mark fault;                /* where in the scene the reason stands; no file: nowhere */
 	double wall_before, settle_wall; /* s on the clock spent before a resume; in settling */
 	double mass_initial;
 	volatile sig_atomic_t *interrupted;
@@ -51,8 +53,9 @@ void quern_run_destroy(quern_run *);
 quern_status quern_run_setup(quern_run *);
 /* One grain step of the settling phase; true when at rest. */
 bool quern_run_settle(quern_run *);
-/* Chooses the steps of the interval that begins now, from the state as it is; QUERN_E_PARAM if the scene's own step
- * is beyond a limit, with the reason in run->message. */
+/* Refuses the scene's own step if it is beyond the hard limit of the state as it is. */
+quern_status quern_run_check_step(quern_run *, double hard, const char *hard_reason, double recommended);
+/* Chooses the steps of the interval that begins now, from the state as it is. */
 quern_status quern_run_interval(quern_run *);
 /* One long step. */
 quern_status quern_run_step(quern_run *);
@@ -69,5 +72,12 @@ uint32_t quern_run_substeps(const quern_run *);
 /* Ends the run: keeps the first message. */
 quern_status quern_run_stop(quern_run *, quern_status, const char *fmt, ...)
 	__attribute__((format(printf, 3, 4)));
+
+/* Ends the run for a fault of the scene that only its state shows: QUERN_E_PARAM. `param`: of the section whose stage
+ * runs, or from the scene's root between stages; NULL: of the section itself. */
+quern_status quern_run_refuse(quern_run *, const char *param, const char *fmt, ...)
+	__attribute__((format(printf, 3, 4)));
+/* Says why the run stopped, with the place in the scene if it has one. */
+void quern_run_complain(const quern_run *, FILE *);
 
 extern const quern_host quern_host_table;

@@ -175,7 +175,7 @@ static const quern_slot_use *find_slot(const quern_scene *s, const char *path) {
 void quern_slot_fill(quern_scene *s, quern_slot_use *use, quern_node *node, quern_mark mark) {
 	const quern_slot *slot = use->slot;
 	if (!node && slot->def) node = default_node(s, slot->def, mark);
-	if (!node && !slot->list)
+	if (!node && (!slot->list || slot->required))
 		quern_report_add(s->report, mark, "%s is missing: %s", use->path, slot->doc ? slot->doc : "");
 	if (!node) return;
 	choice *choices;

@@ -38,7 +38,7 @@ static quern_run *open_scene(const collision *c, int n, const char *step, double
 	const double other = second_radius(c);
 	t.length = 0;
 	text_add(&t, "{quern: 1, dimension: %u, gravity: [0, 0%s], ", c->dim, more);
-	text_add(&t, "domain: {lower: [-0.1, -0.1%s], upper: [0.1, 3%s]},\n", low, high);
+	text_add(&t, "domain: {lower: [-5, -0.1%s], upper: [5, 3%s]},\n", low, high);
 	text_add(&t, "time: {end: %.17g, step: %s}, output: {every: %.17g},\n", 1000 * dt, step, dt);
 	if (c->with == WALL)
 		text_add(&t, "bodies: [{plane: {point: [0, 0%s], normal: [-1, 0%s]}}],\n", more, more);

@@ -1,11 +1,13 @@
 """The same scene leaves the same bits: for any number of threads, batch, instruction set, C library and compiler, and
 across stops by Ctrl-C and by kill -9.
 
-`bits.py` takes small columns in 2-D and 3-D, with conversions on the way; `bits.py --main [--set=...]` takes the scenes
-of configs/ as they are. QUERN_OTHER names a program built by another compiler.
+`bits.py` takes small columns in 2-D and 3-D, with conversions on the way. `bits.py --main [--until=50ms]` takes the
+scenes of configs/ as they are, settles each once, and lets every run go on from there. QUERN_OTHER names a program
+built by another compiler.
 """
 import os
 import pathlib
+import shutil
 import signal
 import sys
 import time
@@ -27,12 +29,19 @@ def converts(name, folder):
           f"{s['wall_seconds']:.1f} s", flush=True)
 
 
-def instructions(name, base, folder, options):
+def run(name, out, settled, *options, **how):
+    """A run to its end, from the beginning or from a settled state."""
+    if settled:
+        shutil.copytree(settled, out)
+    lab.run(name, out, *options, resume=settled is not None, **how)
+
+
+def instructions(name, base, folder, settled, options):
     """Every level that there is an object for; the loader takes lower ones where the processor lacks a level."""
     seen = {}
     for level in ("v1", "v3", "v4"):
         out = folder / level
-        lab.run(name, out, *options, f"--set=run.instructions={level}")
+        run(name, out, settled, *options, f"--set=run.instructions={level}")
         files = {plugin["file"] for plugin in lab.summary(out)["provenance"]["plugins"]}
         taken = {file.split(".")[-2] if file.split(".")[-2] in ("v3", "v4") else "v1" for file in files}
         assert len(taken) == 1, f"{level}: objects of several levels: {taken}"
@@ -48,7 +57,7 @@ def moments_of(base, moments):
     return [(frame, moments.uniform(0, 2 * interval)) for frame in (0, n // 3, 2 * n // 3 - 1)]
 
 
-def stopped(name, base, folder, options, moments):
+def stopped(name, base, folder, settled, options, moments):
     """Ctrl-C while the grains settle and at three arbitrary steps."""
     out = folder / "stopped"
     steps = []
@@ -57,8 +66,11 @@ def stopped(name, base, folder, options, moments):
         lab.wait_for(out / "log.txt", process)
         time.sleep(moments.uniform(0, 0.8) * lab.summary(base)["settle_seconds"])
 
-    lab.on_the_way(name, out, options, signal.SIGINT, settling)
-    settled = lab.summary(out)["settle_steps"]
+    if settled:
+        shutil.copytree(settled, out)
+    else:
+        lab.on_the_way(name, out, options, signal.SIGINT, settling)
+    steps_before = lab.summary(out)["settle_steps"]
     for frame, delay in moments_of(base, moments):
         def later(process):
             lab.wait_for(out / "frames" / f"{frame:06d}.h5", process)
@@ -68,14 +80,16 @@ def stopped(name, base, folder, options, moments):
         assert lab.summary(out)["status"] == "interrupted"
         steps.append(lab.summary(out)["steps"])
     lab.run(name, out, *options, resume=True)
-    lab.same(base, out, f"Ctrl-C after {settled} steps of settling and at the steps {', '.join(map(str, steps))}")
+    lab.same(base, out, f"Ctrl-C after {steps_before} steps of settling and at the steps {', '.join(map(str, steps))}")
 
 
-def killed(name, base, folder, options, moments):
+def killed(name, base, folder, settled, options, moments):
     """kill -9 some time after a checkpoint, thrice in one run."""
     out = folder / "killed"
     checkpoint = out / "checkpoint.h5"
     often = [*options, "--set=checkpoint.every=0.02"]
+    if settled:
+        shutil.copytree(settled, out)
     steps = []
     for frame, delay in moments_of(base, moments):
         before = checkpoint.stat().st_mtime_ns if checkpoint.exists() else 0
@@ -91,37 +105,45 @@ def killed(name, base, folder, options, moments):
     lab.same(base, out, f"kill -9 thrice, resumed from the steps {', '.join(map(str, steps))}")
 
 
-def check(name, options, folder):
+def check(name, options, folder, settled=None):
     moments = lab.seeded()
     base = folder / "base"
-    lab.run(name, base, *options)
+    run(name, base, settled, *options)
     converts(name, base)
-    lab.run(name, folder / "threads", *options, threads=2)
+    run(name, folder / "threads", settled, *options, threads=2)
     assert lab.summary(folder / "threads")["threads"] == 2
     lab.same(base, folder / "threads", "2 threads")
     for batch in (8, 96):
         out = folder / f"batch{batch}"
-        lab.run(name, out, *options, f"--set=run.batch={batch}")
+        run(name, out, settled, *options, f"--set=run.batch={batch}")
         lab.same(base, out, f"run.batch: {batch}")
-    instructions(name, base, folder, options)
+    instructions(name, base, folder, settled, options)
     # the names of glibc 2.33 and later, and those before; unknown ones are passed over
     without = "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable"
-    lab.run(name, folder / "libc", *options, GLIBC_TUNABLES=without)
+    run(name, folder / "libc", settled, *options, GLIBC_TUNABLES=without)
     lab.same(base, folder / "libc", "without AVX2 and FMA in the C library")
     other = os.environ.get("QUERN_OTHER")
     if other:
-        lab.run(name, folder / "other", *options, program=other)
+        run(name, folder / "other", settled, *options, program=other)
         one, two = (lab.summary(p)["provenance"]["compiler"] for p in (base, folder / "other"))
         assert one != two, f"QUERN_OTHER is built by the same {one}"
         lab.same(base, folder / "other", f"{two} and {one}")
     else:
         print("  QUERN_OTHER names no program of another compiler: not compared")
-    stopped(name, base, folder, options, moments)
-    killed(name, base, folder, options, moments)
+    stopped(name, base, folder, settled, options, moments)
+    killed(name, base, folder, settled, options, moments)
 
 
-if __name__ == "__main__":
+def main():
     more = [word for word in sys.argv[1:] if word != "--main"]
     for name, small in lab.SMALL.items():
         with lab.workplace() as place:
-            check(name, ([] if "--main" in sys.argv else small) + more, pathlib.Path(place))
+            folder, settled = pathlib.Path(place), None
+            if "--main" in sys.argv:
+                settled = folder / "settled"
+                lab.run(name, settled, "--until=0s", threads=2)
+            check(name, (more if settled else small + more), folder, settled)
+
+
+if __name__ == "__main__":
+    main()
