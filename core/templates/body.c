@@ -17,18 +17,11 @@ static const quern_param params[] = { QUERN_PARAM(ball, centre, "m", "Centre.", 
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
-static quern_vec centre_of(const ball *p, const quern_pose *pose) {
-	const quern_real *c = p->centre, *turn = pose->turn;
-	return (quern_vec) { pose->position[0] + turn[0] * c[0] + turn[1] * c[1] + turn[2] * c[2],
-		pose->position[1] + turn[3] * c[0] + turn[4] * c[1] + turn[5] * c[2],
-		pose->position[2] + turn[6] * c[0] + turn[7] * c[1] + turn[8] * c[2] };
-}
-
 QUERN_INLINE void kernel(const int dim, const ball *p, const quern_body_batch *b) {
 	const quern_pose *pose = b->pose;
-	const quern_vec centre = centre_of(p, pose), spin = { pose->spin[0], pose->spin[1], pose->spin[2] };
-	const quern_vec origin = { pose->position[0], pose->position[1], pose->position[2] };
-	const quern_vec drift = { pose->velocity[0], pose->velocity[1], pose->velocity[2] };
+	const quern_vec origin = QUERN_VEC_OF(pose->position), drift = QUERN_VEC_OF(pose->velocity),
+					spin = QUERN_VEC_OF(pose->spin);
+	const quern_vec centre = quern_vec_add(origin, quern_vec_turn(pose->turn, QUERN_VEC_OF(p->centre)));
 	const quern_real side = p->hollow ? -1 : 1, size = p->radius;
 	const quern_real *restrict radius = b->radius;
 	quern_real *restrict gap = b->gap;

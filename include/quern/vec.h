@@ -11,6 +11,8 @@ typedef struct quern_vec {
  * functions it calls: clang then compares every pointer with every other, and gives up when there are many. */
 #define QUERN_VEC_AT(columns, i, dim)                                                                        \
 	((quern_vec) { (columns)[0][i], (columns)[1][i], (dim) == 3 ? (columns)[2][i] : 0 })
+/* The vector that an array of three holds. */
+#define QUERN_VEC_OF(array) ((quern_vec) { (array)[0], (array)[1], (array)[2] })
 #define QUERN_VEC_PUT(columns, i, v, dim)                                                                    \
 	do {                                                                                                     \
 		(columns)[0][i] = (v).x;                                                                             \
@@ -37,4 +39,13 @@ QUERN_INLINE quern_real quern_vec_dot(quern_vec a, quern_vec b, int dim) {
 }
 QUERN_INLINE quern_vec quern_vec_cross(quern_vec a, quern_vec b) {
 	return (quern_vec) { a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x };
+}
+/* A row-major matrix times a vector, and its transpose times a vector: with a pose's turn, from body to scene and back. */
+QUERN_INLINE quern_vec quern_vec_turn(const quern_real m[9], quern_vec a) {
+	return (quern_vec) { m[0] * a.x + m[1] * a.y + m[2] * a.z, m[3] * a.x + m[4] * a.y + m[5] * a.z,
+		m[6] * a.x + m[7] * a.y + m[8] * a.z };
+}
+QUERN_INLINE quern_vec quern_vec_turn_back(const quern_real m[9], quern_vec a) {
+	return (quern_vec) { m[0] * a.x + m[3] * a.y + m[6] * a.z, m[1] * a.x + m[4] * a.y + m[7] * a.z,
+		m[2] * a.x + m[5] * a.y + m[8] * a.z };
 }

@@ -1,4 +1,4 @@
-/* body.box - a solid rectangle or cuboid along the axes. docs/theory/bodies.md */
+/* body.box - a solid rectangle or cuboid, along the axes of its pose. docs/theory/bodies.md */
 #include <math.h>
 #include <quern/vec.h>
 
@@ -22,15 +22,17 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 QUERN_INLINE void kernel(const int dim, const box *p, const quern_body_batch *b) {
 	const quern_real *restrict radius = b->radius;
 	quern_real *restrict gap = b->gap;
-	const quern_vec shift = { b->pose->position[0], b->pose->position[1], b->pose->position[2] };
-	const quern_vec surface = { b->pose->velocity[0], b->pose->velocity[1], b->pose->velocity[2] };
-	const quern_vec middle = { 0.5 * (p->lower[0] + p->upper[0]) + shift.x,
-		0.5 * (p->lower[1] + p->upper[1]) + shift.y, 0.5 * (p->lower[2] + p->upper[2]) + shift.z };
+	const quern_pose *pose = b->pose;
+	const quern_vec at = QUERN_VEC_OF(pose->position), drift = QUERN_VEC_OF(pose->velocity),
+					spin = QUERN_VEC_OF(pose->spin);
+	const quern_vec middle = { 0.5 * (p->lower[0] + p->upper[0]), 0.5 * (p->lower[1] + p->upper[1]),
+		0.5 * (p->lower[2] + p->upper[2]) };
 	const quern_vec half = { 0.5 * (p->upper[0] - p->lower[0]), 0.5 * (p->upper[1] - p->lower[1]),
 		0.5 * (p->upper[2] - p->lower[2]) };
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_vec d = quern_vec_sub(QUERN_VEC_AT(b->position, i, dim), middle);
+		const quern_vec x = QUERN_VEC_AT(b->position, i, dim);
+		const quern_vec d = quern_vec_sub(quern_vec_turn_back(pose->turn, quern_vec_sub(x, at)), middle);
 		const quern_real sx = d.x < 0 ? -1 : 1, sy = d.y < 0 ? -1 : 1, sz = d.z < 0 ? -1 : 1;
 		const quern_real qx = sx * d.x - half.x, qy = sy * d.y - half.y,
 						 qz = dim == 3 ? sz * d.z - half.z : -INFINITY;
@@ -41,11 +43,15 @@ QUERN_INLINE void kernel(const int dim, const box *p, const quern_body_batch *b)
 		const bool inside = !(away > 0);
 		const quern_real ix = qx == most ? 1 : 0, iy = qx != most && qy == most ? 1 : 0,
 						 iz = qx != most && qy != most ? 1 : 0;
-		const quern_vec n = { sx * (inside ? ix : ox * one_over), sy * (inside ? iy : oy * one_over),
+		const quern_vec own = { sx * (inside ? ix : ox * one_over), sy * (inside ? iy : oy * one_over),
 			sz * (inside ? iz : oz * one_over) };
-		gap[i] = (inside ? most : away) - radius[i];
+		const quern_real distance = inside ? most : away;
+		const quern_vec n = quern_vec_turn(pose->turn, own);
+		const quern_vec arm = quern_vec_sub(quern_vec_axpy(-distance, n, x), at);
+		const quern_vec v = quern_vec_add(drift, quern_vec_cross(spin, arm));
+		gap[i] = distance - radius[i];
 		QUERN_VEC_PUT(b->normal, i, n, dim);
-		QUERN_VEC_PUT(b->velocity, i, surface, dim);
+		QUERN_VEC_PUT(b->velocity, i, v, dim);
 	}
 }
 
@@ -65,7 +71,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "body.box",
-	.brief = "A solid box along the axes.",
+	.brief = "A solid box, along the axes of its pose.",
 	.instance_size = sizeof(box),
 	.params = params,
 	.uses = uses,

@@ -24,16 +24,20 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 }
 
 QUERN_INLINE void kernel(const int dim, const plane *p, const quern_body_batch *b) {
-	const quern_vec n = { p->normal[0], p->normal[1], p->normal[2] };
-	const quern_vec o = { p->point[0] + b->pose->position[0], p->point[1] + b->pose->position[1],
-		p->point[2] + b->pose->position[2] };
-	const quern_vec v = { b->pose->velocity[0], b->pose->velocity[1], b->pose->velocity[2] };
+	const quern_pose *pose = b->pose;
+	const quern_vec at = QUERN_VEC_OF(pose->position), drift = QUERN_VEC_OF(pose->velocity),
+					spin = QUERN_VEC_OF(pose->spin);
+	const quern_vec n = quern_vec_turn(pose->turn, QUERN_VEC_OF(p->normal));
+	const quern_vec o = quern_vec_add(quern_vec_turn(pose->turn, QUERN_VEC_OF(p->point)), at);
 	const quern_real *restrict radius = b->radius;
 	quern_real *restrict gap = b->gap;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_vec x = QUERN_VEC_AT(b->position, i, dim);
-		gap[i] = quern_vec_dot(quern_vec_sub(x, o), n, dim) - radius[i];
+		const quern_real distance = quern_vec_dot(quern_vec_sub(x, o), n, dim);
+		const quern_vec arm = quern_vec_sub(quern_vec_axpy(-distance, n, x), at);
+		const quern_vec v = quern_vec_add(drift, quern_vec_cross(spin, arm));
+		gap[i] = distance - radius[i];
 		QUERN_VEC_PUT(b->normal, i, n, dim);
 		QUERN_VEC_PUT(b->velocity, i, v, dim);
 	}
