@@ -114,11 +114,13 @@ static void fill_region(filling *f, const dem_fill *item, const quern_bound *pac
 			}
 }
 
-/* True if the grain lies in the domain; a fixed one may lie beyond it, by the domain's own width at most. */
+/* True if the grain lies in the domain. A fixed one may lie beyond it by the domain's own width, any grain along
+ * periodic axes. */
 static bool is_near(const quern_step *s, const dem_place *grain) {
 	bool near = true;
 	for (uint32_t k = 0; k < s->dim; k++) {
-		const quern_real slack = grain->fixed ? s->upper[k] - s->lower[k] : 0, x = grain->position[k];
+		const quern_real slack = grain->fixed || s->periodic[k] ? s->upper[k] - s->lower[k] : 0;
+		const quern_real x = grain->position[k];
 		near = near && x >= s->lower[k] - slack && x <= s->upper[k] + slack;
 	}
 	return near;
