@@ -68,7 +68,8 @@ static quern_status cover_material(const quern_step *s, const cover *c, uint32_t
 	for (uint32_t i = 0; i < n_grains; i++) {
 		bool inside = true; /* fixed grains may lie below the floor */
 		for (uint32_t k = 0; k < s->dim; k++)
-			inside = inside && c->grain.real[k][i] >= s->lower[k] && c->grain.real[k][i] <= s->upper[k];
+			inside = inside && (s->periodic[k] || (c->grain.real[k][i] >= s->lower[k] &&
+													  c->grain.real[k][i] <= s->upper[k]));
 		if (inside) key[m++] = block_key(g, c->grain.real, i, &place);
 	}
 	quern_sort_order(m, key, from, work);

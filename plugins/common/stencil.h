@@ -1,5 +1,6 @@
 /* stencil - particles of one grid block and the nodes they reach, in the block's tile; for points and grains alike */
 #pragma once
+#include <math.h>
 #include <quern/grid.h>
 
 enum { STENCIL = 64 }; /* particles at once */
@@ -11,6 +12,20 @@ typedef struct stencil {
 	int32_t node[STENCIL]; /* of the lowest node, in the tile */
 } stencil;
 
+/* Grains come back through a periodic face when their list is made, not before: here each is taken as the image that lies
+ * in its block, wherever round-off puts the block's faces. */
+QUERN_INLINE void stencil_place(const quern_grid_view *g, uint32_t block, uint32_t axis, const quern_real *x,
+	const int32_t *index, uint32_t n, quern_real *restrict position) {
+	const int32_t edge = (int32_t)g->edge, begin = g->at[block][axis] * edge, rest = g->cells[axis] - begin;
+	const quern_real length = g->periodic[axis] ? g->cells[axis] * g->cell : INFINITY;
+	const quern_real middle = (begin + 0.5 * (rest < edge ? rest : edge)) * g->cell;
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real d = x[index[i]] - g->lower[axis];
+		const quern_real low = d - middle > 0.5 * length ? d - length : d;
+		position[i] = low - middle < -0.5 * length ? low + length : low;
+	}
+}
+
 /* x: whole columns; the particles are entries begin .. begin + n, or those that `index` names. */
 QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shape, uint32_t block,
 	quern_real *const x[3], uint32_t begin, const int32_t *index, uint32_t n, stencil *s) {
@@ -18,8 +33,7 @@ QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shap
 	for (uint32_t a = 0; a < g->dim; a++) {
 		const quern_real lower = g->lower[a];
 		const quern_real *restrict from = x[a] + begin;
-		if (index)
-			for (uint32_t i = 0; i < n; i++) s->position[a][i] = x[a][index[i]] - lower;
+		if (index) stencil_place(g, block, a, x[a], index, n, s->position[a]);
 		else
 			for (uint32_t i = 0; i < n; i++) s->position[a][i] = from[i] - lower;
 		b.position[a] = s->position[a];

@@ -39,6 +39,7 @@ static uint32_t part_of(const update *d, const int32_t cell[3], quern_real *cons
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		quern_real t = (x[k][i] - d->g->lower[k]) / d->g->cell - cell[k];
 		if (d->g->periodic[k] && t < -1) t += d->g->cells[k];
+		if (d->g->periodic[k] && t > 2) t -= d->g->cells[k];
 		part |= (uint32_t)(t >= 0.5) << k;
 	}
 	return part;

@@ -1,8 +1,8 @@
 """The same scene leaves the same bits: for any number of threads, batch, instruction set, C library and compiler, and
 across stops by Ctrl-C and by kill -9.
 
-`bits.py` takes small columns in 2-D and 3-D, with conversions on the way. `bits.py --main [--until=50ms]` takes the
-scenes of configs/ as they are, settles each once, and lets every run go on from there. QUERN_OTHER names a program
+`bits.py` takes small columns in 2-D and 3-D, with conversions on the way. `bits.py --main [SCENE] [--until=50ms]` takes
+the scenes of configs/ as they are, settles each once, and lets every run go on from there. QUERN_OTHER names a program
 built by another compiler.
 """
 import os
@@ -135,14 +135,16 @@ def check(name, options, folder, settled=None):
 
 
 def main():
-    more = [word for word in sys.argv[1:] if word != "--main"]
-    for name, small in lab.SMALL.items():
+    whole = "--main" in sys.argv
+    more = [word for word in sys.argv[1:] if word.startswith("--") and word != "--main"]
+    wanted = [word for word in sys.argv[1:] if not word.startswith("--")]
+    for name in wanted or lab.SMALL:
         with lab.workplace() as place:
             folder, settled = pathlib.Path(place), None
-            if "--main" in sys.argv:
+            if whole:
                 settled = folder / "settled"
                 lab.run(name, settled, "--until=0s", threads=2)
-            check(name, (more if settled else small + more), folder, settled)
+            check(name, more if whole else lab.SMALL[name] + more, folder, settled)
 
 
 if __name__ == "__main__":
