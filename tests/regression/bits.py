@@ -2,8 +2,8 @@
 across stops by Ctrl-C and by kill -9.
 
 `bits.py` takes small columns in 2-D and 3-D, with conversions on the way. `bits.py --main [SCENE] [--until=50ms]` takes
-the scenes of configs/ as they are, settles each once, and lets every run go on from there. QUERN_OTHER names a program
-built by another compiler.
+the scenes of configs/ as they are, settles each once (the states stay in out/bits), and lets every run go on from there.
+QUERN_OTHER names a program built by another compiler.
 """
 import os
 import pathlib
@@ -142,8 +142,9 @@ def main():
         with lab.workplace() as place:
             folder, settled = pathlib.Path(place), None
             if whole:
-                settled = folder / "settled"
-                lab.run(name, settled, "--until=0s", threads=2)
+                settled = lab.SOURCE / "out/bits" / name
+                if not (settled / "checkpoint.h5").exists():
+                    lab.run(name, settled, "--until=0s", threads=2)
             check(name, more if whole else lab.SMALL[name] + more, folder, settled)
 
 
