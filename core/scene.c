@@ -171,6 +171,14 @@ static void read_step(quern_scene *s, const quern_node *root) {
 		quern_report_add(s->report, mark, "scene: time.step is %s, must be above 0 s, or auto", g->step_text);
 }
 
+/* Frames are numbered in six digits and more, and their times are whole multiples. */
+static void check_frames(quern_scene *s, const quern_node *root) {
+	const quern_general *g = &s->general;
+	if (g->every > 0 && g->end / g->every > 1e9)
+		quern_report_add(s->report, quern_param_mark(root, "output.every", root->mark),
+			"scene: output.every: %.3g frames until time.end, more than 1e9", g->end / g->every);
+}
+
 static void check_domain(quern_scene *s, const quern_node *root, bool sound) {
 	quern_general *g = &s->general;
 	for (int k = 0; k < g->dimension; k++)
@@ -206,6 +214,7 @@ static void read_general(quern_scene *s, quern_node *root) {
 	read_periodic(s, quern_node_find(root, "domain"));
 	read_fields(s, quern_node_find(root, "output"));
 	read_step(s, root);
+	check_frames(s, root);
 	check_domain(s, root, dimension == 2 || dimension == 3);
 	quern_loader_limit(s->loader, (const int[]) { 4, 1, 3, 4 }[s->general.instructions]);
 }
