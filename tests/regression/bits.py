@@ -62,9 +62,9 @@ def stopped(name, base, folder, settled, options, moments):
     out = folder / "stopped"
     steps = []
 
-    def settling(process):
+    def settling(process, share):
         lab.wait_for(out / "log.txt", process)
-        time.sleep(moments.uniform(0, 0.8) * lab.summary(base)["settle_seconds"])
+        time.sleep(share * moments.uniform(0, 0.8) * lab.summary(base)["settle_seconds"])
 
     if settled:
         shutil.copytree(settled, out)
@@ -72,9 +72,9 @@ def stopped(name, base, folder, settled, options, moments):
         lab.on_the_way(name, out, options, signal.SIGINT, settling)
     steps_before = lab.summary(out)["settle_steps"]
     for frame, delay in moments_of(base, moments):
-        def later(process):
+        def later(process, share):
             lab.wait_for(out / "frames" / f"{frame:06d}.h5", process)
-            time.sleep(delay)
+            time.sleep(share * delay)
 
         lab.on_the_way(name, out, options, signal.SIGINT, later)
         assert lab.summary(out)["status"] == "interrupted"
@@ -94,10 +94,10 @@ def killed(name, base, folder, settled, options, moments):
     for frame, delay in moments_of(base, moments):
         before = checkpoint.stat().st_mtime_ns if checkpoint.exists() else 0
 
-        def later(process):
+        def later(process, share):
             lab.wait_for(out / "frames" / f"{frame:06d}.h5", process)
             lab.wait_for(checkpoint, process, newer=before)
-            time.sleep(delay)
+            time.sleep(share * delay)
 
         lab.on_the_way(name, out, often, signal.SIGKILL, later)
         steps.append(int(lab.whole(checkpoint)["@step"]))

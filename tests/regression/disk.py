@@ -3,6 +3,7 @@
 On a small file system of its own where one may be mounted (as root on Linux); with a limit on the size of a file
 everywhere.
 """
+import os
 import pathlib
 import resource
 import signal
@@ -37,7 +38,7 @@ def refused(folder, reason, every=0.02, **options):
 
 def begin(folder):
     """A run that was stopped after some frames."""
-    def wait(process):
+    def wait(process, _):
         lab.wait_for(folder / "frames/000002.h5", process)
 
     lab.on_the_way("column", folder, OPTIONS, signal.SIGINT, wait)
@@ -86,12 +87,14 @@ def with_limit(place, base):
     """A limit on the size of a file, below that of the checkpoint, of a frame, of a page."""
     sizes = {"checkpoint.h5": (base / "checkpoint.h5").stat().st_size,
              "frames": max(frame.stat().st_size for frame in lab.frames(base))}
+    # a thread sanitizer writes a file of its own where TMPDIR says, before all else; without a place it does not
+    nowhere = {**os.environ, "TMPDIR": "/nowhere"}
     for name, limit in (("checkpoint.h5", (sizes["checkpoint.h5"] + sizes["frames"]) // 2),
                         ("frames", sizes["frames"] * 3 // 4), ("scene.yaml", 1024)):
         out = place / "limit"
         begin(out)
         file = refused(out, "File too large", 0.02 if name == "checkpoint.h5" else 0,
-                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+                       env=nowhere, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
         assert file.startswith(name), f"with {limit} bytes {file} is refused, not {name}"
         look(out)
         lab.run("column", out, *OPTIONS, resume=True)

@@ -104,16 +104,16 @@ def stop(process, number=signal.SIGKILL):
 
 
 def on_the_way(name, folder, options, number, wait, threads=1):
-    """Starts or resumes a run and stops it with a signal once wait(process) is over. A run that has ended by then is
-    put back and tried again."""
+    """Starts or resumes a run and stops it with a signal once wait(process, share) is over. A run that has ended by then
+    is put back and tried again with a smaller share of the waiting."""
     aside, begun = folder.with_name(folder.name + ".before"), folder / "scene.yaml"
     if folder.exists():
         shutil.copytree(folder, aside)
-    for _ in range(20):
+    for attempt in range(20):
         before = begun.stat().st_mtime_ns if begun.exists() else 0
         process = start(name, folder, *options, threads=threads, resume=aside.exists())
         wait_for(begun, process, newer=before)  # from here on Ctrl-C is waited for
-        wait(process)
+        wait(process, 0.7 ** attempt)
         status = stop(process, number)
         if status == (130 if number == signal.SIGINT else -number):
             shutil.rmtree(aside, ignore_errors=True)
