@@ -3,7 +3,7 @@
  *
  * What is kept is small where strains are, J - 1 and dev b of the isochoric strain b, so that the yield stress is met to
  * round-off at any pressure; b = dev b + t I follows from det b = 1. */
-#include "../mpm_hypo/rotation.h"
+#include "../common/rotation.h"
 #include <quern/math.h>
 
 typedef struct {

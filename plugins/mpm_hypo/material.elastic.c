@@ -1,6 +1,6 @@
 /* material.elastic - linear hypoelasticity: it carries tension, and nothing yields. docs/theory/materials.md, section 2.
  * Start here to write a material of your own. */
-#include "rotation.h"
+#include "../common/rotation.h"
 #include <quern/math.h>
 
 typedef struct {

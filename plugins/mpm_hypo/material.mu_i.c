@@ -1,6 +1,6 @@
 /* material.mu_i - hypoelastic up to a yield stress that grows with the inertial number, no tension, and no stress below
  * the critical density. docs/theory/materials.md, section 3 */
-#include "rotation.h"
+#include "../common/rotation.h"
 #include <quern/math.h>
 
 typedef struct {
