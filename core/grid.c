@@ -62,7 +62,7 @@ quern_status quern_grid_init(quern_grid *g, uint32_t dim, double cell, const dou
 		g->blocks[k] = 1;
 		if (k >= dim) continue;
 		const double cells = (upper[k] - lower[k]) / cell;
-		if (!(cells < 0x1p30)) return QUERN_E_PARAM;
+		if (!(cells <= 0x1p22)) return QUERN_E_PARAM;
 		v->cells[k] = (int32_t)lround(cells);
 		if (v->cells[k] < 1) v->cells[k] = 1;
 		v->periodic[k] = periodic[k];
@@ -71,7 +71,7 @@ quern_status quern_grid_init(quern_grid *g, uint32_t dim, double cell, const dou
 		const quern_status status = colour_axis(g, (int)k);
 		if (status != QUERN_OK) return status;
 	}
-	return QUERN_OK;
+	return (double)v->cells[0] * v->cells[1] * v->cells[2] < 0x1p31 ? QUERN_OK : QUERN_E_PARAM;
 }
 
 static void clear(quern_grid *g) {

@@ -14,7 +14,8 @@ typedef struct quern_grid {
 	uint32_t n_slots;
 } quern_grid;
 
-/* Domain and cell size; QUERN_E_PARAM if the grid would have more than 2^30 cells along an axis. */
+/* Domain and cell size; QUERN_E_PARAM if the grid would have more than 2^22 cells along an axis, or 2^31 in all:
+ * blocks have 20 bits along an axis, and cells are numbered. */
 quern_status quern_grid_init(quern_grid *, uint32_t dim, double cell, const double lower[3],
 	const double upper[3], const bool periodic[3]);
 void quern_grid_finish(quern_grid *);

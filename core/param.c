@@ -20,38 +20,32 @@ static bool is_prefix(const char *prefix, const char *name) {
 	return !strncmp(prefix, name, n) && name[n] == '.';
 }
 
-static const quern_entry *walk(const quern_node *map, const char *name) {
-	char part[64];
-	for (;;) {
-		const size_t n = strcspn(name, ".");
-		snprintf(part, sizeof part, "%.*s", (int)n, name);
-		const quern_entry *entry = quern_node_entry(map, part);
-		if (!entry || quern_node_is_null(entry->value)) return NULL;
-		if (!name[n]) return entry;
-		map = entry->value;
-		name += n + 1;
-	}
-}
-
 /* One part of a path: a key of a map, or the number of a list's item. */
 static const quern_entry *step_into(const quern_node *node, const char *part) {
-	if (!node || node->kind != QUERN_NODE_LIST) return quern_node_entry(node, part);
+	if (node->kind != QUERN_NODE_LIST) return quern_node_entry(node, part);
 	char *end;
 	const unsigned long k = strtoul(part, &end, 10);
 	return *part && !*end && k < node->n ? &node->entries[k] : NULL;
 }
 
-quern_mark quern_param_mark(const quern_node *map, const char *name, quern_mark fallback) {
+/* The entry of a dotted name, or NULL; `mark` (NULL: not wanted) becomes that of the last part that is there. */
+static const quern_entry *walk(const quern_node *node, const char *name, quern_mark *mark) {
 	char part[64];
-	while (name && map) {
+	while (node) {
 		const size_t n = strcspn(name, ".");
 		snprintf(part, sizeof part, "%.*s", (int)n, name);
-		const quern_entry *entry = step_into(map, part);
-		if (!entry || quern_node_is_null(entry->value)) break;
-		fallback = entry->value->mark;
-		map = entry->value;
-		name = name[n] ? name + n + 1 : NULL;
+		const quern_entry *entry = step_into(node, part);
+		if (!entry || quern_node_is_null(entry->value)) return NULL;
+		if (mark) *mark = entry->value->mark;
+		if (!name[n]) return entry;
+		node = entry->value;
+		name += n + 1;
 	}
+	return NULL;
+}
+
+quern_mark quern_param_mark(const quern_node *map, const char *name, quern_mark fallback) {
+	if (name) walk(map, name, &fallback);
 	return fallback;
 }
 
@@ -383,7 +377,7 @@ void quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 	}
 	for (const quern_param *row = rows; row && row->name; row++) {
 		void *member = (char *)instance + row->offset;
-		const quern_entry *entry = walk(map, row->name);
+		const quern_entry *entry = walk(map, row->name, NULL);
 		const quern_node *node = entry ? entry->value : NULL;
 		bool opens = false; /* "boundary" beside "boundary.frictional": a map is for the others */
 		for (const quern_param *other = rows; other->name; other++)

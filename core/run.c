@@ -10,7 +10,7 @@ quern_status quern_run_stop(quern_run *run, quern_status status, const char *fmt
 	va_list list;
 	va_start(list, fmt);
 	if (run->stage)
-		quern_text_add(&text, "%s, at t = %.6g s (step %lld): ", run->stage, quern_run_time(run),
+		quern_text_add(&text, "%s, at t = %.6g s (step %lld): ", run->stage->name, quern_run_time(run),
 			(long long)run->clock.step);
 	quern_text_addv(&text, fmt, list);
 	va_end(list);
@@ -22,7 +22,7 @@ quern_status quern_run_stop(quern_run *run, quern_status status, const char *fmt
 
 quern_status quern_run_refuse(quern_run *run, const char *param, const char *fmt, ...) {
 	if (run->status != QUERN_OK) return QUERN_E_PARAM;
-	const quern_section *section = run->stage ? run->section : NULL;
+	const quern_section *section = run->stage ? run->stage->section : NULL;
 	quern_text text = { 0 };
 	va_list list;
 	if (section) quern_text_add(&text, "%s: ", section->name);
@@ -89,7 +89,9 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 				 QUERN_OK)
 			quern_report_add(scene->report,
 				quern_param_mark(scene->tree->root, "domain.upper", (quern_mark) { 0 }),
-				"the domain has more than 2^30 cells along an axis: make it smaller or the cells larger");
+				"the domain has more than 2^22 cells along an axis, or 2^31 in all: make it smaller or the "
+				"cells "
+				"larger");
 	}
 	const int total = quern_store_set(&run->plan->store, "total");
 	bool reserved = quern_store_fill(&run->plan->store, total, 1) == QUERN_OK;
@@ -213,9 +215,8 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 	const quern_general *g = &run->scene->general;
 	if (g->force || !(g->step > hard)) return QUERN_OK;
 	return quern_run_refuse(run, "time.step",
-		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it all "
-		"the "
-		"same)",
+		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it "
+		"all the same)",
 		g->step, hard, hard_reason, recommended);
 }
 
@@ -268,8 +269,7 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 	quern_step step = quern_run_record(run, stage->section);
 	step.dt = dt;
 	step.use = stage->column;
-	run->stage = stage->name;
-	run->section = stage->section;
+	run->stage = stage;
 	quern_status status = stage->stage->run(stage->section->solver->self, &step);
 	arena_reset(&run->arena);
 	if (status == QUERN_OK) status = run->status;

@@ -33,10 +33,9 @@ struct quern_run {
 	quern_log *log;
 	char *folder; /* NULL: nothing is written */
 	struct quern_sidecars *sidecars;
-	const char *stage; /* the one that runs, for messages */
+	const quern_plan_stage *stage; /* the one that runs, for messages; NULL between stages */
 	quern_status status;
 	char *message;                   /* why the run stopped */
-	const quern_section *section;    /* whose stage runs */
 	quern_mark fault;                /* where in the scene the reason stands; no file: nowhere */
 	double wall_before, settle_wall; /* s on the clock spent before a resume; in settling */
 	double mass_initial;

@@ -197,7 +197,7 @@ typedef struct quern_grid_view {
 	uint32_t dim, edge, n_blocks;
 	uint32_t span;      /* nodes per axis of a tile: edge + 4, from node edge * at[b] - 1 on */
 	uint32_t tile_size; /* span^dim */
-	int32_t cells[3];   /* of the domain, per axis */
+	int32_t cells[3];   /* of the domain, per axis: at most 2^22, and fewer than 2^31 in all */
 	bool periodic[3];
 	const int32_t (*at)[3]; /* sorted */
 	const uint8_t *asked;   /* 1: by the last cover(); 0: a neighbour of such a block */

@@ -42,7 +42,7 @@ static uint64_t block_key(const quern_grid_view *g, quern_real *const x[3], uint
 	return key;
 }
 
-/* Distinct blocks of sorted keys; 20 bits per axis hold 8 million cells. */
+/* Distinct blocks of sorted keys; 20 bits hold every block along an axis. */
 static uint32_t list_blocks(const quern_grid_view *g, uint32_t n, const uint64_t *key, int32_t (*block)[3]) {
 	uint32_t m = 0;
 	for (uint32_t i = 0; i < n; i++) {

@@ -126,7 +126,7 @@ static bool is_near(const quern_step *s, const dem_place *grain) {
 	return near;
 }
 
-/* A grain that somebody has placed, number k; `param` is where: no law has a direction for grains whose centres coincide. */
+/* A grain that somebody has placed, number k of `param`: no law has a direction for grains whose centres coincide. */
 static quern_status add_given(filling *f, const dem_place *given, const char *param, uint32_t k) {
 	const quern_step *s = f->step;
 	dem_place grain = *given;
@@ -137,21 +137,17 @@ static quern_status add_given(filling *f, const dem_place *given, const char *pa
 	if (!is_near(s, &grain)) wrong = "lies outside of the domain";
 	else if (!grain.fixed && !quern_placer_free(&f->placer, &centre))
 		wrong = "has its centre within another grain";
-	if (wrong)
-		return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "grain %u at (%g, %g, %g) m %s", k,
-			centre.x[0], centre.x[1], centre.x[2], wrong);
-	add(f, &grain);
-	return QUERN_OK;
+	if (!wrong) return add(f, &grain), QUERN_OK;
+	char item[40];
+	snprintf(item, sizeof item, "%s.%u", param, k);
+	return s->host->stop(s->run, QUERN_E_PARAM, item, -1, "the grain at (%g, %g, %g) m %s", centre.x[0],
+		centre.x[1], centre.x[2], wrong);
 }
 
-static quern_status add_all(filling *f, const dem_place *grain, uint32_t n, const char *param, bool of_list) {
+static quern_status add_all(filling *f, const dem_place *grain, uint32_t n, const char *param) {
 	quern_status status = QUERN_OK;
 	f->placer.n_bodies = 0; /* a grain may start behind a wall that it shall be pushed out of */
-	for (uint32_t i = 0; i < n && status == QUERN_OK; i++) {
-		char item[40];
-		snprintf(item, sizeof item, "%s.%u", param, i);
-		status = add_given(f, &grain[i], of_list ? item : param, i);
-	}
+	for (uint32_t i = 0; i < n && status == QUERN_OK; i++) status = add_given(f, &grain[i], param, i);
 	return status;
 }
 
@@ -228,8 +224,8 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
 	const dem *d = f->d;
 	const dem_fill *item = d->fill.items;
-	quern_status status = add_all(f, d->place.items, d->place.n, "place", true);
-	if (status == QUERN_OK) status = add_all(f, table->grain, table->n, "file", false);
+	quern_status status = add_all(f, d->place.items, d->place.n, "place");
+	if (status == QUERN_OK) status = add_all(f, table->grain, table->n, "file");
 	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = check_fill(d, s, i);
 	if (status != QUERN_OK) return status;
 	for (int fixed = 1; fixed >= 0; fixed--) /* floors first: what falls must find them */

@@ -93,9 +93,6 @@ quern_status quern_hybrid_sort(update *d) {
 	const quern_status status = quern_cover_sort(s, &c);
 	if (status != QUERN_OK) return status;
 	d->g = s->host->grid(s->run);
-	if ((double)d->g->cells[0] * d->g->cells[1] * d->g->cells[2] > INT32_MAX)
-		return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
-			"the domain has more than 2^31 cells: a hybrid cannot number them");
 	d->u = s->use;
 	d->n_cells = d->g->n_blocks * N;
 	d->n_grains = s->host->set(s->run, "grain").n;

@@ -106,12 +106,21 @@ static void colours(void **state) {
 }
 
 static void too_many_cells(void **state) {
-	static const double upper[3] = { 1, 1, 0 };
+	static const struct {
+		uint32_t dim;
+		double upper[3];
+		quern_status status;
+	} domains[] = { { 2, { 1e12, 1, 0 }, QUERN_E_PARAM }, { 2, { 4194305, 1, 0 }, QUERN_E_PARAM },
+		{ 2, { 4194304, 1, 0 }, QUERN_OK }, { 2, { 65536, 32768, 0 }, QUERN_E_PARAM },
+		{ 3, { 2000, 2000, 2000 }, QUERN_E_PARAM }, { 3, { 1200, 1200, 1200 }, QUERN_OK } };
 	static const bool around[3] = { false };
-	quern_grid g;
 	(void)state;
-	assert_int_equal(quern_grid_init(&g, 2, 1e-12, lower, upper, around), QUERN_E_PARAM);
-	quern_grid_finish(&g);
+	for (size_t i = 0; i < sizeof domains / sizeof *domains; i++) {
+		quern_grid g;
+		assert_int_equal(
+			quern_grid_init(&g, domains[i].dim, 1, lower, domains[i].upper, around), domains[i].status);
+		quern_grid_finish(&g);
+	}
 }
 
 int main(void) {
