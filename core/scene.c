@@ -45,12 +45,6 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 static const char *const general_also[] = { "domain.periodic", "output.fields", "observe", "bodies", "grains",
 	"continuum", "hybrid", NULL };
 
-uint64_t quern_hash(const void *data, size_t length) {
-	uint64_t hash = 1469598103934665603u;
-	for (size_t i = 0; i < length; i++) hash = (hash ^ ((const unsigned char *)data)[i]) * 1099511628211u;
-	return hash;
-}
-
 quern_reading quern_scene_reading(const quern_scene *s) {
 	return (quern_reading) { s->report, s->units, (uint32_t)s->general.dimension, s->published,
 		s->n_published, s->tree };

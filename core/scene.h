@@ -1,5 +1,6 @@
 /* scene - a scene file read, checked and resolved: every section's solver, every slot's plugins, every default */
 #pragma once
+#include "file.h"
 #include "loader.h"
 #include "param.h"
 
@@ -88,8 +89,6 @@ typedef struct quern_section_name {
 extern const quern_section_name quern_section_names[];
 
 const quern_section *quern_scene_section(const quern_scene *, const char *name);
-/* FNV-1a over the resolved text, without what does not change the result (name, output folder, end) */
-uint64_t quern_hash(const void *data, size_t length);
 /* What rows of this scene are read with. */
 quern_reading quern_scene_reading(const quern_scene *);
 /* The set-up record that every init gets. */

@@ -197,6 +197,18 @@ static void edit(hid_t file, bytes *b) {
 	}
 }
 
+static bool save(hid_t file, char why[256]) {
+	H5Fflush(file, H5F_SCOPE_GLOBAL);
+	const ssize_t n = H5Fget_file_image(file, NULL, 0);
+	char *edited = n > 0 ? malloc(512 + (size_t)n) : NULL;
+	if (!edited || H5Fget_file_image(file, edited + 512, (size_t)n) != n) abort();
+	H5Fclose(file);
+	quern_h5_seal(edited, 512 + (size_t)n);
+	const bool good = quern_save_bytes(path, edited, 512 + (size_t)n, why);
+	free(edited);
+	return good;
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 	char why[256];
 	int64_t rows = 0;
@@ -204,9 +216,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 	bool good;
 	if (size >= 5 && !memcmp(data, "quern", 5)) good = quern_save_bytes(path, data, size, why);
 	else {
-		quern_h5 h = { .file = open_image(), .user_block = 512 };
-		edit(h.file, &b);
-		good = quern_h5_save(&h, path, why);
+		const hid_t file = open_image();
+		edit(file, &b);
+		good = save(file, why);
 	}
 	if (!good) abort();
 	quern_run *run = open_run();
