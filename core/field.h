@@ -47,6 +47,9 @@ int quern_store_set(const quern_store *, const char *name);   /* -1: none */
 int quern_store_field(const quern_store *, const char *name); /* -1: none */
 quern_column quern_field_column(const quern_store *, const quern_field *, uint8_t copy);
 
+/* All that follow return QUERN_E_MEMORY if memory is gone, and leave a store that can be looked at and saved: what it
+ * was, but that entries whose target is gone may still be there with QUERN_NO_TARGET. */
+
 /* A set of n entries at their initial values; ids are numbered on. Old contents are lost. */
 quern_status quern_store_fill(quern_store *, int set, uint32_t n);
 /* New entry i is old entry from[i], or fresh if from[i] < 0; block may be NULL. See quern_host.remap. */

@@ -146,6 +146,8 @@ typedef enum {
 	QUERN_ID          /* 1 int64_t, unique for ever within its set; the host numbers new entries */
 } quern_shape;
 
+#define QUERN_NO_TARGET (-1) /* an INDEX that points at nothing */
+
 enum {
 	QUERN_OPTIONAL = 1, /* attaches to the field if somebody else needs it; its column is NULL otherwise */
 	QUERN_OTHERS = 2,   /* this READ looks at other entities: if its stage changes the field too, the
@@ -164,7 +166,8 @@ typedef struct quern_use {
 	const char *when;   /* parameter of this plugin: the row counts only if that is not zero */
 	const char *with;   /* another field: the row counts only if that one exists */
 	const char *target; /* INDEX: the set it points into; rewritten when that set is reordered, and
-	                           an entry whose target is gone is dropped */
+	                           an entry whose target is gone is dropped. A field that may hold
+	                           QUERN_NO_TARGET, which is left as it is, has it as `initial` */
 	quern_real initial; /* of a new entry; diagonal of SYMMETRIC and TENSOR */
 	uint8_t access, shape, flags;
 	uint8_t hook; /* which function of the kind touches it (0: the main one) */
@@ -225,7 +228,8 @@ typedef struct quern_host {
 	uint32_t (*workers)(quern_run *);
 	/* [stage, or this worker's own in a parallel body] 64-byte aligned, kept until asked for more. */
 	void *(*scratch)(quern_run *, uint32_t worker, size_t bytes);
-	/* [stage] Zeroed memory until the stage returns. NULL if there is none: return QUERN_E_MEMORY. */
+	/* [stage] Zeroed, 64-byte aligned memory until the stage returns, also of 0 bytes. NULL only if memory is
+	 * gone: return QUERN_E_MEMORY. */
 	void *(*memory)(quern_run *, size_t bytes);
 	/* [stage] Sum in a fixed binary tree over the index: the same for any number of threads. */
 	quern_real (*sum)(quern_run *, size_t n, const quern_real *);
