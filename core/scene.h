@@ -26,7 +26,7 @@ typedef struct quern_slot_use {
 	const quern_slot *slot;
 	char *path;             /* "grains.contact" */
 	quern_filling *filling; /* same_as: those of that slot */
-	size_t n;
+	size_t n, capacity;
 	bool borrowed;
 } quern_slot_use;
 

@@ -5,17 +5,22 @@
 
 /* ---- instances ---- */
 
+/* NULL after one sentence if there is no memory for what the plugin keeps: how much that is, is its own to say. */
 static quern_instance *instance_create(
 	quern_scene *s, const quern_plugin_file *file, const quern_node *map, quern_mark mark, const char *path) {
+	const size_t size = ((size_t)file->plugin.instance_size + 127u) & ~(size_t)63;
+	void *self = aligned_alloc(64, size);
+	if (!self) {
+		quern_report_add(s->report, mark, "%s: out of memory: it wants %u bytes for itself", file->plugin.id,
+			file->plugin.instance_size);
+		return NULL;
+	}
 	quern_instance *it = quern_take(1, sizeof *it);
-	const size_t size = (file->plugin.instance_size + 127u) & ~(size_t)63;
 	it->file = file;
 	it->map = map;
 	it->mark = mark;
 	it->path = quern_copy(path);
-	it->self = aligned_alloc(64, size);
-	if (!it->self) abort();
-	memset(it->self, 0, size);
+	it->self = memset(self, 0, size);
 	s->instances = quern_grow(s->instances, s->n_instances, &s->instances_capacity, sizeof(it));
 	s->instances[s->n_instances++] = it;
 	return it;
@@ -146,11 +151,11 @@ static void read_entry(quern_scene *s, const quern_slot *slot, quern_filling *f)
 static void add_filling(quern_scene *s, quern_slot_use *use, const choice *c, quern_kind kind) {
 	if (!c->name) return;
 	const quern_plugin_file *file = quern_loader_find(s->loader, kind, c->name, s->report, c->mark);
-	if (!file) return;
-	use->filling = realloc(use->filling, (use->n + 1) * sizeof(quern_filling));
-	if (!use->filling) abort();
+	quern_instance *it = file ? instance_create(s, file, c->map, c->mark, use->path) : NULL;
+	if (!it) return;
+	use->filling = quern_grow(use->filling, use->n, &use->capacity, sizeof(quern_filling));
 	quern_filling *f = &use->filling[use->n++];
-	*f = (quern_filling) { .instance = instance_create(s, file, c->map, c->mark, use->path) };
+	*f = (quern_filling) { .instance = it };
 	const size_t before = quern_report_errors(s->report);
 	read_entry(s, use->slot, f);
 	instance_init(s, f->instance, before);
@@ -250,6 +255,7 @@ static void fill_variants(quern_scene *s, quern_slot_use *use) {
 				}
 			if (!any) continue;
 			quern_instance *it = instance_create(s, base->file, keep->root, given->mark, use->path);
+			if (!it) continue;
 			const size_t before = quern_report_errors(s->report);
 			instance_read(s, it, NULL);
 			instance_init(s, it, before);
@@ -320,12 +326,13 @@ void quern_section_read(quern_scene *s, const quern_section_name *names, const q
 	const char *name = swap && swap->kind == QUERN_NODE_SCALAR ? swap->text : names->solver;
 	const quern_plugin_file *file =
 		quern_loader_find(s->loader, QUERN_SOLVER, name, s->report, swap ? swap->mark : entry->mark);
-	if (!file) return;
+	quern_instance *solver =
+		file ? instance_create(s, file, map ? node : NULL, entry->mark, names->section) : NULL;
+	if (!solver) return;
 	quern_section *section = &s->sections[s->n_sections++];
 	*section = (quern_section) {
-		.name = names->section, .node = node, .mark = entry->mark, .ops = file->plugin.ops
+		.name = names->section, .node = node, .mark = entry->mark, .ops = file->plugin.ops, .solver = solver
 	};
-	section->solver = instance_create(s, file, map ? node : NULL, entry->mark, names->section);
 	for (const quern_slot *slot = section->ops->slots; slot && slot->name; slot++) section->n_slots++;
 	section->slots = quern_take(section->n_slots, sizeof(quern_slot_use));
 	bool is_list = false; /* the section is itself the list of its one slot */

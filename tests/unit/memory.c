@@ -33,7 +33,11 @@ static bool fails(void) {
 void *__wrap_malloc(size_t n) { return fails() ? NULL : __real_malloc(n); }
 void *__wrap_calloc(size_t n, size_t m) { return fails() ? NULL : __real_calloc(n, m); }
 void *__wrap_realloc(void *p, size_t n) { return fails() ? NULL : __real_realloc(p, n); }
-void *__wrap_aligned_alloc(size_t a, size_t n) { return fails() ? NULL : __real_aligned_alloc(a, n); }
+static long aligned_left = -1; /* the same of aligned memory, of which one alone fails */
+void *__wrap_aligned_alloc(size_t a, size_t n) {
+	if (aligned_left >= 0 && aligned_left-- == 0) return NULL;
+	return fails() ? NULL : __real_aligned_alloc(a, n);
+}
 
 enum { GRAIN, CONTACT, NODE, SETS };
 enum { ID, POSITION, FIRST, SECOND, PARTNER, SLIP, FIELDS };
@@ -188,8 +192,33 @@ static void memory_of_nothing(void **state) {
 	free(run.arena.extra);
 }
 
+/* How large a plugin's instance is, the plugin says: where there is no room for it, that is a fault with a place. */
+static void no_room_for_a_plugin(void **state) {
+	static const char text[] =
+		"quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [1, 1]}\ntime: {end: "
+		"1}\n"
+		"bodies: [{plane: {point: [0, 0], normal: [0, 1], contact: {friction: 0}}}]\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.01}}, contact: {linear: {stiffness: 1e5}},\n"
+		"  place: [{position: [0.5, 0.5]}]}\nobserve: [mass]\n";
+	const char *folder = getenv("QUERN_PLUGINS_DIR");
+	(void)state;
+	if (folder) setenv("QUERN_PLUGIN_PATH", folder, 1);
+	long k = 0;
+	for (size_t errors = 1; errors; k++) {
+		aligned_left = k;
+		quern_scene *scene = quern_scene_parse("scene.yaml", text, sizeof text - 1, &quern_host_table);
+		const bool all = aligned_left >= 0;
+		aligned_left = -1;
+		errors = quern_report_errors(scene->report);
+		assert_true((errors > 0) == !all);
+		quern_scene_destroy(scene);
+	}
+	assert_true(k > 6);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(loses_a_grain), cmocka_unit_test(gains_grains),
-		cmocka_unit_test(grows_rows), cmocka_unit_test(memory_of_nothing) };
+		cmocka_unit_test(grows_rows), cmocka_unit_test(memory_of_nothing),
+		cmocka_unit_test(no_room_for_a_plugin) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
