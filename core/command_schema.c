@@ -136,7 +136,7 @@ static json_t *scene_schema(const context *c) {
 	put(properties, "output.fields", json_pack("{s:s, s:{s:s}}", "type", "array", "items", "type", "string"));
 	for (const quern_section_name *n = quern_section_names; n->section; n++)
 		json_object_set_new(properties, n->section, section_schema(c, n->solver));
-	json_object_set_new(properties, "observe", slot_schema(c, QUERN_OBSERVER, true, NULL));
+	json_object_set_new(properties, "observe", slot_schema(c, QUERN_OBSERVER, true, &quern_observe_slot));
 	const char *const needed[] = { "quern", "dimension", "gravity", "domain", "time" };
 	for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
 		json_array_append_new(required, json_string(needed[i]));

@@ -359,3 +359,20 @@ quern_account quern_run_account(quern_run *run) {
 	}
 	return account;
 }
+
+quern_status quern_run_check_account(quern_run *run) {
+	const quern_account a = quern_run_account(run);
+	const struct {
+		const char *name;
+		double value;
+	} sums[] = { { "mass", a.mass + a.discrete + a.owed },
+		{ "momentum", a.momentum[0] + a.momentum[1] + a.momentum[2] }, { "kinetic energy", a.kinetic },
+		{ "potential energy", a.potential }, { "elastic energy", a.elastic },
+		{ "defect of the invariants", a.defect } };
+	for (size_t k = 0; k < sizeof sums / sizeof *sums; k++)
+		if (!isfinite(sums[k].value))
+			return quern_run_stop(run, QUERN_E_NUMERIC,
+				"the %s of the run is no finite number at t = %.6g s (step %lld)", sums[k].name,
+				quern_run_time(run), (long long)run->clock.step);
+	return QUERN_OK;
+}

@@ -65,6 +65,8 @@ int64_t quern_run_frames(const quern_run *); /* index of the last frame */
 /* The step record for code that is called between stages. */
 quern_step quern_run_record(quern_run *, const quern_section *);
 quern_account quern_run_account(quern_run *);
+/* QUERN_E_NUMERIC with run->message if a sum over all that is carried is not finite. */
+quern_status quern_run_check_account(quern_run *);
 /* The smallest recommended long step, the smallest hard limit and what sets the first. */
 double quern_run_limit(quern_run *, double *hard, char reason[200], char hard_reason[200]);
 uint32_t quern_run_substeps(const quern_run *);

@@ -248,6 +248,59 @@ static bool lacks_a_side(quern_scene *s, const quern_section_name *name, const q
 	return missing != NULL;
 }
 
+/* ---- observers ---- */
+
+static const quern_param observe_rows[] = {
+	QUERN_PARAM(quern_observe_item, label, NULL,
+		"What its columns in series.csv and its numbers in summary.json are called; default: the plugin's "
+		"name, from the second one on with a number.",
+		.flags = QUERN_MAYBE),
+	QUERN_END_PARAMS
+};
+const quern_slot quern_observe_slot = { .name = "observe",
+	.kind = QUERN_OBSERVER,
+	.list = 1,
+	.rows = observe_rows,
+	.item_size = sizeof(quern_observe_item) };
+
+static quern_observe_item *observe_item(const quern_scene *s, size_t e) { return s->observe.filling[e].item; }
+
+/* Which of the first n observers has that label; n if none has. */
+static size_t labelled(const quern_scene *s, size_t n, const char *label) {
+	for (size_t e = 0; e < n; e++)
+		if (observe_item(s, e)->label && !strcmp(observe_item(s, e)->label, label)) return e;
+	return n;
+}
+
+static void check_label(quern_scene *s, size_t e) {
+	const quern_instance *it = s->observe.filling[e].instance;
+	const char *label = observe_item(s, e)->label;
+	const quern_mark mark = quern_param_mark(it->map, "label", it->mark);
+	if (!quern_is_name(label))
+		quern_report_add(s->report, mark,
+			"observe: the label '%s' is no name: it must be letters, digits and '_', beginning with a letter",
+			label);
+	else if (labelled(s, e, label) < e)
+		quern_report_add(
+			s->report, mark, "observe: two observers are labelled '%s': give each its own", label);
+}
+
+static void label_observers(quern_scene *s) {
+	const size_t n = s->observe.n;
+	for (size_t e = 0; e < n; e++)
+		if (observe_item(s, e)->label) check_label(s, e);
+	for (size_t e = 0; e < n; e++) {
+		const char *name = strchr(s->observe.filling[e].instance->file->plugin.id, '.') + 1;
+		char *label = quern_copy(name);
+		for (int k = 2; !observe_item(s, e)->label && labelled(s, n, label) < n; k++) {
+			free(label);
+			label = quern_format("%s_%d", name, k);
+		}
+		if (!observe_item(s, e)->label) observe_item(s, e)->label = quern_tree_keep(s->tree, label);
+		free(label);
+	}
+}
+
 static void resolve(quern_scene *s) {
 	quern_node *root = s->tree->root;
 	if (!root) return;
@@ -267,10 +320,10 @@ static void resolve(quern_scene *s) {
 		failed = failed || s->n_sections == before;
 	}
 	if (!failed) check_sections(s, root->mark);
-	static const quern_slot observe = { .name = "observe", .kind = QUERN_OBSERVER, .list = 1 };
-	s->observe.slot = &observe;
+	s->observe.slot = &quern_observe_slot;
 	s->observe.path = quern_copy("observe");
 	quern_slot_fill(s, &s->observe, quern_node_find(root, "observe"), root->mark);
+	label_observers(s);
 }
 
 static quern_scene *create(const quern_host *host) {

@@ -40,6 +40,12 @@ typedef struct quern_section {
 	size_t n_slots;
 } quern_section;
 
+/* What every observer takes besides its own keys. */
+typedef struct quern_observe_item {
+	const char *label; /* never NULL once the scene is read, and no other observer's */
+} quern_observe_item;
+extern const quern_slot quern_observe_slot;
+
 /* What the core itself takes from a scene. */
 typedef struct quern_general {
 	int32_t version, dimension, seed, model, batch, instructions;

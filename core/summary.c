@@ -46,32 +46,39 @@ static json_t *plugins(const quern_run *run) {
 	return list;
 }
 
-static void observers(json_t *root, const quern_series *s) {
-	for (size_t c = 0; c < s->n; c++) {
-		const quern_observed *o = &s->column[c];
-		const char *dot = strchr(o->name, '.');
-		if (!dot) continue;
-		char *owner = quern_copy(o->name);
-		owner[dot - o->name] = 0;
-		json_t *map = json_object_get(root, owner);
-		if (!map) json_object_set_new(root, owner, map = json_object());
-		json_t *one = json_object();
-		json_object_set_new(one, "unit", json_string(o->unit));
-		json_object_set_new(one, "first", number(o->first));
-		json_object_set_new(one, "last", number(o->last));
-		json_object_set_new(one, "mean", number(o->n ? o->sum / (double)o->n : NAN));
-		json_object_set_new(one, "min", number(o->least));
-		json_object_set_new(one, "max", number(o->most));
-		json_object_set_new(map, dot + 1, one);
-		free(owner);
-	}
+static json_t *observed(const quern_observed *o) {
+	json_t *one = json_object();
+	json_object_set_new(one, "unit", json_string(o->unit));
+	json_object_set_new(one, "first", number(o->first));
+	json_object_set_new(one, "last", number(o->last));
+	json_object_set_new(one, "mean", number(o->n ? o->sum / (double)o->n : NAN));
+	json_object_set_new(one, "min", number(o->least));
+	json_object_set_new(one, "max", number(o->most));
+	return one;
 }
 
-static double mean_of(const quern_series *s, const char *name, double otherwise) {
-	for (size_t c = 0; c < s->n; c++)
-		if (!strcmp(s->column[c].name, name) && s->column[c].n)
-			return s->column[c].sum / (double)s->column[c].n;
-	return otherwise;
+/* One object per observer, by label. */
+static json_t *observers(const quern_run *run, const quern_series *s) {
+	json_t *all = json_object();
+	for (size_t e = 0; e < run->scene->observe.n; e++) {
+		json_t *own = json_object();
+		for (size_t c = 0; c < s->n; c++)
+			if (s->column[c].output && s->column[c].observer == e)
+				json_object_set_new(own, s->column[c].output, observed(&s->column[c]));
+		json_object_set_new(all, quern_observer_label(run, e), own);
+	}
+	return all;
+}
+
+/* The grains' share of the mass: the mean of what an observer of it saw, or as it is now. */
+static double discrete_share(const quern_run *run, const quern_series *s, const quern_account *a) {
+	for (size_t c = 0; c < s->n; c++) {
+		const quern_observed *o = &s->column[c];
+		if (o->output && o->n && !strcmp(o->output, "share") &&
+			!strcmp(run->plan->observers[o->observer]->bound->id, "observer.discrete_share"))
+			return o->sum / (double)o->n;
+	}
+	return a->mass > 0 ? a->discrete / a->mass : 0;
 }
 
 static json_t *provenance(const quern_run *run) {
@@ -114,14 +121,14 @@ bool quern_summary_write(
 	json_object_set_new(root, "mass_initial", number(run->mass_initial));
 	json_object_set_new(root, "mass_final", number(a.mass));
 	json_object_set_new(root, "mass_ledger", number(a.owed));
-	json_object_set_new(root, "mass_defect", number((a.mass + a.owed) / run->mass_initial - 1));
+	json_object_set_new(
+		root, "mass_defect", number(run->mass_initial > 0 ? (a.mass + a.owed) / run->mass_initial - 1 : 0));
 	json_object_set_new(root, "invariant_defect", number(a.defect));
 	json_object_set_new(root, "momentum", vector(a.momentum, dim));
 	json_object_set_new(root, "energy", number(a.kinetic + a.potential + a.elastic));
-	json_object_set_new(root, "discrete_share",
-		number(mean_of(series, "discrete_share.share", a.mass > 0 ? a.discrete / a.mass : NAN)));
+	json_object_set_new(root, "discrete_share", number(discrete_share(run, series, &a)));
 	json_object_set_new(root, "peak_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024));
-	observers(root, series);
+	json_object_set_new(root, "observers", observers(run, series));
 	json_object_set_new(root, "provenance", provenance(run));
 	char *text = json_dumps(root, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(17));
 	char *path = quern_format("%s/summary.json", run->folder);

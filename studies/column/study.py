@@ -30,11 +30,11 @@ def run(out, model, seed, threads):
 
 def row(model, seed, s):
     """One run as a row of the table."""
-    ledger = s.get("ledger", {})
+    ledger = s["observers"].get("ledger", {})
     share = f"{s['discrete_share']:.3f}" if model == "hybrid" else ""
     entries = f"{ledger['entries']['mean']:.4f}" if model == "hybrid" else ""
     carried = f"{ledger['carried']['mean']:+.4f}, {max((ledger['carried'][k] for k in ('min', 'max')), key=abs):+.4f}" if model == "hybrid" else ""
-    return (f"| {model} | {seed} | {s['runout']['front']['last']:.4f} | {s['runout']['height']['last']:.4f} | {s['settle_seconds']:.0f} "
+    return (f"| {model} | {seed} | {s['observers']['runout']['front']['last']:.4f} | {s['observers']['runout']['height']['last']:.4f} | {s['settle_seconds']:.0f} "
             f"| {s['wall_seconds'] - s['settle_seconds']:.0f} | {share} | {entries} | {carried} | {s['invariant_defect']:.0e} |")
 
 
@@ -57,7 +57,7 @@ def report(runs, threads):
               "| model | figure | difference | twice its standard error |", "|---|---|---|---|"]
     for model in MODELS[::2]:
         for figure, key in FIGURES:
-            off, error = difference(*([s["runout"][key]["last"] for s in runs[m]] for m in (model, "grains")))
+            off, error = difference(*([s["observers"]["runout"][key]["last"] for s in runs[m]] for m in (model, "grains")))
             lines.append(f"| {model} | {figure} | {100 * off:+.1f} % | {100 * error:.1f} % |")
     return "\n".join(lines) + "\n"
 

@@ -70,9 +70,9 @@ def profile(out):
 
 
 def measure(out, summary):
-    return {"core_seconds": summary["core_seconds"], "front": summary["runout"]["front"]["last"],
-            "height": summary["runout"]["height"]["last"], "share": summary["discrete_share"],
-            "entries": summary["ledger"]["entries"]["mean"], "carried": summary["ledger"]["carried"]["last"],
+    return {"core_seconds": summary["core_seconds"], "front": summary["observers"]["runout"]["front"]["last"],
+            "height": summary["observers"]["runout"]["height"]["last"], "share": summary["discrete_share"],
+            "entries": summary["observers"]["ledger"]["entries"]["mean"], "carried": summary["observers"]["ledger"]["carried"]["last"],
             "defect": summary["invariant_defect"], "profile": profile(out).tolist()}
 
 
