@@ -17,7 +17,7 @@ uint64_t quern_checkpoint_key(const quern_scene *scene) {
 	g->batch = 0;
 	g->instructions = 0;
 	g->compress = false;
-	char *text = quern_scene_resolved(scene);
+	char *text = quern_scene_resolved(scene, NULL);
 	*g = kept;
 	const uint64_t key = quern_hash(text, strlen(text));
 	free(text);

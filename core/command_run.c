@@ -118,7 +118,7 @@ static quern_status open_folder(quern_run *run, bool fresh) {
 	if (!make_folders(frames))
 		status = quern_run_stop(run, QUERN_E_IO, "folder %s cannot be made: %s", frames, strerror(errno));
 	else {
-		char *resolved = quern_scene_resolved(run->scene);
+		char *resolved = quern_scene_resolved(run->scene, NULL);
 		if (fresh) {
 			char *checkpoint = quern_format("%s/checkpoint.h5", run->folder);
 			unlink(checkpoint);

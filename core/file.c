@@ -19,13 +19,14 @@ uint64_t quern_hash(const void *data, size_t length) {
 
 static bool hash_rest(int fd, uint64_t *hash) {
 	unsigned char buffer[65536];
+	uint64_t sum = quern_hash("", 0);
 	ssize_t n;
-	*hash = quern_hash("", 0);
 	while ((n = read(fd, buffer, sizeof buffer)) != 0) {
 		if (n < 0 && errno == EINTR) continue;
 		if (n < 0) return false;
-		*hash = quern_hash_more(*hash, buffer, (size_t)n);
+		sum = quern_hash_more(sum, buffer, (size_t)n);
 	}
+	*hash = sum;
 	return true;
 }
 
@@ -66,10 +67,29 @@ static void flush_folder(const char *path) {
 	free(folder);
 }
 
-bool quern_save_bytes(const char *path, const void *data, size_t size, char why[256]) {
-	char *aside = quern_format("%s.part", path);
-	const int fd = open(aside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-	bool good = fd >= 0 && write_all(fd, data, size) && !fsync(fd);
+/* A device or a pipe gets the bytes itself: a file renamed onto it would take its place. */
+static bool save_in_place(const char *path, const void *data, size_t size) {
+	const int fd = open(path, O_WRONLY);
+	const bool good = fd >= 0 && write_all(fd, data, size);
+	const int error = errno;
+	if (fd >= 0 && close(fd) && good) return false;
+	errno = error;
+	return good;
+}
+
+static bool is_no_file(const char *path) {
+	struct stat is;
+	return !stat(path, &is) && !S_ISREG(is.st_mode);
+}
+
+static int open_aside(const char *path, char **aside) {
+	*aside = quern_format("%s.part", path);
+	return open(*aside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+}
+
+/* Ends what was written aside: in the place of `path` if all of it was, gone if not. errno says why. */
+static bool put_in_place(int fd, char *aside, const char *path, bool written, char why[256]) {
+	bool good = written && !fsync(fd);
 	int error = good ? 0 : errno;
 	if (fd >= 0 && close(fd) && good) good = false, error = errno;
 	if (good && rename(aside, path)) good = false, error = errno;
@@ -79,5 +99,36 @@ bool quern_save_bytes(const char *path, const void *data, size_t size, char why[
 		snprintf(why, 256, "%.180s cannot be written: %s", path, strerror(error));
 	}
 	free(aside);
+	return good;
+}
+
+bool quern_save_bytes(const char *path, const void *data, size_t size, char why[256]) {
+	if (is_no_file(path)) {
+		const bool good = save_in_place(path, data, size);
+		if (!good) snprintf(why, 256, "%.180s cannot be written: %s", path, strerror(errno));
+		return good;
+	}
+	char *aside;
+	const int fd = open_aside(path, &aside);
+	return put_in_place(fd, aside, path, fd >= 0 && write_all(fd, data, size), why);
+}
+
+static bool copy_all(int from, int to) {
+	char buffer[65536];
+	ssize_t n;
+	while ((n = read(from, buffer, sizeof buffer)) != 0) {
+		if (n < 0 && errno == EINTR) continue;
+		if (n < 0 || !write_all(to, buffer, (size_t)n)) return false;
+	}
+	return true;
+}
+
+bool quern_save_copy(const char *path, const char *from, char why[256]) {
+	char *aside;
+	const int source = open(from, O_RDONLY | O_CLOEXEC);
+	if (source < 0) return snprintf(why, 256, "%.180s cannot be read: %s", from, strerror(errno)), false;
+	const int fd = open_aside(path, &aside);
+	const bool good = put_in_place(fd, aside, path, fd >= 0 && copy_all(source, fd), why);
+	close(source);
 	return good;
 }

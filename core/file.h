@@ -13,3 +13,5 @@ bool quern_hash_file(const char *path, size_t from, uint64_t *hash);
 
 /* Written aside, flushed, renamed: after a crash or on a full disk there is the new file or the old one, whole. */
 bool quern_save_bytes(const char *path, const void *data, size_t size, char why[256]);
+/* The same of another file's bytes. */
+bool quern_save_copy(const char *path, const char *from, char why[256]);

@@ -112,7 +112,7 @@ static void write_set(quern_h5 *h, const quern_run *run, int s) {
 }
 
 static void provenance(quern_h5 *h, const quern_run *run, int64_t frame) {
-	char *resolved = quern_scene_resolved(run->scene);
+	char *resolved = quern_scene_resolved(run->scene, NULL);
 	quern_h5_text(h, h->file, "format", "quern-frame 1");
 	quern_h5_number(h, h->file, "time", quern_run_frame_time(run, frame));
 	quern_h5_integer(h, h->file, "step", run->clock.step);

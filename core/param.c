@@ -251,13 +251,17 @@ static void read_vector(const quern_reading *r, const char *owner, const quern_p
 }
 
 /* A file is named from the scene's folder, so that a scene works from wherever it is run. */
+char *quern_param_path(const quern_node *node) {
+	const char *scene = node->mark.file, *slash = scene ? strrchr(scene, '/') : NULL;
+	const bool relative = node->text[0] != '/' && slash && node->mark.line;
+	return relative ? quern_format("%.*s/%s", (int)(slash - scene), scene, node->text)
+					: quern_copy(node->text);
+}
+
 static const char *read_text(
 	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node) {
 	if (!(row->flags & QUERN_FILE) || !r->tree) return node->text;
-	const char *scene = node->mark.file, *slash = scene ? strrchr(scene, '/') : NULL;
-	const bool relative = node->text[0] != '/' && slash && node->mark.line;
-	char *path =
-		relative ? quern_format("%.*s/%s", (int)(slash - scene), scene, node->text) : quern_copy(node->text);
+	char *path = quern_param_path(node);
 	struct stat is;
 	if (access(path, R_OK) || stat(path, &is))
 		quern_report_add(
@@ -349,7 +353,6 @@ static void missing(const quern_reading *r, const char *owner, const quern_param
 		row->from ? "; nothing in this scene gives " : "", row->from ? row->from : "");
 }
 
-/* The value of a row that the scene leaves out; false if it must not. */
 /* The value of a row that the scene leaves out; false if it must not be. */
 static bool left_out(const quern_reading *r, const quern_param *row, void *member) {
 	set_default(r, row, member);
@@ -420,13 +423,33 @@ void quern_params_finish(const quern_param *rows, void *instance) {
 
 /* ---- writing ---- */
 
-void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim, quern_node *map) {
+static void write_text(
+	const quern_param *row, const char *text, const quern_naming *naming, quern_node *map) {
+	if (!text) return;
+	char *named = naming && row->flags & QUERN_FILE ? naming->name(naming->context, text) : NULL;
+	quern_node_put_quoted(map, row->name, named ? named : text);
+	free(named);
+}
+
+static void write_vector(const quern_param *row, const quern_real *v, uint32_t dim, quern_node *map) {
+	char number[32];
+	for (uint32_t k = 0; k < dim; k++)
+		if (!isfinite(v[k])) return;
+	quern_node *list = quern_node_put_list(map, row->name);
+	for (uint32_t k = 0; k < dim; k++) {
+		quern_number(v[k], number);
+		quern_node_append(list, number);
+	}
+}
+
+void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim,
+	const quern_naming *naming, quern_node *map) {
 	for (; rows && rows->name; rows++) {
 		const void *member = (const char *)instance + rows->offset;
 		char number[32];
 		switch (rows->type) {
 		case QUERN_T_REAL:
-			if (isnan(*(const quern_real *)member)) break;
+			if (!isfinite(*(const quern_real *)member)) break;
 			quern_number(*(const quern_real *)member, number);
 			quern_node_put(map, rows->name, number);
 			break;
@@ -438,26 +461,14 @@ void quern_params_write(const quern_param *rows, const void *instance, uint32_t 
 			break;
 		}
 		case QUERN_T_BOOL: quern_node_put(map, rows->name, *(const bool *)member ? "true" : "false"); break;
-		case QUERN_T_TEXT:
-			if (*(const char *const *)member)
-				quern_node_put_quoted(map, rows->name, *(const char *const *)member);
-			break;
-		case QUERN_T_VECTOR: {
-			const quern_real *v = member;
-			if (isnan(v[0])) break;
-			quern_node *list = quern_node_put_list(map, rows->name);
-			for (uint32_t k = 0; k < dim; k++) {
-				quern_number(v[k], number);
-				quern_node_append(list, number);
-			}
-			break;
-		}
+		case QUERN_T_TEXT: write_text(rows, *(const char *const *)member, naming, map); break;
+		case QUERN_T_VECTOR: write_vector(rows, member, dim, map); break;
 		case QUERN_T_LIST: {
 			const quern_list *values = member;
 			quern_node *list = quern_node_put_list(map, rows->name);
 			for (uint32_t i = 0; i < values->n; i++)
 				quern_params_write(rows->rows, (const char *)values->items + (size_t)i * values->item_size,
-					dim, quern_node_append_map(list));
+					dim, naming, quern_node_append_map(list));
 			break;
 		}
 		default: break;

@@ -55,6 +55,7 @@ typedef struct quern_general {
 	quern_real end, every, checkpoint, step; /* s; step 0: auto */
 	bool force;
 	bool compress;
+	bool every_given; /* output.every stands in the scene */
 } quern_general;
 
 typedef struct quern_scene {
@@ -84,8 +85,9 @@ quern_scene *quern_scene_read(const char *path, const char *const *sets, const q
 quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *);
 void quern_scene_destroy(quern_scene *);
 
-/* The scene with every default written out, in SI, as YAML; free() it. */
-char *quern_scene_resolved(const quern_scene *);
+/* The scene with every default written out, in SI: a tree to destroy, or YAML to free(). */
+quern_node *quern_scene_tree(const quern_scene *, const quern_naming *);
+char *quern_scene_resolved(const quern_scene *, const quern_naming *);
 /* The rows of the core's own keys, for schema and describe. */
 extern const quern_param quern_general_rows[];
 /* Sections and the solver that reads each by default, NULL-name terminated. */

@@ -82,7 +82,7 @@ static double discrete_share(const quern_run *run, const quern_series *s, const 
 }
 
 static json_t *provenance(const quern_run *run) {
-	char *resolved = quern_scene_resolved(run->scene);
+	char *resolved = quern_scene_resolved(run->scene, NULL);
 	json_t *p = json_object();
 	json_object_set_new(p, "program", json_string("quern " QUERN_VERSION));
 	json_object_set_new(p, "compiler", json_string(QUERN_COMPILER));

@@ -285,6 +285,8 @@ static quern_node *parse(
 
 quern_tree *quern_tree_parse(const char *name, const char *data, size_t length, quern_report *report) {
 	quern_tree *tree = quern_take(1, sizeof *tree);
+	tree->source = memcpy(quern_take(length + 1, 1), data, length);
+	tree->length = length;
 	tree->root = parse(tree, name, data, length, false, report);
 	if (!tree->root && !quern_report_errors(report))
 		quern_report_add(report, (quern_mark) { .file = tree->names[0] }, "the scene is empty");
@@ -323,6 +325,7 @@ void quern_tree_destroy(quern_tree *tree) {
 	quern_node_destroy(tree->root);
 	for (size_t i = 0; i < tree->n_names; i++) free(tree->names[i]);
 	free(tree->names);
+	free(tree->source);
 	free(tree);
 }
 

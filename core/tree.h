@@ -26,6 +26,8 @@ typedef struct quern_tree {
 	quern_node *root; /* NULL if the document could not be read */
 	char **names;
 	size_t n_names, names_capacity;
+	char *source; /* the text it was read from, `length` bytes; NULL if it was not read */
+	size_t length;
 } quern_tree;
 
 /* Reads a file; faults (syntax, duplicate keys, too deep, too many aliases, too large) go to the report. */

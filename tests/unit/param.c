@@ -137,7 +137,7 @@ static void writes(void **state) {
 	quern_node *map = quern_node_create(QUERN_NODE_MAP);
 	quern_text out = { 0 };
 	(void)state;
-	quern_params_write(rows, &r.s, 2, map);
+	quern_params_write(rows, &r.s, 2, NULL, map);
 	quern_node_print(map, 0, &out);
 	reading again = read_text(quern_text_string(&out), 2);
 	assert_int_equal(quern_report_errors(again.report), 0);
