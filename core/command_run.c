@@ -263,8 +263,10 @@ static int drive(session *s, const options *o, double until) {
 		run->log = quern_log_create(path, o->quiet, again);
 		free(path);
 		if (o->resume && !again) quern_log_add(run->log, 1, "no checkpoint yet: starting from the beginning");
-		run->sidecars = quern_sidecars_create(run->folder, again ? run->clock.frame + 1 : 0);
-		quern_series_init(&s->series, run, rows);
+		char why[256];
+		run->sidecars = quern_sidecars_create(run->folder, again ? run->clock.frame + 1 : 0, why);
+		if (!run->sidecars) quern_run_stop(run, QUERN_E_IO, "%s", why);
+		else quern_series_init(&s->series, run, rows);
 	}
 	if (run->status != QUERN_OK) {
 		quern_run_complain(run, stderr);
