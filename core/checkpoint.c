@@ -88,6 +88,8 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 				*(const int64_t *)(const void *)((const char *)&run->clock + counters[i].offset));
 		quern_h5_number(&h, h.file, "dt", run->clock.dt);
 		quern_h5_number(&h, h.file, "settle_dt", run->clock.settle_dt);
+		quern_h5_number(&h, h.file, "begin", run->clock.begin);
+		quern_h5_number(&h, h.file, "end", run->clock.end);
 		quern_h5_number(&h, h.file, "wall", run->wall_before);
 		quern_h5_number(&h, h.file, "settle_wall", run->settle_wall);
 		quern_h5_number(&h, h.file, "mass_initial", run->mass_initial);
@@ -230,6 +232,8 @@ static bool read_clock(quern_run *run, quern_h5 *h, int64_t *rows, char why[256]
 						   h->file, counters[i].name, (int64_t *)(void *)((char *)c + counters[i].offset));
 	good = good && quern_h5_read_number(h->file, "dt", &c->dt) &&
 		   quern_h5_read_number(h->file, "settle_dt", &c->settle_dt) &&
+		   quern_h5_read_number(h->file, "begin", &c->begin) &&
+		   quern_h5_read_number(h->file, "end", &c->end) &&
 		   quern_h5_read_number(h->file, "wall", &run->wall_before) &&
 		   quern_h5_read_number(h->file, "settle_wall", &run->settle_wall) &&
 		   quern_h5_read_number(h->file, "mass_initial", &run->mass_initial);
@@ -258,7 +262,10 @@ static bool read_all(quern_run *run, quern_h5 *h, int64_t *rows, char why[256]) 
 		if (!read_set(run, h, s, why)) return false;
 	for (size_t k = 0; k < store->n_fields; k++)
 		if (!values_hold(store, &store->fields[k], why)) return false;
-	return true;
+	if (quern_run_rejoin(run)) return true;
+	snprintf(why, 256, "time.end is %.9g s, and the run has come to %.9g s already", run->scene->general.end,
+		quern_run_time(run));
+	return false;
 }
 
 quern_status quern_checkpoint_read(quern_run *run, const char *path, int64_t *rows, char why[256]) {

@@ -8,6 +8,7 @@
 #include "text.h"
 #include <errno.h>
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -180,18 +181,22 @@ static quern_status settle(session *s) {
 
 static quern_status output(session *s) {
 	quern_run *run = s->run;
-	run->clock.frame++;
-	run->clock.at = run->clock.steps_in = 0;
+	quern_run_frame(run);
 	if (quern_series_add(&s->series, run) != QUERN_OK || quern_run_check_account(run) != QUERN_OK)
 		return run->status;
 	return quern_frame_write(run, run->clock.frame);
 }
 
-static quern_status step_on(session *s, int64_t last) {
+/* A time that is later only by round-off has come. */
+static bool has_come(const quern_run *run, double time) {
+	return time >= 0 && run->clock.frame >= 0 && quern_run_time(run) >= time - 1e-9 * run->clock.dt;
+}
+
+static quern_status step_on(session *s, double until) {
 	quern_run *run = s->run;
 	quern_clock *c = &run->clock;
 	if (c->frame < 0 && output(s) != QUERN_OK) return run->status;
-	while (c->frame < last && !interrupted && run->status == QUERN_OK) {
+	while (run->status == QUERN_OK && !quern_run_over(run) && !has_come(run, until) && !interrupted) {
 		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
 		if (c->step == 0 && c->at == 0)
 			quern_log_add(run->log, 1, "step %.4g s, set by %s", c->dt, run->limit_reason);
@@ -220,8 +225,8 @@ static void report_end(session *s, const char *status) {
 
 static int finish(session *s) {
 	quern_run *run = s->run;
-	const bool stopped = interrupted && run->status == QUERN_OK;
-	const char *status = run->status != QUERN_OK ? "failed" : stopped ? "interrupted" : "done";
+	const bool over = quern_run_over(run), stopped = interrupted && !over;
+	const char *status = over ? "done" : stopped ? "interrupted" : "stopped";
 	if (run->status == QUERN_OK) checkpoint(s);
 	report_end(s, run->status == QUERN_OK ? status : "failed");
 	if (run->status != QUERN_OK) {
@@ -242,14 +247,6 @@ static bool resume(session *s, int64_t *rows, int *status) {
 	}
 	free(path);
 	return there;
-}
-
-static int64_t last_frame(const quern_run *run, double until) {
-	const int64_t last = quern_run_frames(run);
-	if (!(until >= 0)) return last;
-	int64_t k = 0;
-	while (k < last && quern_run_frame_time(run, k) < until * (1 - 1e-12)) k++;
-	return k;
 }
 
 static int drive(session *s, const options *o, double until) {
@@ -273,7 +270,7 @@ static int drive(session *s, const options *o, double until) {
 		return exit_status(run);
 	}
 	if (!again && quern_run_setup(run) == QUERN_OK) run->mass_initial = quern_run_account(run).mass;
-	if (run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s, last_frame(run, until));
+	if (run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s, until);
 	return finish(s);
 }
 

@@ -111,10 +111,10 @@ static void write_set(quern_h5 *h, const quern_run *run, int s) {
 	if (group >= 0) H5Gclose(group);
 }
 
-static void provenance(quern_h5 *h, const quern_run *run, int64_t frame) {
+static void provenance(quern_h5 *h, const quern_run *run) {
 	char *resolved = quern_scene_resolved(run->scene, NULL);
 	quern_h5_text(h, h->file, "format", "quern-frame 1");
-	quern_h5_number(h, h->file, "time", quern_run_frame_time(run, frame));
+	quern_h5_number(h, h->file, "time", quern_run_time(run));
 	quern_h5_integer(h, h->file, "step", run->clock.step);
 	quern_h5_integer(h, h->file, "dimension", run->scene->general.dimension);
 	quern_h5_text(h, h->file, "name", run->scene->general.name);
@@ -133,7 +133,7 @@ quern_status quern_frame_write(quern_run *run, int64_t frame) {
 	char *path = quern_format("%s/frames/%06lld.h5", run->folder, (long long)frame);
 	bool good = quern_h5_create(&h, run->scene->general.compress, 0);
 	if (good) {
-		provenance(&h, run, frame);
+		provenance(&h, run);
 		for (int s = 0; s < (int)run->plan->store.n_sets; s++) write_set(&h, run, s);
 	}
 	good = quern_h5_save(&h, path, why) && quern_sidecars_add(run->sidecars, frame, why);

@@ -119,26 +119,54 @@ void quern_run_destroy(quern_run *run) {
 	free(run->arena.extra);
 	free(run->folder);
 	free(run->message);
+	free(run->identity);
+	free(run->replaced);
 	free(run);
 }
 
 /* ---- time ---- */
 
-int64_t quern_run_frames(const quern_run *run) {
+/* How far from a whole number of intervals still counts as one, in intervals: both times may be written as decimals. */
+static double slack(double intervals) { return fmin(1e-9 * fmax(intervals, 1), 0.01); }
+
+double quern_run_due(const quern_run *run, double time) {
 	const quern_general *g = &run->scene->general;
-	const double frames = g->end / g->every;
-	return (int64_t)ceil(frames - 1e-9 * (frames > 1 ? frames : 1));
+	const double last = g->end / g->every, now = time / g->every;
+	const double next = floor(now + slack(now)) + 1;
+	return next >= ceil(last - slack(last)) ? g->end : next * g->every;
 }
 
-double quern_run_frame_time(const quern_run *run, int64_t frame) {
+bool quern_run_over(const quern_run *run) {
+	const quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
-	return frame >= quern_run_frames(run) ? g->end : (double)frame * g->every;
+	const double now = c->end / g->every, last = g->end / g->every;
+	return c->frame >= 0 && !c->steps_in && now >= last - slack(last);
 }
 
 double quern_run_time(const quern_run *run) {
 	const quern_clock *c = &run->clock;
-	if (!c->settled || c->frame < 0) return 0;
-	return quern_run_frame_time(run, c->frame) + (double)c->at * c->dt;
+	return c->at == c->steps_in ? c->end : c->begin + (double)c->at * c->dt;
+}
+
+void quern_run_cut(quern_run *run) {
+	quern_clock *c = &run->clock;
+	c->begin = c->end = quern_run_time(run);
+	c->at = c->steps_in = 0;
+}
+
+bool quern_run_rejoin(quern_run *run) {
+	quern_clock *c = &run->clock;
+	const quern_general *g = &run->scene->general;
+	const double now = quern_run_time(run), intervals = now / g->every;
+	if (c->frame >= 0 && g->end / g->every < intervals - slack(intervals)) return false;
+	const bool same = quern_run_due(run, c->begin) == c->end || quern_run_due(run, now) == c->end;
+	if (c->steps_in && !same) quern_run_cut(run);
+	return true;
+}
+
+void quern_run_frame(quern_run *run) {
+	quern_run_cut(run);
+	run->clock.frame++;
 }
 
 uint32_t quern_run_substeps(const quern_run *run) {
@@ -223,7 +251,7 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 quern_status quern_run_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
-	const double length = quern_run_frame_time(run, c->frame + 1) - quern_run_frame_time(run, c->frame);
+	const double end = quern_run_due(run, c->end), length = end - c->end;
 	double hard;
 	char hard_reason[200];
 	double limit = quern_run_limit(run, &hard, run->limit_reason, hard_reason);
@@ -245,6 +273,8 @@ quern_status quern_run_interval(quern_run *run) {
 	c->steps_in = steps < 1 ? 1 : (int64_t)steps;
 	c->dt = length / (double)c->steps_in;
 	c->at = 0;
+	c->begin = c->end;
+	c->end = end;
 	return QUERN_OK;
 }
 

@@ -28,9 +28,15 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 	ROW(upper, "domain.upper", "m", "Upper corner of the domain.", .flags = QUERN_REQUIRED, .min = -1e9,
 		.max = 1e9),
 	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED, .max = 1e12),
-	ROW(step_text, "time.step", "s", "The long step, or auto; grains alone: their step.", .text = "auto"),
+	ROW(step_text, "time.step", "s",
+		"The long step, or auto; grains alone: their step. Taken a little shorter, so that a whole number of "
+		"equal steps leads to the next frame.",
+		.text = "auto"),
 	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit."),
-	ROW(every, "output.every", "s", "Time between frames and between rows of series.csv; default: end/50.",
+	ROW(every, "output.every", "s",
+		"Time between frames and between rows of series.csv; default: end/50. It is divided into equal "
+		"steps, "
+		"so another value changes the step a little, and with it the numbers.",
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
 	ROW(compress, "output.compress", NULL, "Deflate the frames.", .def = 1),
 	ROW(checkpoint, "checkpoint.every", "s", "Time on the clock between checkpoints.", .def = 300,
@@ -204,7 +210,8 @@ static void read_general(quern_scene *s, quern_node *root) {
 	if (s->general.version > 1)
 		quern_report_add(s->report, quern_param_mark(root, "quern", root->mark),
 			"scene: quern is %d, must be 1: a newer program is needed", s->general.version);
-	if (isnan(s->general.every)) s->general.every = s->general.end > 0 ? s->general.end / 50 : 1;
+	s->general.every_given = !isnan(s->general.every);
+	if (!s->general.every_given) s->general.every = s->general.end > 0 ? s->general.end / 50 : 1;
 	read_periodic(s, quern_node_find(root, "domain"));
 	read_fields(s, quern_node_find(root, "output"));
 	read_step(s, root);

@@ -47,13 +47,10 @@ static quern_run *open_run(void) {
 static void steps(quern_run *run, int n) {
 	quern_clock *c = &run->clock;
 	c->settled = 1;
-	if (c->frame < 0) c->frame = 0;
+	if (c->frame < 0) quern_run_frame(run);
 	for (int i = 0; i < n && run->status == QUERN_OK; i++) {
 		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
-		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) {
-			c->frame++;
-			c->at = c->steps_in = 0;
-		}
+		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) quern_run_frame(run);
 	}
 }
 
