@@ -238,14 +238,16 @@ static int finish(session *s) {
 }
 
 static bool resume(session *s, int64_t *rows, int *status) {
-	char why[256];
+	quern_text said = { 0 }, why = { 0 };
 	char *path = quern_format("%s/checkpoint.h5", s->run->folder);
 	bool there = !access(path, F_OK);
-	if (there && quern_checkpoint_read(s->run, path, rows, why) != QUERN_OK) {
-		fprintf(stderr, "quern: error: %s: %s; remove it to start anew\n", path, why);
+	if (there && quern_checkpoint_read(s->run, path, false, rows, &said, &why) != QUERN_OK) {
+		fprintf(stderr, "quern: error: %s: %s; remove it to start anew\n", path, quern_text_string(&why));
 		*status = QUERN_EXIT_SCENE;
 	}
 	free(path);
+	quern_text_finish(&said);
+	quern_text_finish(&why);
 	return there;
 }
 

@@ -10,7 +10,8 @@ typedef struct quern_field {
 	int set, target; /* indices of sets; target -1 unless INDEX into one */
 	uint8_t shape, n_components;
 	bool twice;    /* read from one copy, written to the other, then swapped */
-	bool state;    /* checkpointed */
+	bool state;    /* a step goes on from it */
+	bool kept;     /* checkpointed: state, and what is looked at between steps */
 	bool local;    /* born and used up within one stage: a worker's scratch, no memory here */
 	bool shown;    /* in every frame */
 	uint32_t lane; /* of a row set */

@@ -428,6 +428,32 @@ static void follow_field(quern_plan *p, int k) {
 	field->state = field->state && !field->local;
 }
 
+/* The first stage whose uses a solver's limit and account go by. */
+static bool is_first_of_section(const quern_plan *p, int stage) {
+	for (int s = 0; s < stage; s++)
+		if (p->stages[s].section == p->stages[stage].section) return false;
+	return p->stages[stage].section != NULL;
+}
+
+/* Frames, observers, limits and accounts look at fields before anything is computed anew. What they see must come back
+ * with a checkpoint, state or not. */
+static void mark_kept(quern_plan *p) {
+	quern_store *store = &p->store;
+	for (size_t i = 0; i < p->n_uses; i++) {
+		const quern_plan_use *u = &p->uses[i];
+		if (u->target < 0 || u->stage < 0) continue;
+		if (p->stages[u->stage].observer || is_first_of_section(p, u->stage))
+			store->fields[u->target].kept = true;
+	}
+	for (size_t k = 0; k < store->n_fields; k++) {
+		quern_field *field = &store->fields[k];
+		bool shown = field->shown; /* a contact's grains go with its force */
+		for (size_t i = 0; i < store->n_fields && field->target >= 0; i++)
+			shown = shown || (store->fields[i].set == field->set && store->fields[i].shown);
+		field->kept = !field->local && (field->kept || shown || field->state || field->shape == QUERN_ID);
+	}
+}
+
 static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(const quern_use *)) {
 	for (size_t i = 0; i < p->n_uses; i++)
 		if (p->uses[i].stage == stage && p->uses[i].target == field && test(p->uses[i].row)) return true;
@@ -504,6 +530,7 @@ quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
 	lay_rows(p);
 	order_stages(p);
 	for (size_t k = 0; k < p->store.n_fields; k++) follow_field(p, (int)k);
+	mark_kept(p);
 	mark_swaps_and_zeros(p);
 	for (size_t i = 0; i < p->n_stages; i++)
 		p->stages[i].column = quern_take(p->stages[i].n_uses, sizeof(quern_column));

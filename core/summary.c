@@ -1,7 +1,6 @@
 #include "summary.h"
 #include "config.h"
-#include "h5.h"
-#include "text.h"
+#include "identity.h"
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
@@ -81,16 +80,23 @@ static double discrete_share(const quern_run *run, const quern_series *s, const 
 	return a->mass > 0 ? a->discrete / a->mass : 0;
 }
 
-static json_t *provenance(const quern_run *run) {
-	char *resolved = quern_scene_resolved(run->scene, NULL);
+/* Plugins that took the place of others on the way, a line each. */
+static json_t *replaced(const quern_run *run) {
+	json_t *list = json_array();
+	for (const char *line = run->replaced; line && *line; line += strcspn(line, "\n") + 1)
+		json_array_append_new(list, json_stringn(line, strcspn(line, "\n")));
+	return list;
+}
+
+static json_t *provenance(quern_run *run) {
 	json_t *p = json_object();
 	json_object_set_new(p, "program", json_string("quern " QUERN_VERSION));
 	json_object_set_new(p, "compiler", json_string(QUERN_COMPILER));
 	json_object_set_new(p, "flags", json_string(QUERN_FLAGS));
-	json_object_set_new(p, "scene_hash", hash(quern_hash(resolved, strlen(resolved))));
+	json_object_set_new(p, "scene_hash", hash(quern_run_scene_hash(run)));
 	json_object_set_new(p, "seed", json_integer(run->scene->general.seed));
 	json_object_set_new(p, "plugins", plugins(run));
-	free(resolved);
+	if (run->replaced && *run->replaced) json_object_set_new(p, "plugins_replaced", replaced(run));
 	return p;
 }
 

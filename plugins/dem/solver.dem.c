@@ -85,7 +85,7 @@ static const quern_slot slots[] = {
 };
 
 #define DISPLACEMENT                                                                                         \
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR,                                                 \
+	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY,                            \
 		.doc = "Farthest way of a grain since the last list; infinite: the list is stale.")
 #define FIXED(access)                                                                                        \
 	F("grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed",                        \

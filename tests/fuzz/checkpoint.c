@@ -103,7 +103,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
 	const char *folder = getenv("TMPDIR"); /* best in memory */
 	snprintf(path, sizeof path, "%.200s", folder ? folder : "/tmp");
 	run->folder = quern_copy(path);
-	if (quern_checkpoint_write(run, 1) != QUERN_OK) abort();
+	if (quern_checkpoint_write(run, run->clock.frame + 1) != QUERN_OK) abort();
 	quern_run_destroy(run);
 	strcat(path, "/checkpoint.h5");
 	FILE *f = fopen(path, "rb");
@@ -207,27 +207,29 @@ static bool save(hid_t file, char why[256]) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-	char why[256];
+	char broken[256];
 	int64_t rows = 0;
+	quern_text said = { 0 }, why = { 0 };
 	bytes b = { data, data + size };
 	bool good;
-	if (size >= 5 && !memcmp(data, "quern", 5)) good = quern_save_bytes(path, data, size, why);
+	if (size >= 5 && !memcmp(data, "quern", 5)) good = quern_save_bytes(path, data, size, broken);
 	else {
 		const hid_t file = open_image();
 		edit(file, &b);
-		good = save(file, why);
+		good = save(file, broken);
 	}
 	if (!good) abort();
 	quern_run *run = open_run();
-	*why = 0;
-	good = quern_checkpoint_read(run, path, &rows, why) == QUERN_OK;
-	if (!good && (!*why || !memchr(why, 0, sizeof why))) abort();
+	good = quern_checkpoint_read(run, path, size % 2, &rows, &said, &why) == QUERN_OK;
+	if (!good && !why.length) abort();
 	if (!size && !good) {
-		fprintf(stderr, "the checkpoint as it was written is refused: %s\n", why);
+		fprintf(stderr, "the checkpoint as it was written is refused: %s\n", why.data);
 		abort();
 	}
 	if (good) quern_run_account(run);
 	if (!size) steps(run, STEPS);
+	quern_text_finish(&said);
+	quern_text_finish(&why);
 	quern_run_destroy(run);
 	unlink(path);
 	return 0;
