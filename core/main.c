@@ -11,7 +11,8 @@ static const struct {
 	int (*run)(int argc, char **argv);
 } commands[] = {
 	{ "run",
-		"SCENE.yaml [-o DIR] [--set path.to.key=value]... [--threads N] [--resume] [--until T] [--quiet]",
+		"SCENE.yaml [-o DIR] [--set path.to.key=value]... [--threads N] [--resume] [--force] [--until T] "
+		"[--quiet]",
 		"runs a scene", quern_command_run },
 	{ "plan", "SCENE.yaml [--set ...] [--json]", "everything short of running", quern_command_plan },
 	{ "list", "[--json]", "installed plugins", quern_command_list },
