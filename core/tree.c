@@ -517,16 +517,38 @@ void quern_node_merge(quern_node *map, const quern_node *over) {
 		quern_node_merge_entry(map, &over->entries[i]);
 }
 
+/* One character of UTF-8, and how many bytes it has. */
+static int character_at(const char *text, unsigned *code) {
+	const unsigned char *c = (const unsigned char *)text;
+	const int n = *c < 0xc0 ? 1 : *c < 0xe0 ? 2 : *c < 0xf0 ? 3 : 4;
+	*code = n == 1 ? *c : *c & (0xffu >> (n + 1));
+	for (int i = 1; i < n; i++) {
+		if ((c[i] & 0xc0u) != 0x80u) return 1;
+		*code = *code << 6 | (c[i] & 0x3fu);
+	}
+	return n;
+}
+
+/* Control characters, line separators and the like do not come back as they are. */
+static bool must_be_escaped(unsigned code) {
+	return code < 32 || (code >= 0x7f && code < 0xa0) || code == 0x2028 || code == 0x2029 || code == 0xfeff ||
+		   code == 0xfffe || code == 0xffff;
+}
+
 static void print_scalar(const quern_node *node, quern_text *out) {
-	if (!node->quoted) {
+	/* a plain text may have stood where a comma or a bracket means nothing */
+	if (!node->quoted && !node->text[strcspn(node->text, ",[]{}#:\n\"'")]) {
 		quern_text_add(out, "%s", node->text);
 		return;
 	}
 	quern_text_add(out, "\"");
-	for (const char *c = node->text; *c; c++)
+	unsigned code;
+	for (const char *c = node->text; *c; c += character_at(c, &code)) {
+		const int n = character_at(c, &code);
 		if (*c == '"' || *c == '\\') quern_text_add(out, "\\%c", *c);
-		else if ((unsigned char)*c < 32) quern_text_add(out, "\\x%02x", (unsigned)*c);
-		else quern_text_add(out, "%c", *c);
+		else if (must_be_escaped(code)) quern_text_add(out, "\\u%04x", code);
+		else quern_text_add(out, "%.*s", n, c);
+	}
 	quern_text_add(out, "\"");
 }
 
