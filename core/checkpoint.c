@@ -145,7 +145,7 @@ static void write_plugins(quern_h5 *h, const quern_run *run) {
 		const hid_t one = quern_h5_group(h, all, f->plugin.id);
 		quern_h5_text(h, one, "version", f->library->version);
 		quern_h5_integer(h, one, "revision", f->plugin.revision);
-		quern_h5_integer(h, one, "hash", (int64_t)quern_plugin_identity(f));
+		quern_h5_integer(h, one, "hash", (int64_t)quern_run_plugin(run, i));
 		if (one >= 0) H5Gclose(one);
 	}
 	if (all >= 0) H5Gclose(all);
@@ -349,10 +349,9 @@ static bool read_scene(quern_run *run, quern_h5 *h, quern_text *said, quern_text
 }
 
 /* "contact.linear was 0.1.0, revision 1, and is 0.2.0, revision 2": nothing if it is the one that wrote the file. */
-static void compare_plugin(hid_t group, const quern_plugin_file *f, quern_text *out) {
+static void compare_plugin(hid_t group, const quern_plugin_file *f, uint64_t is, quern_text *out) {
 	char version[64] = "not there";
 	int64_t revision = 0, was = 0;
-	const uint64_t is = quern_plugin_identity(f);
 	const bool there = group >= 0 && quern_h5_read_text(group, "version", version, sizeof version) &&
 					   quern_h5_read_integer(group, "revision", &revision) &&
 					   quern_h5_read_integer(group, "hash", &was);
@@ -369,7 +368,7 @@ static bool read_plugins(quern_run *run, quern_h5 *h, bool force, quern_text *sa
 	for (size_t i = 0; i < quern_loader_count(run->scene->loader); i++) {
 		const quern_plugin_file *f = quern_loader_at(run->scene->loader, i);
 		const hid_t one = all < 0 ? -1 : quern_h5_find(all, f->plugin.id);
-		compare_plugin(one, f, &others);
+		compare_plugin(one, f, quern_run_plugin(run, i), &others);
 		if (one >= 0) H5Gclose(one);
 	}
 	if (all >= 0) H5Gclose(all);

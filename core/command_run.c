@@ -254,6 +254,7 @@ static quern_status begin_anew(session *s, const options *o) {
 	quern_text_finish(&why);
 	if (!good) return run->status;
 	if (o->resume) quern_log_add(run->log, 1, "no checkpoint yet: starting from the beginning");
+	quern_run_identity(run); /* of the files as they are now */
 	if (quern_run_setup(run) != QUERN_OK) return run->status;
 	run->mass_initial = quern_run_account(run).mass;
 	quern_run_folder_clear(&s->folder, run->scene);

@@ -21,11 +21,6 @@ static char *contents_of(void *none, const char *path) {
 
 static const quern_naming by_contents = { contents_of, NULL };
 
-const char *quern_run_identity(quern_run *run) {
-	if (!run->identity) run->identity = quern_scene_resolved(run->scene, &by_contents);
-	return run->identity;
-}
-
 static void drop(quern_node *map, const char *path) {
 	const size_t n = strcspn(path, ".");
 	for (size_t i = 0; map && map->kind == QUERN_NODE_MAP && i < map->n; i++) {
@@ -42,15 +37,21 @@ static void drop(quern_node *map, const char *path) {
 	}
 }
 
-uint64_t quern_run_scene_hash(quern_run *run) {
-	if (run->scene_hash) return run->scene_hash;
+const char *quern_run_identity(quern_run *run) {
+	if (run->identity) return run->identity;
 	quern_node *root = quern_scene_tree(run->scene, &by_contents);
-	quern_text text = { 0 };
+	quern_text whole = { 0 }, fixed = { 0 };
+	quern_node_print(root, 0, &whole);
 	for (int k = 0; k < N_FREE; k++) drop(root, may_change[k]);
-	quern_node_print(root, 0, &text);
-	run->scene_hash = quern_hash(quern_text_string(&text), text.length);
-	quern_text_finish(&text);
+	quern_node_print(root, 0, &fixed);
 	quern_node_destroy(root);
+	run->scene_hash = quern_hash(quern_text_string(&fixed), fixed.length);
+	quern_text_finish(&fixed);
+	return run->identity = whole.data;
+}
+
+uint64_t quern_run_scene_hash(quern_run *run) {
+	quern_run_identity(run);
 	return run->scene_hash;
 }
 
@@ -143,7 +144,7 @@ double quern_identity_every(const char *text) {
 
 /* ---- plugins ---- */
 
-uint64_t quern_plugin_identity(const quern_plugin_file *file) {
+static uint64_t hash_of(const quern_plugin_file *file) {
 	uint64_t hash = file->hash;
 	const size_t n = strlen(file->path), suffix = strlen(".v3.so");
 	if (file->level == 1 || n <= suffix) return hash;
@@ -152,3 +153,11 @@ uint64_t quern_plugin_identity(const quern_plugin_file *file) {
 	free(baseline);
 	return hash;
 }
+
+uint64_t *quern_plugin_hashes(const quern_loader *loader) {
+	uint64_t *hashes = quern_take(quern_loader_count(loader), sizeof *hashes);
+	for (size_t i = 0; i < quern_loader_count(loader); i++) hashes[i] = hash_of(quern_loader_at(loader, i));
+	return hashes;
+}
+
+uint64_t quern_run_plugin(const quern_run *run, size_t i) { return run->plugins[i]; }

@@ -4,7 +4,8 @@
 #include "run.h"
 #include "text.h"
 
-/* The resolved scene, with files named by their contents: what is compared. Computed once; the run's own. */
+/* The resolved scene, with files named by their contents: what is compared. Made at the first call, of the files as they are
+ * then; the run's own. */
 const char *quern_run_identity(quern_run *);
 /* Of all that results depend on: equal for scenes that differ in title, end, compression, checkpoints and run alone. */
 uint64_t quern_run_scene_hash(quern_run *);
@@ -15,6 +16,8 @@ bool quern_identity_compare(const char *was, const char *is, quern_text *allowed
 /* output.every of such a text; 0 if it has none. */
 double quern_identity_every(const char *text);
 
-/* The hash by which a plugin is known: of its object for any processor, whichever was loaded, so that a run may go on
- * elsewhere. */
-uint64_t quern_plugin_identity(const quern_plugin_file *);
+/* The hash by which the loader's plugin i is known: of its object for any processor, whichever was loaded, so that a run may
+ * go on elsewhere; as it was when the run was made, since the file may be another one by now. */
+uint64_t quern_run_plugin(const quern_run *, size_t i);
+/* Looks at all of them: part of quern_run_create. */
+uint64_t *quern_plugin_hashes(const quern_loader *);

@@ -1,5 +1,5 @@
 #include "run.h"
-#include "text.h"
+#include "identity.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,6 +78,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	run->scene = scene;
 	run->clock.frame = -1;
 	run->mass_initial = NAN;
+	run->plugins = quern_plugin_hashes(scene->loader);
 	run->pool = quern_pool_create(workers);
 	run->plan = quern_plan_create(scene, run->pool);
 	run->has_grid = needs_grid(&run->plan->store);
@@ -120,6 +121,7 @@ void quern_run_destroy(quern_run *run) {
 	free(run->folder);
 	free(run->message);
 	free(run->identity);
+	free(run->plugins);
 	free(run->replaced);
 	free(run);
 }

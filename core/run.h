@@ -42,7 +42,7 @@ struct quern_run {
 	double mass_initial;
 	char limit_reason[200]; /* what sets the step */
 	char *identity;         /* see identity.h */
-	uint64_t scene_hash;
+	uint64_t scene_hash, *plugins;
 	char *replaced; /* plugins that took the place of others on the way, a line each; NULL: none */
 };
 
