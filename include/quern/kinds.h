@@ -271,14 +271,15 @@ typedef struct quern_output {
 typedef struct quern_observer_batch {
 	uint32_t n, dim; /* entries of this leaf; `whole`: 0 */
 	quern_real time, gravity[3], lower[3], upper[3];
-	const quern_column *use;
+	const quern_column
+		*use; /* by row of `uses`; `map`: those of `set` from the leaf's first entry on, others whole */
 	const uint32_t *count; /* `whole`: entries by row of `uses`; NULL in `map` */
 } quern_observer_batch;
 
 typedef struct quern_observer_ops {
 	uint32_t size, pad;
 	const char *set;             /* that `map` runs over; NULL: `whole` */
-	const quern_output *outputs; /* NULL-name terminated */
+	const quern_output *outputs; /* NULL-name terminated; what comes out must be finite */
 	void (*map)(
 		const void *self, const quern_observer_batch *, quern_real *partial); /* [batch] one per output */
 	quern_status (*whole)(const void *self, const quern_observer_batch *, quern_real *out, const quern_host *,

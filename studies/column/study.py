@@ -23,8 +23,8 @@ def run(out, model, seed, threads):
     summary = out / "summary.json"
     if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
         sets = [f"seed={seed}"] + ([] if model == "hybrid" else [f"model={model}"])
-        subprocess.run([ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--quiet", "--threads", str(threads)]
-                       + [word for one in sets for word in ("--set", one)], check=True)
+        subprocess.run([ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--force", "--quiet"]
+                       + ["--threads", str(threads)] + [word for one in sets for word in ("--set", one)], check=True)
     return json.loads(summary.read_text())
 
 

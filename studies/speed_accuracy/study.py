@@ -28,7 +28,8 @@ def run(out, sets, threads=1, until=None):
     """Runs the column into `out` unless it is there; returns its summary, with the processor time it took."""
     summary = out / "summary.json"
     if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
-        command = [ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--quiet", "--threads", str(threads)]
+        command = [ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--force", "--quiet", "--threads",
+                   str(threads)]
         for one in sets:
             command += ["--set", one]
         if until is not None:
