@@ -98,10 +98,20 @@ static bool indices_hold(const quern_store *store, const quern_field *field) {
 	return true;
 }
 
+/* A number is given once, in the order of counting. */
+static bool ids_hold(const quern_set_store *set, const quern_field *field) {
+	const int64_t *id = field->data[field->now][0];
+	for (uint32_t i = 0; i < set->n; i++)
+		if (id[i] < 0 || id[i] >= set->next_id) return false;
+	return true;
+}
+
 /* NULL, or what is wrong with a field. What is only looked at may hold anything: no step goes on from it. */
 static const char *fault_in(const quern_run *run, const quern_field *field) {
 	const quern_store *store = &run->plan->store;
-	if (!field->kept || store->sets[field->set].rows || field->shape == QUERN_ID) return NULL;
+	if (!field->kept || store->sets[field->set].rows) return NULL;
+	if (field->shape == QUERN_ID)
+		return ids_hold(&store->sets[field->set], field) ? NULL : "a number that was never given";
 	if (field->shape == QUERN_INDEX)
 		return field->target < 0 || indices_hold(store, field) ? NULL : "an index out of its set";
 	if (!field->state) return NULL;

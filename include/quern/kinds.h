@@ -271,8 +271,8 @@ typedef struct quern_output {
 typedef struct quern_observer_batch {
 	uint32_t n, dim; /* entries of this leaf; `whole`: 0 */
 	quern_real time, gravity[3], lower[3], upper[3];
-	const quern_column
-		*use; /* by row of `uses`; `map`: those of `set` from the leaf's first entry on, others whole */
+	/* by row of `uses`; in `map` the columns of `set` begin at the leaf's first entry, others are whole */
+	const quern_column *use;
 	const uint32_t *count; /* `whole`: entries by row of `uses`; NULL in `map` */
 } quern_observer_batch;
 

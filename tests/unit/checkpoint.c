@@ -195,6 +195,8 @@ static const struct {
 	{ "total/displacement.0", (double)NAN, 0, false },
 	{ "grain/acceleration.0", (double)NAN, 0, true }, /* of a grain that has never been pushed */
 	{ "grain/acceleration.0", (double)INFINITY, 0, false },
+	{ "grain/id.0", 0, -1, false },
+	{ "grain/id.0", 0, 1 << 20, false },
 	{ "contact/first.0", 0, -1, false },
 	{ "contact/second.0", 0, 1 << 30, false },
 	{ "@steps_in", 0, 1000000000, false },
