@@ -125,6 +125,8 @@ static void progress(session *s, bool settling) {
 static quern_status checkpoint(session *s) {
 	s->run->wall_before += quern_wall() - s->start;
 	s->start = s->saved = quern_wall();
+	/* rows that a checkpoint counts must be there after a power cut too */
+	if (quern_series_flush(&s->series, s->run) != QUERN_OK) return s->run->status;
 	return quern_checkpoint_write(s->run, s->series.rows);
 }
 
@@ -228,8 +230,8 @@ static int finish(session *s) {
 
 /* ---- the beginning ---- */
 
-/* The folder is this run's from here on. */
-static quern_status take_over(session *s, bool again, int64_t rows) {
+/* The folder is this run's from here on; `again`: it was before. */
+static quern_status take_over(session *s, bool again) {
 	quern_run *run = s->run;
 	char why[256] = "";
 	if (!quern_run_folder_begin(&s->folder, run->scene, why))
@@ -240,7 +242,7 @@ static quern_status take_over(session *s, bool again, int64_t rows) {
 	s->begun = true;
 	run->sidecars = quern_sidecars_create(run->folder, again ? run->clock.frame + 1 : 0, why);
 	if (!run->sidecars) return quern_run_stop(run, QUERN_E_IO, "%s", why);
-	if (quern_series_init(&s->series, run, rows) != QUERN_OK) return run->status;
+	if (!again && quern_series_init(&s->series, run, 0) != QUERN_OK) return run->status;
 	return check_log(run);
 }
 
@@ -258,14 +260,17 @@ static quern_status begin_anew(session *s, const options *o) {
 	if (quern_run_setup(run) != QUERN_OK) return run->status;
 	run->mass_initial = quern_run_account(run).mass;
 	quern_run_folder_clear(&s->folder, run->scene);
-	return take_over(s, false, 0);
+	return take_over(s, false);
 }
 
 static void note_changes(quern_run *run, const char *said) {
 	quern_log_add(
 		run->log, 1, "resumed at t = %.6g s, step %lld", quern_run_time(run), (long long)run->clock.step);
-	for (; said && *said; said += strcspn(said, "\n") + 1)
-		quern_log_add(run->log, 1, "changed: %.*s", (int)strcspn(said, "\n"), said);
+	while (said && *said) {
+		const size_t n = strcspn(said, "\n");
+		quern_log_add(run->log, 1, "changed: %.*s", (int)n, said);
+		said += n + (said[n] != 0);
+	}
 }
 
 static quern_status go_on(session *s, const options *o, const char *path) {
@@ -278,10 +283,10 @@ static quern_status go_on(session *s, const options *o, const char *path) {
 	else if (has_come(run, s->until))
 		fprintf(stderr, "quern: the run has come to t = %.9g s already: nothing to do until %.9g s\n",
 			quern_run_time(run), s->until);
-	else {
+	else if (quern_series_init(&s->series, run, rows) == QUERN_OK) {
 		note_changes(run, said.data);
 		quern_run_folder_trim(&s->folder, run->clock.frame + 1);
-		take_over(s, true, rows);
+		take_over(s, true);
 	}
 	quern_text_finish(&said);
 	quern_text_finish(&why);

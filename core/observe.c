@@ -1,6 +1,7 @@
 #include "observe.h"
 #include "text.h"
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -115,6 +116,14 @@ quern_status quern_series_init(quern_series *s, quern_run *run, int64_t rows) {
 	add_columns(s, run);
 	if (!s->path) return QUERN_OK;
 	return rows > 0 ? cut(s, run, rows) : write_header(s, run);
+}
+
+quern_status quern_series_flush(const quern_series *s, quern_run *run) {
+	if (!s->path) return QUERN_OK;
+	const int fd = open(s->path, O_RDONLY | O_CLOEXEC);
+	const bool good = fd >= 0 && !fsync(fd);
+	if (fd >= 0) close(fd);
+	return good ? QUERN_OK : unwritable(s, run);
 }
 
 void quern_series_finish(quern_series *s) {

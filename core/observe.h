@@ -24,5 +24,7 @@ const char *quern_observer_label(const quern_run *, size_t observer);
  * written, QUERN_E_PARAM if it does not hold the rows. */
 quern_status quern_series_init(quern_series *, quern_run *, int64_t rows);
 void quern_series_finish(quern_series *);
+/* The rows so far are on the disk. */
+quern_status quern_series_flush(const quern_series *, quern_run *);
 /* One row, of the state as it is. A number that is not finite ends the run instead: QUERN_E_NUMERIC. */
 quern_status quern_series_add(quern_series *, quern_run *);

@@ -83,8 +83,11 @@ static double discrete_share(const quern_run *run, const quern_series *s, const 
 /* Plugins that took the place of others on the way, a line each. */
 static json_t *replaced(const quern_run *run) {
 	json_t *list = json_array();
-	for (const char *line = run->replaced; line && *line; line += strcspn(line, "\n") + 1)
-		json_array_append_new(list, json_stringn(line, strcspn(line, "\n")));
+	for (const char *line = run->replaced; line && *line;) {
+		const size_t n = strcspn(line, "\n");
+		json_array_append_new(list, json_stringn(line, n));
+		line += n + (line[n] != 0);
+	}
 	return list;
 }
 

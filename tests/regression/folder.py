@@ -100,6 +100,13 @@ def resumed(place):
     run(out / "scene.yaml", out, "--resume", "--set=time.end=22 ms")
     assert "end: 0.022" in (out / "scene.yaml").read_text()
     assert (out / "input.yaml").read_bytes() == SCENE.read_bytes()
+    # what does not fit the checkpoint is refused before anything is touched
+    series = (out / "series.csv").read_text()
+    (out / "series.csv").write_text(series[:100])
+    before = contents(out)
+    assert "does not hold the 23 rows" in run(out / "scene.yaml", out, "--resume", status=2)
+    assert contents(out) == before
+    (out / "series.csv").write_text(series)
     # frames whose checkpoint is gone are not lost by a run that begins anew
     (out / "checkpoint.h5").unlink()
     before = contents(out)
