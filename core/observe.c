@@ -79,7 +79,7 @@ static quern_status cut(quern_series *s, quern_run *run, int64_t rows) {
 	FILE *file = fopen(s->path, "r+");
 	if (!file && errno != ENOENT) return unwritable(s, run);
 	const long end = file ? read_back(s, file, rows) : -1;
-	const bool cut = end >= 0 && !fflush(file) && !ftruncate(fileno(file), end);
+	const bool good = end >= 0 && !fflush(file) && !ftruncate(fileno(file), end);
 	const bool closed = file && !fclose(file);
 	s->rows = rows;
 	if (end < 0)
@@ -87,7 +87,7 @@ static quern_status cut(quern_series *s, quern_run *run, int64_t rows) {
 			"%s does not hold the %lld rows that the checkpoint counts: put it back, or start anew with "
 			"--force",
 			s->path, (long long)rows);
-	return cut && closed ? QUERN_OK : unwritable(s, run);
+	return good && closed ? QUERN_OK : unwritable(s, run);
 }
 
 static quern_status write_header(const quern_series *s, quern_run *run) {

@@ -1,6 +1,5 @@
 #include "run_folder.h"
 #include "folder.h"
-#include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -105,11 +104,14 @@ static int64_t view_of(const char *name) {
 }
 
 /* "0123456789abcdef-grains.txt": the name begins with the hash of what is in it. */
+static bool is_copy_name(const char *name) {
+	return strspn(name, "0123456789abcdef") >= 16 && name[16] == '-';
+}
+
 static bool is_copy(const char *path, const char *name) {
 	uint64_t hash;
 	char digits[20];
-	if (strspn(name, "0123456789abcdef") < 16 || name[16] != '-' || !quern_hash_file(path, 0, &hash))
-		return false;
+	if (!is_copy_name(name) || !quern_hash_file(path, 0, &hash)) return false;
 	snprintf(digits, sizeof digits, "%016llx", (unsigned long long)hash);
 	return !strncmp(digits, name, 16);
 }
@@ -117,9 +119,11 @@ static bool is_copy(const char *path, const char *name) {
 /* Whether a run has left that file in frames/, views/ or files/; half a file that it was killed over is one too. */
 static bool is_left(const char *folder, const char *path, const char *name) {
 	char *whole = quern_copy(name);
-	if (ends_with(whole, ".part")) whole[strlen(whole) - strlen(".part")] = 0;
+	const bool half = ends_with(whole, ".part");
+	if (half) whole[strlen(whole) - strlen(".part")] = 0;
 	const bool left = !strcmp(folder, "frames")  ? frame_of(whole) >= 0
 					  : !strcmp(folder, "views") ? view_of(whole) >= 0 || ends_with(whole, ".hdf.series")
+					  : half                     ? is_copy_name(whole)
 												 : is_copy(path, name);
 	free(whole);
 	return left;

@@ -48,7 +48,7 @@ def forces(place):
     kept = ["notes.txt", "frames/notes.txt", "frames/12.h5", "views/mine.pvsm", "views/grains_12.hdf", "files/mine.txt",
             "files/0123456789abcdef-other.txt", "frame_000003.png"]
     stale = ["frames/000077.h5", "frames/000078.h5.part", "views/grains_000077.hdf", "views/points.hdf.series",
-             "checkpoint.h5.part"]
+             "checkpoint.h5.part", "files/0123456789abcdef-grains.txt.part"]
     for name in kept + stale:
         (out / name).parent.mkdir(exist_ok=True)
         (out / name).write_text("x")
