@@ -1,6 +1,7 @@
 /* quern check - conformance tests of one plugin, each group in a process of its own, so that a crash is one sentence */
 #include "check.h"
 #include "command.h"
+#include "options.h"
 #include "text.h"
 #include <signal.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@
 #include <unistd.h>
 
 /* A group of tests takes a few seconds; one that goes on for ever is stopped. */
-static unsigned seconds = 120;
+static int64_t seconds = 120;
 
 static const check_kind *const kinds[QUERN_KINDS] = { [QUERN_CONTACT] = &check_contact,
 	[QUERN_NEIGHBOURS] = &check_neighbours,
@@ -45,7 +46,7 @@ static void tell_end(const check *c, const char *group, int status) {
 	const check_shared *s = c->shared;
 	if (WIFEXITED(status) && !WEXITSTATUS(status)) return;
 	if (WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM)
-		printf("  FAILED  %s: %s: did not come back within %u s from %s.%s\n", group, id, seconds, name,
+		printf("  FAILED  %s: %s: did not come back within %d s from %s.%s\n", group, id, (int)seconds, name,
 			s->place);
 	else if (WIFSIGNALED(status))
 		printf("  FAILED  %s: %s: crashed (%s) in %s.%s\n", group, id, signal_name(WTERMSIG(status)), name,
@@ -66,7 +67,7 @@ static void run_group(const check *c, const char *name, void (*group)(const chec
 		exit(QUERN_EXIT_IO);
 	}
 	if (!child) {
-		alarm(seconds);
+		alarm((unsigned)seconds);
 		group(c);
 		fflush(stdout);
 		_exit(0);
@@ -104,28 +105,26 @@ static const quern_plugin_file *open_plugin(quern_loader *loader, const char *pa
 }
 
 int quern_command_check(int argc, char **argv) {
-	const char *path = NULL;
+	quern_texts sets = { 0 };
+	quern_words words = { .missing = "a plugin is missing", .least = 1, .most = 1 };
+	const quern_option options[] = { QUERN_TEXTS(&sets, "set", "KEY=VALUE",
+										 "a parameter of the plugin; may stand several times"),
+		QUERN_NUMBER(&seconds, "seconds", 1, 86400, "when a group of tests is stopped; default: 120"),
+		QUERN_END_OPTIONS };
+	int status = quern_options_read("check", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return free(sets.at), status;
 	quern_report *report = quern_report_create();
 	quern_tree *tree = quern_tree_parse("--set", "{}", 2, report);
-	int status = QUERN_EXIT_DONE;
-	for (int i = 1; i < argc && status == QUERN_EXIT_DONE; i++) {
-		if (!strcmp(argv[i], "--set") && i + 1 < argc) quern_tree_set(tree, argv[++i], report);
-		else if (!strcmp(argv[i], "--seconds") && i + 1 < argc && atoi(argv[i + 1]) > 0)
-			seconds = (unsigned)atoi(argv[++i]);
-		else if (argv[i][0] == '-' || path) status = quern_usage("check", "unknown argument '%s'", argv[i]);
-		else path = argv[i];
-	}
-	if (status == QUERN_EXIT_DONE && !path) status = quern_usage("check", "a plugin is missing");
-	if (status == QUERN_EXIT_DONE) {
-		quern_loader *loader = quern_loader_create();
-		check c = { .given = tree->root, .units = quern_units_create() };
-		if (!quern_report_errors(report)) c.file = open_plugin(loader, path, report);
-		quern_report_print(report, stderr);
-		status = c.file ? run_checks(&c) : QUERN_EXIT_SCENE;
-		quern_units_destroy(c.units);
-		quern_loader_destroy(loader);
-	}
+	for (size_t i = 0; i < sets.n; i++) quern_tree_set(tree, sets.at[i], report);
+	quern_loader *loader = quern_loader_create();
+	check c = { .given = tree->root, .units = quern_units_create() };
+	if (!quern_report_errors(report)) c.file = open_plugin(loader, words.at[0], report);
+	quern_report_print(report, stderr);
+	status = c.file ? run_checks(&c) : QUERN_EXIT_SCENE;
+	quern_units_destroy(c.units);
+	quern_loader_destroy(loader);
 	quern_tree_destroy(tree);
 	quern_report_destroy(report);
+	free(sets.at);
 	return status;
 }

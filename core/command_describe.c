@@ -1,6 +1,7 @@
 /* quern list, quern describe - what is installed, from the plugins' own tables */
 #include "command.h"
 #include "loader.h"
+#include "options.h"
 #include "param.h"
 #include "text.h"
 #include <jansson.h>
@@ -27,8 +28,11 @@ static const quern_plugin_file *load(quern_loader *loader, const char *id, quern
 /* ---- list ---- */
 
 int quern_command_list(int argc, char **argv) {
-	const bool json = argc == 2 && !strcmp(argv[1], "--json");
-	if (argc > 1 && !json) return quern_usage("list", "unknown argument '%s'", argv[1]);
+	bool json = false;
+	quern_words words = { 0 };
+	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
+	int status = quern_options_read("list", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
 	char **ids = quern_loader_ids(loader);
@@ -45,7 +49,7 @@ int quern_command_list(int argc, char **argv) {
 	if (json) json_dumpf(list, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 	json_decref(list);
 	quern_report_print(report, stderr);
-	const int status = quern_report_errors(report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
+	status = quern_report_errors(report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
 	quern_loader_free_ids(ids);
 	quern_report_destroy(report);
 	quern_loader_destroy(loader);
@@ -191,17 +195,14 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 }
 
 int quern_command_describe(int argc, char **argv) {
-	const char *name = NULL;
 	bool json = false;
-	for (int i = 1; i < argc; i++) {
-		if (!strcmp(argv[i], "--json")) json = true;
-		else if (argv[i][0] == '-' || name) return quern_usage("describe", "unknown argument '%s'", argv[i]);
-		else name = argv[i];
-	}
-	if (!name) return quern_usage("describe", "a plugin is missing");
+	quern_words words = { .missing = "a plugin is missing", .least = 1, .most = 1 };
+	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
+	const int status = quern_options_read("describe", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
-	const quern_plugin_file *f = find(loader, name, report);
+	const quern_plugin_file *f = find(loader, words.at[0], report);
 	if (f && json) {
 		json_t *root = plugin_json(f);
 		json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");

@@ -1,6 +1,7 @@
 /* quern schema - a JSON Schema of scenes from the rows of all installed plugins, for completion in editors */
 #include "command.h"
 #include "h5.h"
+#include "options.h"
 #include "scene.h"
 #include "text.h"
 #include <jansson.h>
@@ -147,14 +148,17 @@ static json_t *scene_schema(const context *c) {
 
 int quern_command_schema(int argc, char **argv) {
 	const char *out = NULL;
-	if (argc == 3 && !strcmp(argv[1], "-o")) out = argv[2];
-	else if (argc > 1) return quern_usage("schema", "unknown argument '%s'", argv[1]);
+	quern_words words = { 0 };
+	const quern_option options[] = { QUERN_TEXT(&out, 'o', "output", "FILE", "where to write it"),
+		QUERN_END_OPTIONS };
+	int status = quern_options_read("schema", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
 	context c = { quern_loader_create(), quern_report_create(), NULL };
 	c.ids = quern_loader_ids(c.loader);
 	json_t *schema = scene_schema(&c);
 	char *text = json_dumps(schema, JSON_INDENT(1) | JSON_PRESERVE_ORDER);
 	char why[256];
-	int status = quern_report_errors(c.report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
+	status = quern_report_errors(c.report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
 	quern_report_print(c.report, stderr);
 	if (!out) puts(text);
 	else if (!quern_save_bytes(out, text, strlen(text), why)) {
