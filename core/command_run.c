@@ -1,8 +1,10 @@
 /* quern run - reads, settles, steps, writes; ends with a checkpoint whatever stops it in between */
 #include "checkpoint.h"
 #include "command.h"
+#include "folder.h"
 #include "frame.h"
 #include "h5.h"
+#include "options.h"
 #include "sidecar.h"
 #include "summary.h"
 #include "text.h"
@@ -10,14 +12,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 typedef struct {
 	const char *scene, *out, *until;
-	const char **sets;
-	size_t n_sets, capacity;
-	uint32_t threads;
+	quern_texts sets;
+	int64_t threads;
 	bool resume, quiet;
 } options;
 
@@ -36,41 +36,18 @@ static void on_signal(int number) {
 
 /* ---- the command line ---- */
 
-static bool take_value(int argc, char **argv, int *i, const char *name, const char **value) {
-	const size_t n = strlen(name);
-	if (strncmp(argv[*i], name, n) != 0) return false;
-	if (argv[*i][n] == '=') return *value = argv[*i] + n + 1, true;
-	if (argv[*i][n]) return false;
-	*value = *i + 1 < argc ? argv[++*i] : NULL;
-	return true;
-}
-
 static int parse(options *o, int argc, char **argv) {
-	for (int i = 1; i < argc; i++) {
-		const char *value = NULL;
-		if (take_value(argc, argv, &i, "--set", &value)) {
-			if (!value) return quern_usage("run", "--set needs path.to.key=value");
-			o->sets = quern_grow(o->sets, o->n_sets + 1, &o->capacity, sizeof(char *));
-			o->sets[o->n_sets++] = value;
-		} else if (take_value(argc, argv, &i, "--threads", &value)) {
-			char *end;
-			const long n = value ? strtol(value, &end, 10) : 0;
-			if (!value || *end || n < 1 || n > 256)
-				return quern_usage("run", "--threads needs a number from 1 to 256");
-			o->threads = (uint32_t)n;
-		} else if (take_value(argc, argv, &i, "--until", &value)) {
-			if (!value) return quern_usage("run", "--until needs a time");
-			o->until = value;
-		} else if (!strcmp(argv[i], "-o")) {
-			if (i + 1 == argc) return quern_usage("run", "-o needs a folder");
-			o->out = argv[++i];
-		} else if (!strcmp(argv[i], "--resume")) o->resume = true;
-		else if (!strcmp(argv[i], "--quiet")) o->quiet = true;
-		else if (argv[i][0] == '-') return quern_usage("run", "unknown option '%s'", argv[i]);
-		else if (o->scene) return quern_usage("run", "one scene at a time: '%s' is a second one", argv[i]);
-		else o->scene = argv[i];
-	}
-	return o->scene ? QUERN_EXIT_DONE : quern_usage("run", "a scene is missing");
+	quern_words words = { .missing = "a scene is missing", .least = 1, .most = 1 };
+	const quern_option known[] = { QUERN_TEXT(&o->out, 'o', "output", "DIR",
+									   "the folder of the run; default: out/NAME"),
+		QUERN_TEXTS(&o->sets, "set", "PATH=VALUE", "a key of the scene; may stand several times"),
+		QUERN_NUMBER(&o->threads, "threads", 1, 256, "how many work; results do not depend on it"),
+		QUERN_FLAG(&o->resume, "resume", "go on from the checkpoint"),
+		QUERN_TEXT(&o->until, 0, "until", "TIME", "stop at this time"),
+		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"), QUERN_END_OPTIONS };
+	const int status = quern_options_read("run", known, &words, argc, argv);
+	o->scene = words.at[0];
+	return status;
 }
 
 /* ---- the folder ---- */
@@ -84,21 +61,6 @@ static char *folder_of(const options *o) {
 	char *folder = quern_format("out/%s", base);
 	free(base);
 	return folder;
-}
-
-static bool make_folders(const char *path) {
-	char *copy = quern_copy(path);
-	bool good = true;
-	for (char *p = copy + 1; good; p++)
-		if (*p == '/' || !*p) {
-			const char kept = *p;
-			*p = 0;
-			good = !mkdir(copy, 0777) || errno == EEXIST;
-			*p = kept;
-			if (!kept) break;
-		}
-	free(copy);
-	return good;
 }
 
 static void remove_frames(const char *folder) {
@@ -115,7 +77,7 @@ static quern_status open_folder(quern_run *run, bool fresh) {
 	char *frames = quern_format("%s/frames", run->folder),
 		 *scene = quern_format("%s/scene.yaml", run->folder);
 	quern_status status = QUERN_OK;
-	if (!make_folders(frames))
+	if (!quern_folder_make(frames))
 		status = quern_run_stop(run, QUERN_E_IO, "folder %s cannot be made: %s", frames, strerror(errno));
 	else {
 		char *resolved = quern_scene_resolved(run->scene);
@@ -286,11 +248,11 @@ static bool parse_until(const options *o, quern_run *run, double *until) {
 int quern_command_run(int argc, char **argv) {
 	options o = { 0 };
 	int status = parse(&o, argc, argv);
-	if (status != QUERN_EXIT_DONE) return free(o.sets), status;
+	if (status != QUERN_OPTIONS_READ) return free(o.sets.at), status;
 	signal(SIGINT, on_signal);
 	signal(SIGTERM, on_signal);
-	quern_scene *scene = quern_scene_read(o.scene, o.sets, &quern_host_table);
-	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, o.threads);
+	quern_scene *scene = quern_scene_read(o.scene, o.sets.at, &quern_host_table);
+	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, (uint32_t)o.threads);
 	quern_report_print(scene->report, stderr);
 	session s = { .run = run, .start = quern_wall(), .saved = quern_wall() };
 	double until;
@@ -308,6 +270,6 @@ int quern_command_run(int argc, char **argv) {
 	if (run) quern_sidecars_destroy(run->sidecars);
 	if (run) quern_run_destroy(run);
 	else quern_scene_destroy(scene);
-	free(o.sets);
+	free(o.sets.at);
 	return status;
 }
