@@ -55,7 +55,27 @@ static void flush_folder(const char *path) {
 	free(folder);
 }
 
+/* A device or a pipe gets the bytes itself: a file renamed onto it would take its place. */
+static bool save_in_place(const char *path, const void *data, size_t size) {
+	const int fd = open(path, O_WRONLY);
+	const bool good = fd >= 0 && write_all(fd, data, size);
+	const int error = errno;
+	if (fd >= 0 && close(fd) && good) return false;
+	errno = error;
+	return good;
+}
+
+static bool is_no_file(const char *path) {
+	struct stat is;
+	return !stat(path, &is) && !S_ISREG(is.st_mode);
+}
+
 bool quern_save_bytes(const char *path, const void *data, size_t size, char why[256]) {
+	if (is_no_file(path)) {
+		const bool good = save_in_place(path, data, size);
+		if (!good) snprintf(why, 256, "%.180s cannot be written: %s", path, strerror(errno));
+		return good;
+	}
 	char *aside = quern_format("%s.part", path);
 	const int fd = open(aside, O_WRONLY | O_CREAT | O_TRUNC, 0666);
 	bool good = fd >= 0 && write_all(fd, data, size) && !fsync(fd);
