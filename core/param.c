@@ -22,10 +22,7 @@ static bool is_prefix(const char *prefix, const char *name) {
 
 /* One part of a path: a key of a map, or the number of a list's item. */
 static const quern_entry *step_into(const quern_node *node, const char *part) {
-	if (node->kind != QUERN_NODE_LIST) return quern_node_entry(node, part);
-	char *end;
-	const unsigned long k = strtoul(part, &end, 10);
-	return *part && !*end && k < node->n ? &node->entries[k] : NULL;
+	return node->kind == QUERN_NODE_LIST ? quern_node_item(node, part) : quern_node_entry(node, part);
 }
 
 /* The entry of a dotted name, or NULL; `mark` (NULL: not wanted) becomes that of the last part that is there. */
@@ -177,6 +174,14 @@ void quern_params_check(const quern_reading *r, const char *owner, const quern_p
 	check_keys(r, owner, rows, map, "", also);
 }
 
+/* What stands in quotes is text; only a quantity with its unit is text all the same. */
+static bool is_quoted_number(const quern_node *node) {
+	char *end;
+	if (!node->quoted || !*node->text) return false;
+	strtod(node->text, &end);
+	return end != node->text && !end[strspn(end, " \t")];
+}
+
 static bool read_number(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, double *value) {
 	char why[160], range[96], say[64];
@@ -187,6 +192,11 @@ static bool read_number(const quern_reading *r, const char *owner, const quern_p
 	}
 	if (!quern_quantity_read(r->units, node->text, row->unit ? row->unit : "1", value, why)) {
 		quern_report_add(r->report, node->mark, "%s: %s: %s", owner, row->name, why);
+		return false;
+	}
+	if (is_quoted_number(node)) {
+		quern_report_add(r->report, node->mark, "%s: %s: \"%s\" in quotes is a text, not a number", owner,
+			row->name, node->text);
 		return false;
 	}
 	if (in_range(row, *value)) return true;
@@ -229,10 +239,7 @@ static void read_int(const quern_reading *r, const char *owner, const quern_para
 static void read_bool(
 	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node, bool *member) {
 	char say[64];
-	const char *t = node->kind == QUERN_NODE_SCALAR && !node->quoted ? node->text : "";
-	if (!strcmp(t, "true") || !strcmp(t, "yes") || !strcmp(t, "on")) *member = true;
-	else if (!strcmp(t, "false") || !strcmp(t, "no") || !strcmp(t, "off")) *member = false;
-	else
+	if (!quern_node_bool(node, member))
 		quern_report_add(r->report, node->mark, "%s: %s is %s, must be true or false", owner, row->name,
 			quern_node_say(node, say));
 }
@@ -262,9 +269,9 @@ static const char *read_text(
 	if (access(path, R_OK) || stat(path, &is))
 		quern_report_add(
 			r->report, node->mark, "%s: %s: cannot read '%s': %s", owner, row->name, path, strerror(errno));
-	else if (S_ISDIR(is.st_mode))
-		quern_report_add(
-			r->report, node->mark, "%s: %s: '%s' is a folder; a file is wanted", owner, row->name, path);
+	else if (!S_ISREG(is.st_mode))
+		quern_report_add(r->report, node->mark, "%s: %s: '%s' is %s; a file is wanted", owner, row->name,
+			path, S_ISDIR(is.st_mode) ? "a folder" : "no regular file");
 	const char *kept = quern_tree_keep(r->tree, path);
 	free(path);
 	return kept;

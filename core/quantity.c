@@ -101,6 +101,10 @@ bool quern_quantity_read(
 		snprintf(why, 160, "'%.40s' is too large", text);
 		return false;
 	}
+	if (number == 0 && errno == ERANGE) {
+		snprintf(why, 160, "'%.40s' is too small", text);
+		return false;
+	}
 	*value = number;
 	while (isspace((unsigned char)*end)) end++;
 	if (*end && !convert(units, end, unit, value, why)) return false;

@@ -128,9 +128,7 @@ static void read_periodic(quern_scene *s, const quern_node *domain) {
 	}
 	for (size_t k = 0; k < node->n; k++) {
 		const quern_node *value = node->entries[k].value;
-		const char *t = value->kind == QUERN_NODE_SCALAR ? value->text : "";
-		s->general.periodic[k] = !strcmp(t, "true");
-		if (strcmp(t, "true") != 0 && strcmp(t, "false") != 0)
+		if (!quern_node_bool(value, &s->general.periodic[k]))
 			quern_report_add(s->report, value->mark, "scene: domain.periodic is %s, must be true or false",
 				quern_node_say(value, say));
 	}
