@@ -36,7 +36,10 @@ static double within(const quern_param *row, double x) {
 	return x;
 }
 
-static bool needs_a_value(const quern_param *row) { return row->flags & QUERN_REQUIRED; }
+/* Nobody publishes anything here. */
+static bool needs_a_value(const quern_param *row) {
+	return row->flags & QUERN_REQUIRED || (row->from && !(row->flags & QUERN_MAYBE));
+}
 
 static double usual(const check *c, uint32_t dim, const quern_param *row) {
 	if (needs_a_value(row) || row->from || row->flags & QUERN_MAYBE)

@@ -253,12 +253,11 @@ int quern_command_run(int argc, char **argv) {
 	signal(SIGTERM, on_signal);
 	quern_scene *scene = quern_scene_read(o.scene, o.sets.at, &quern_host_table);
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, (uint32_t)o.threads);
-	quern_report_print(scene->report, stderr);
+	const size_t faults = quern_report_print(scene->report, stderr);
 	session s = { .run = run, .start = quern_wall(), .saved = quern_wall() };
 	double until;
 	if (!run || quern_report_errors(scene->report)) {
-		fprintf(stderr, "quern: %zu fault%s in %s\n", quern_report_errors(scene->report),
-			quern_report_errors(scene->report) == 1 ? "" : "s", o.scene);
+		fprintf(stderr, "quern: %zu fault%s in %s\n", faults, faults == 1 ? "" : "s", o.scene);
 		status = QUERN_EXIT_SCENE;
 	} else if (!parse_until(&o, run, &until)) status = QUERN_EXIT_USAGE;
 	else {

@@ -351,12 +351,13 @@ static void missing(const quern_reading *r, const char *owner, const quern_param
 	const char *doc = row->doc ? row->doc : "";
 	const size_t n = strlen(doc);
 	const bool stop = n && doc[n - 1] == '.', unit = row->unit && strcmp(row->unit, "1") != 0;
-	quern_report_add(r->report, mark, "%s: '%s' is missing: %.*s%s%s%s%s%s", owner, row->name,
-		(int)(n - stop), doc, unit ? " [" : "", unit ? row->unit : "", unit ? "]" : "",
-		row->from ? "; nothing in this scene gives " : "", row->from ? row->from : "");
+	/* whoever would give it may have stopped at a fault of its own */
+	(row->from ? quern_report_follow : quern_report_add)(r->report, mark,
+		"%s: '%s' is missing: %.*s%s%s%s%s%s", owner, row->name, (int)(n - stop), doc, unit ? " [" : "",
+		unit ? row->unit : "", unit ? "]" : "", row->from ? "; nothing in this scene gives " : "",
+		row->from ? row->from : "");
 }
 
-/* The value of a row that the scene leaves out; false if it must not. */
 /* The value of a row that the scene leaves out; false if it must not be. */
 static bool left_out(const quern_reading *r, const quern_param *row, void *member) {
 	set_default(r, row, member);
@@ -367,7 +368,8 @@ static bool left_out(const quern_reading *r, const quern_param *row, void *membe
 				return true;
 			}
 	}
-	return !(row->flags & QUERN_REQUIRED);
+	const bool nowhere = row->from && !(row->flags & QUERN_MAYBE) && quern_param_default(row, r->dim) == 0;
+	return !(row->flags & QUERN_REQUIRED) && !nowhere;
 }
 
 void quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,

@@ -86,11 +86,12 @@ enum {
 
 /* One row feeds the scene reader, `describe`, the JSON Schema, the resolved scene and the fuzzer. */
 typedef struct quern_param {
-	const char *name;               /* scene key; a dot opens a map: "radius.mean" */
-	const char *unit, *doc;         /* SI: "Pa", "kg/m^3", "1" */
-	const char *const *choices;     /* NULL-terminated, or NULL */
-	const char *text;               /* default of a T_TEXT */
-	const char *from;               /* default taken from this published quantity, see publish() */
+	const char *name;           /* scene key; a dot opens a map: "radius.mean" */
+	const char *unit, *doc;     /* SI: "Pa", "kg/m^3", "1" */
+	const char *const *choices; /* NULL-terminated, or NULL */
+	const char *text;           /* default of a T_TEXT */
+	const char *from; /* default taken from this published quantity, see publish(); where nobody publishes it,
+	                     `def` if that is not 0, else the scene must give the value, or may leave out a MAYBE */
 	const struct quern_param *rows; /* T_LIST: the rows of one item */
 	quern_real def, planar;
 	quern_real min, max;        /* inclusive unless *_OPEN; min == max: unbounded */
