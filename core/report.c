@@ -4,10 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+typedef enum { FAULT, FOLLOWS, WARNING } severity;
+
 typedef struct {
 	quern_mark mark;
 	char *text;
-	enum { FAULT, FOLLOWS, WARNING } sort;
+	severity severity;
 	size_t order;
 } entry;
 
@@ -25,14 +27,14 @@ void quern_report_destroy(quern_report *report) {
 	free(report);
 }
 
-static void add(quern_report *report, quern_mark mark, int sort, const char *fmt, va_list list) {
+static void add(quern_report *report, quern_mark mark, severity kind, const char *fmt, va_list list) {
 	quern_text text = { 0 };
 	quern_text_addv(&text, fmt, list);
 	report->entries = quern_grow(report->entries, report->n, &report->capacity, sizeof(entry));
-	report->entries[report->n] = (entry) { mark, text.data ? text.data : quern_copy(""), sort, report->n };
+	report->entries[report->n] = (entry) { mark, text.data ? text.data : quern_copy(""), kind, report->n };
 	report->n++;
-	report->errors += sort != WARNING;
-	report->follow += sort == FOLLOWS;
+	report->errors += kind != WARNING;
+	report->follow += kind == FOLLOWS;
 }
 
 void quern_report_addv(quern_report *report, quern_mark mark, const char *fmt, va_list list) {
@@ -111,16 +113,16 @@ size_t quern_report_print(const quern_report *report, FILE *out) {
 	qsort(sorted, report->n, sizeof(entry), by_place);
 	for (size_t i = 0; i < report->n; i++) {
 		const entry *e = &sorted[i];
-		if (e->sort == FOLLOWS && report->errors > report->follow) continue;
+		if (e->severity == FOLLOWS && report->errors > report->follow) continue;
 		if (i && e->mark.line == e[-1].mark.line && e->mark.column == e[-1].mark.column &&
 			!strcmp(e->text, e[-1].text))
 			continue; /* an alias repeats its anchor's faults */
 		if (e->mark.file) fprintf(out, "%s:", e->mark.file);
 		if (e->mark.line) fprintf(out, "%zu:%zu:", e->mark.line, e->mark.column);
-		fprintf(
-			out, "%s%s: %s\n", e->mark.file ? " " : "", e->sort == WARNING ? "warning" : "error", e->text);
+		fprintf(out, "%s%s: %s\n", e->mark.file ? " " : "", e->severity == WARNING ? "warning" : "error",
+			e->text);
 		show_line(&file, e->mark, out);
-		faults += e->sort != WARNING;
+		faults += e->severity != WARNING;
 	}
 	if (file.file) fclose(file.file);
 	free(file.line);
