@@ -14,12 +14,12 @@ static const char *const type_names[] = { "", "number", "whole number", "true or
 	"list" };
 
 static const quern_plugin_file *load(quern_loader *loader, const char *id, quern_report *report) {
-	const char *dot = strchr(id, '.');
+	const char *name = quern_id_name(id);
 	char *kind = quern_copy(id);
-	if (dot) kind[dot - id] = 0;
-	const uint32_t k = dot ? quern_kind_of(kind) : 0;
+	kind[strcspn(kind, ".")] = 0;
 	const quern_plugin_file *f = NULL;
-	if (k) f = quern_loader_find(loader, (quern_kind)k, dot + 1, report, (quern_mark) { 0 });
+	if (name)
+		f = quern_loader_find(loader, (quern_kind)quern_kind_of(kind), name, report, (quern_mark) { 0 });
 	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id such as contact.linear", id);
 	free(kind);
 	return f;
@@ -35,8 +35,10 @@ int quern_command_list(int argc, char **argv) {
 	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
+	quern_loader_beware(loader);
 	char **ids = quern_loader_ids(loader);
 	json_t *list = json_array();
+	quern_loader_report_strays(loader, report);
 	for (size_t i = 0; ids[i]; i++) {
 		const quern_plugin_file *f = load(loader, ids[i], report);
 		if (!f) continue;
@@ -179,7 +181,7 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 	size_t n = 0;
 	quern_text all = { 0 };
 	for (size_t i = 0; ids[i]; i++)
-		if (!strcmp(strchr(ids[i], '.') + 1, name)) quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
+		if (!strcmp(quern_id_name(ids[i]), name)) quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
 	if (n == 1) found = load(loader, quern_text_string(&all), report);
 	else if (n)
 		quern_report_add(
@@ -202,6 +204,7 @@ int quern_command_describe(int argc, char **argv) {
 	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
+	quern_loader_beware(loader);
 	const quern_plugin_file *f = find(loader, words.at[0], report);
 	if (f && json) {
 		json_t *root = plugin_json(f);

@@ -18,8 +18,12 @@
  * Units.    SI. A 2-D scene is a slab one metre thick: kg, N, Pa and kg/m^3 mean the same in both
  *           dimensions. 2-D vectors have two components, axial ones (spin, torque, slip) one.
  * Growth.   Structs grow at the end only. What a plugin fills carries its size (or a stride in
- *           quern_library); what the host fills needs none, since a host refuses a plugin whose minor
- *           version is newer than its own. A breaking change renames the exported symbol. */
+ *           quern_library), and the host takes an older, shorter one: what it does not know is zero. Sets,
+ *           slots, stages and outputs carry none yet, so they cannot grow. What the host fills needs none,
+ *           since a host refuses a plugin whose minor version is newer than its own. A breaking change
+ *           renames the exported symbol.
+ * Looks.    The host looks at all tables when it loads a plugin, and refuses by one sentence what cannot be
+ *           true: rows without an end, members outside the instance, a function missing for a dimension. */
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
