@@ -4,6 +4,7 @@
 #include "options.h"
 #include "run.h"
 #include "text.h"
+#include "watch.h"
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -185,6 +186,7 @@ int quern_command_plan(int argc, char **argv) {
 	int status = quern_options_read("plan", options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return free(sets.at), status;
 	status = QUERN_EXIT_DONE;
+	quern_watch_begin();
 	quern_scene *scene = quern_scene_read(words.at[0], sets.at, &quern_host_table);
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, 0);
 	quern_report_print(scene->report, stderr);

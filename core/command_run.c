@@ -8,8 +8,10 @@
 #include "sidecar.h"
 #include "summary.h"
 #include "text.h"
+#include "watch.h"
 #include <errno.h>
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -25,7 +27,7 @@ typedef struct {
 	quern_run *run;
 	quern_series series;
 	double start, saved; /* on the clock */
-	int64_t progress_step;
+	int64_t saved_step;  /* of the last checkpoint; -1: none */
 } session;
 
 static volatile sig_atomic_t interrupted;
@@ -112,10 +114,24 @@ static void progress(session *s, bool settling) {
 	}
 }
 
+/* For the sentence about a plugin that ends the program between here and the next frame or checkpoint. */
+static void tell_what_stays(const session *s) {
+	const quern_run *run = s->run;
+	char checkpoint[96] = "no checkpoint";
+	if (s->saved_step >= 0)
+		snprintf(checkpoint, sizeof checkpoint, "a checkpoint of step %lld, from which --resume goes on",
+			(long long)s->saved_step);
+	quern_watch_keep("%s keeps %lld frame%s and %s", run->folder, (long long)run->clock.frame + 1,
+		run->clock.frame ? "s" : "", checkpoint);
+}
+
 static quern_status checkpoint(session *s) {
 	s->run->wall_before += quern_wall() - s->start;
 	s->start = s->saved = quern_wall();
-	return quern_checkpoint_write(s->run, s->series.rows);
+	const quern_status status = quern_checkpoint_write(s->run, s->series.rows);
+	if (status == QUERN_OK) s->saved_step = s->run->clock.step;
+	tell_what_stays(s);
+	return status;
 }
 
 static bool due(const session *s) {
@@ -145,7 +161,9 @@ static quern_status output(session *s) {
 	run->clock.frame++;
 	run->clock.at = run->clock.steps_in = 0;
 	if (quern_series_add(&s->series, run) != QUERN_OK) return run->status;
-	return quern_frame_write(run, run->clock.frame);
+	const quern_status status = quern_frame_write(run, run->clock.frame);
+	tell_what_stays(s);
+	return status;
 }
 
 static quern_status step_on(session *s, int64_t last) {
@@ -231,6 +249,8 @@ static int drive(session *s, const options *o, double until) {
 		quern_run_complain(run, stderr);
 		return exit_status(run);
 	}
+	if (again) s->saved_step = run->clock.step;
+	tell_what_stays(s);
 	if (!again && quern_run_setup(run) == QUERN_OK) run->mass_initial = quern_run_account(run).mass;
 	if (run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s, last_frame(run, until));
 	return finish(s);
@@ -251,10 +271,11 @@ int quern_command_run(int argc, char **argv) {
 	if (status != QUERN_OPTIONS_READ) return free(o.sets.at), status;
 	signal(SIGINT, on_signal);
 	signal(SIGTERM, on_signal);
+	quern_watch_begin();
 	quern_scene *scene = quern_scene_read(o.scene, o.sets.at, &quern_host_table);
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, (uint32_t)o.threads);
 	const size_t faults = quern_report_print(scene->report, stderr);
-	session s = { .run = run, .start = quern_wall(), .saved = quern_wall() };
+	session s = { .run = run, .saved_step = -1, .start = quern_wall(), .saved = quern_wall() };
 	double until;
 	if (!run || quern_report_errors(scene->report)) {
 		fprintf(stderr, "quern: %zu fault%s in %s\n", faults, faults == 1 ? "" : "s", o.scene);

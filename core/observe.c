@@ -1,5 +1,6 @@
 #include "observe.h"
 #include "text.h"
+#include "watch.h"
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -202,7 +203,9 @@ quern_status quern_series_add(quern_series *s, quern_run *run) {
 	note(&s->column[c++], quern_host_table.set(run, "point").n);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
 		double out[MOST_OUTPUTS] = { 0 };
+		quern_watch_enter(run->plan->observers[e]->bound->id, ops_of(run, e)->map ? "map" : "whole");
 		const quern_status status = ask(run, e, out);
+		quern_watch_leave();
 		if (status != QUERN_OK)
 			return quern_run_stop(run, status, "%s failed", run->plan->observers[e]->bound->id);
 		for (uint32_t k = 0; k < outputs_of(ops_of(run, e)); k++) note(&s->column[c++], out[k]);

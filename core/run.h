@@ -3,7 +3,6 @@
 #include "grid.h"
 #include "log.h"
 #include "plan.h"
-#include <signal.h>
 
 /* Time is counted in whole numbers: interval i runs from frame i to frame i + 1 in `steps_in` equal steps. */
 typedef struct quern_clock {
@@ -39,7 +38,6 @@ struct quern_run {
 	quern_mark fault;                /* where in the scene the reason stands; no file: nowhere */
 	double wall_before, settle_wall; /* s on the clock spent before a resume; in settling */
 	double mass_initial;
-	volatile sig_atomic_t *interrupted;
 	char limit_reason[200]; /* what sets the step */
 };
 

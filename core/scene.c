@@ -1,6 +1,7 @@
 #include "scene.h"
 #include "section.h"
 #include "text.h"
+#include "watch.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -283,6 +284,7 @@ static quern_scene *create(const quern_host *host) {
 	s->report = quern_report_create();
 	s->units = quern_units_create();
 	s->loader = quern_loader_create();
+	quern_watch_know(s->loader);
 	return s;
 }
 
@@ -323,6 +325,7 @@ void quern_scene_destroy(quern_scene *s) {
 	free(s->field_marks);
 	free(s->published);
 	quern_tree_destroy(s->tree);
+	quern_watch_know(NULL);
 	quern_loader_destroy(s->loader);
 	quern_units_destroy(s->units);
 	quern_report_destroy(s->report);
