@@ -113,6 +113,17 @@ bool quern_quantity_read(
 	return false;
 }
 
+int quern_units_mass(quern_units *units, const char *unit) {
+	ut_system *system = load(units);
+	ut_unit *u = system ? parse(system, unit) : NULL;
+	char text[128] = ""; /* in base units: "0.001 m-3.kg" */
+	if (u && ut_format(u, text, sizeof text, UT_ASCII | UT_DEFINITION) < 0) *text = 0;
+	ut_free(u);
+	const char *kg = strstr(text, "kg");
+	if (!kg) return 0;
+	return kg[2] == '-' || isdigit((unsigned char)kg[2]) ? (int)strtol(kg + 2, NULL, 10) : 1;
+}
+
 bool quern_units_equal(quern_units *units, const char *a, const char *b) {
 	if (!strcmp(a, b)) return true;
 	ut_system *system = load(units);

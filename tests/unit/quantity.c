@@ -76,8 +76,19 @@ static void equal_units(void **state) {
 	assert_false(quern_units_equal(*state, "nonsense", "m"));
 }
 
+static void masses(void **state) {
+	static const struct {
+		const char *unit;
+		int power;
+	} cases[] = { { "1", 0 }, { "m/s", 0 }, { "kg", 1 }, { "g", 1 }, { "N/m", 1 }, { "kg/m^3", 1 },
+		{ "J/kg", 0 }, { "1/Pa", -1 }, { "kg2", 2 }, { "deg", 0 }, { "nonsense", 0 } };
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+		if (quern_units_mass(*state, cases[i].unit) != cases[i].power)
+			fail_msg("%s has kg^%d", cases[i].unit, quern_units_mass(*state, cases[i].unit));
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(reads), cmocka_unit_test(refuses),
-		cmocka_unit_test(long_text), cmocka_unit_test(equal_units) };
+		cmocka_unit_test(long_text), cmocka_unit_test(equal_units), cmocka_unit_test(masses) };
 	return cmocka_run_group_tests(tests, open_units, close_units);
 }
