@@ -3,10 +3,12 @@
 #include "command.h"
 #include "config.h"
 #include "frame.h"
+#include "options.h"
 #include "run_folder.h"
 #include "sidecar.h"
 #include "summary.h"
 #include "text.h"
+#include "watch.h"
 #include <errno.h>
 #include <math.h>
 #include <signal.h>
@@ -16,9 +18,8 @@
 
 typedef struct {
 	const char *scene, *out, *until;
-	const char **sets;
-	size_t n_sets, capacity;
-	uint32_t threads;
+	quern_texts sets;
+	int64_t threads;
 	bool resume, force, quiet;
 } options;
 
@@ -29,6 +30,7 @@ typedef struct {
 	double start, saved; /* on the clock */
 	double until;        /* s; negative: to the end */
 	bool begun;          /* the folder is this run's: what happens is noted there */
+	int64_t saved_step;  /* of the last checkpoint; -1: none */
 } session;
 
 /* ---- signals ---- */
@@ -55,42 +57,19 @@ static void catch_signals(void) {
 
 /* ---- the command line ---- */
 
-static bool take_value(int argc, char **argv, int *i, const char *name, const char **value) {
-	const size_t n = strlen(name);
-	if (strncmp(argv[*i], name, n) != 0) return false;
-	if (argv[*i][n] == '=') return *value = argv[*i] + n + 1, true;
-	if (argv[*i][n]) return false;
-	*value = *i + 1 < argc ? argv[++*i] : NULL;
-	return true;
-}
-
 static int parse(options *o, int argc, char **argv) {
-	for (int i = 1; i < argc; i++) {
-		const char *value = NULL;
-		if (take_value(argc, argv, &i, "--set", &value)) {
-			if (!value) return quern_usage("run", "--set needs path.to.key=value");
-			o->sets = quern_grow(o->sets, o->n_sets + 1, &o->capacity, sizeof(char *));
-			o->sets[o->n_sets++] = value;
-		} else if (take_value(argc, argv, &i, "--threads", &value)) {
-			char *end;
-			const long n = value ? strtol(value, &end, 10) : 0;
-			if (!value || *end || n < 1 || n > 256)
-				return quern_usage("run", "--threads needs a number from 1 to 256");
-			o->threads = (uint32_t)n;
-		} else if (take_value(argc, argv, &i, "--until", &value)) {
-			if (!value) return quern_usage("run", "--until needs a time");
-			o->until = value;
-		} else if (!strcmp(argv[i], "-o")) {
-			if (i + 1 == argc || !*argv[i + 1]) return quern_usage("run", "-o needs a folder");
-			o->out = argv[++i];
-		} else if (!strcmp(argv[i], "--resume")) o->resume = true;
-		else if (!strcmp(argv[i], "--force")) o->force = true;
-		else if (!strcmp(argv[i], "--quiet")) o->quiet = true;
-		else if (argv[i][0] == '-') return quern_usage("run", "unknown option '%s'", argv[i]);
-		else if (o->scene) return quern_usage("run", "one scene at a time: '%s' is a second one", argv[i]);
-		else o->scene = argv[i];
-	}
-	return o->scene ? QUERN_EXIT_DONE : quern_usage("run", "a scene is missing");
+	quern_words words = { .missing = "a scene is missing", .least = 1, .most = 1 };
+	const quern_option known[] = { QUERN_TEXT(&o->out, 'o', "output", "DIR",
+									   "the folder of the run; default: out/NAME"),
+		QUERN_TEXTS(&o->sets, "set", "PATH=VALUE", "a key of the scene; may stand several times"),
+		QUERN_NUMBER(&o->threads, "threads", 1, 256, "how many work; results do not depend on it"),
+		QUERN_FLAG(&o->resume, "resume", "go on from the checkpoint"),
+		QUERN_FLAG(&o->force, "force", "replace the run in the folder; with --resume, take other plugins"),
+		QUERN_TEXT(&o->until, 0, "until", "TIME", "stop at the first step at or after this time"),
+		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"), QUERN_END_OPTIONS };
+	const int status = quern_options_read("run", known, &words, argc, argv);
+	o->scene = words.at[0];
+	return status;
 }
 
 /* ---- the folder ---- */
@@ -122,12 +101,26 @@ static void progress(session *s, bool settling) {
 	}
 }
 
+/* For the sentence about a plugin that ends the program between here and the next frame or checkpoint. */
+static void tell_what_stays(const session *s) {
+	const quern_run *run = s->run;
+	char checkpoint[96] = "no checkpoint";
+	if (s->saved_step >= 0)
+		snprintf(checkpoint, sizeof checkpoint, "a checkpoint of step %lld, from which --resume goes on",
+			(long long)s->saved_step);
+	quern_watch_keep("%s keeps %lld frame%s and %s", run->folder, (long long)run->clock.frame + 1,
+		run->clock.frame ? "s" : "", checkpoint);
+}
+
 static quern_status checkpoint(session *s) {
 	s->run->wall_before += quern_wall() - s->start;
 	s->start = s->saved = quern_wall();
 	/* rows that a checkpoint counts must be there after a power cut too */
 	if (quern_series_flush(&s->series, s->run) != QUERN_OK) return s->run->status;
-	return quern_checkpoint_write(s->run, s->series.rows);
+	const quern_status status = quern_checkpoint_write(s->run, s->series.rows);
+	if (status == QUERN_OK) s->saved_step = s->run->clock.step;
+	tell_what_stays(s);
+	return status;
 }
 
 static bool due(const session *s) {
@@ -164,6 +157,7 @@ static quern_status output(session *s) {
 	if (quern_series_add(&s->series, run) != QUERN_OK || quern_run_check_account(run) != QUERN_OK ||
 		quern_frame_write(run, run->clock.frame) != QUERN_OK)
 		return run->status;
+	tell_what_stays(s);
 	return check_log(run);
 }
 
@@ -285,6 +279,7 @@ static quern_status go_on(session *s, const options *o, const char *path) {
 			quern_run_time(run), s->until);
 	else if (quern_series_init(&s->series, run, rows) == QUERN_OK) {
 		note_changes(run, said.data);
+		s->saved_step = run->clock.step;
 		quern_run_folder_trim(&s->folder, run->clock.frame + 1);
 		take_over(s, true);
 	}
@@ -316,6 +311,7 @@ static int drive(session *s, const options *o) {
 		free(path);
 	}
 	quern_text_finish(&why);
+	if (s->begun) tell_what_stays(s);
 	if (s->begun && run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s);
 	return finish(s);
 }
@@ -324,23 +320,26 @@ static bool parse_until(const options *o, quern_run *run, double *until) {
 	char why[160];
 	*until = -1;
 	if (!o->until) return true;
-	if (quern_quantity_read(run->scene->units, o->until, "s", until, why) && *until >= 0) return true;
-	quern_usage("run", "--until: %s", *until < 0 ? "must not be negative" : why);
+	const bool good = quern_quantity_read(run->scene->units, o->until, "s", until, why);
+	if (good && !signbit(*until)) return true;
+	quern_usage("run", "--until: %s", good ? "must not be negative" : why);
 	return false;
 }
 
 int quern_command_run(int argc, char **argv) {
 	options o = { 0 };
 	int status = parse(&o, argc, argv);
-	if (status != QUERN_EXIT_DONE) return free(o.sets), status;
+	if (status != QUERN_OPTIONS_READ) return free(o.sets.at), status;
 	catch_signals();
-	quern_scene *scene = quern_scene_read(o.scene, o.sets, &quern_host_table);
-	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, o.threads);
-	quern_report_print(scene->report, stderr);
-	session s = { .run = run, .folder = { .lock = -1 }, .start = quern_wall(), .saved = quern_wall() };
+	quern_watch_begin();
+	quern_scene *scene = quern_scene_read(o.scene, o.sets.at, &quern_host_table);
+	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, (uint32_t)o.threads);
+	const size_t faults = quern_report_print(scene->report, stderr);
+	session s = {
+		.run = run, .folder = { .lock = -1 }, .saved_step = -1, .start = quern_wall(), .saved = quern_wall()
+	};
 	if (!run || quern_report_errors(scene->report)) {
-		fprintf(stderr, "quern: %zu fault%s in %s\n", quern_report_errors(scene->report),
-			quern_report_errors(scene->report) == 1 ? "" : "s", o.scene);
+		fprintf(stderr, "quern: %zu fault%s in %s\n", faults, faults == 1 ? "" : "s", o.scene);
 		status = QUERN_EXIT_SCENE;
 	} else if (!parse_until(&o, run, &s.until)) status = QUERN_EXIT_USAGE;
 	else {
@@ -354,6 +353,6 @@ int quern_command_run(int argc, char **argv) {
 	if (run) quern_sidecars_destroy(run->sidecars);
 	if (run) quern_run_destroy(run);
 	else quern_scene_destroy(scene);
-	free(o.sets);
+	free(o.sets.at);
 	return status;
 }

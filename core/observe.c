@@ -1,5 +1,6 @@
 #include "observe.h"
 #include "text.h"
+#include "watch.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -277,7 +278,9 @@ quern_status quern_series_add(quern_series *s, quern_run *run) {
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
 		const uint32_t n = outputs_of(ops_of(run, e));
 		double *out = calloc(n + 1u, sizeof *out);
+		quern_watch_enter(run->plan->observers[e]->bound->id, ops_of(run, e)->map ? "map" : "whole");
 		quern_status status = out ? ask(run, e, out) : QUERN_E_MEMORY;
+		quern_watch_leave();
 		if (status == QUERN_OK) status = take_answers(s, run, e, c, out);
 		free(out);
 		c += n;

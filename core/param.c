@@ -22,10 +22,7 @@ static bool is_prefix(const char *prefix, const char *name) {
 
 /* One part of a path: a key of a map, or the number of a list's item. */
 static const quern_entry *step_into(const quern_node *node, const char *part) {
-	if (node->kind != QUERN_NODE_LIST) return quern_node_entry(node, part);
-	char *end;
-	const unsigned long k = strtoul(part, &end, 10);
-	return *part && !*end && k < node->n ? &node->entries[k] : NULL;
+	return node->kind == QUERN_NODE_LIST ? quern_node_item(node, part) : quern_node_entry(node, part);
 }
 
 /* The entry of a dotted name, or NULL; `mark` (NULL: not wanted) becomes that of the last part that is there. */
@@ -177,6 +174,14 @@ void quern_params_check(const quern_reading *r, const char *owner, const quern_p
 	check_keys(r, owner, rows, map, "", also);
 }
 
+/* What stands in quotes is text; only a quantity with its unit is text all the same. */
+static bool is_quoted_number(const quern_node *node) {
+	char *end;
+	if (!node->quoted || !*node->text) return false;
+	strtod(node->text, &end);
+	return end != node->text && !end[strspn(end, " \t")];
+}
+
 static bool read_number(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, double *value) {
 	char why[160], range[96], say[64];
@@ -187,6 +192,11 @@ static bool read_number(const quern_reading *r, const char *owner, const quern_p
 	}
 	if (!quern_quantity_read(r->units, node->text, row->unit ? row->unit : "1", value, why)) {
 		quern_report_add(r->report, node->mark, "%s: %s: %s", owner, row->name, why);
+		return false;
+	}
+	if (is_quoted_number(node)) {
+		quern_report_add(r->report, node->mark, "%s: %s: \"%s\" in quotes is a text, not a number", owner,
+			row->name, node->text);
 		return false;
 	}
 	if (in_range(row, *value)) return true;
@@ -229,10 +239,7 @@ static void read_int(const quern_reading *r, const char *owner, const quern_para
 static void read_bool(
 	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node, bool *member) {
 	char say[64];
-	const char *t = node->kind == QUERN_NODE_SCALAR && !node->quoted ? node->text : "";
-	if (!strcmp(t, "true") || !strcmp(t, "yes") || !strcmp(t, "on")) *member = true;
-	else if (!strcmp(t, "false") || !strcmp(t, "no") || !strcmp(t, "off")) *member = false;
-	else
+	if (!quern_node_bool(node, member))
 		quern_report_add(r->report, node->mark, "%s: %s is %s, must be true or false", owner, row->name,
 			quern_node_say(node, say));
 }
@@ -266,9 +273,9 @@ static const char *read_text(
 	if (access(path, R_OK) || stat(path, &is))
 		quern_report_add(
 			r->report, node->mark, "%s: %s: cannot read '%s': %s", owner, row->name, path, strerror(errno));
-	else if (S_ISDIR(is.st_mode))
-		quern_report_add(
-			r->report, node->mark, "%s: %s: '%s' is a folder; a file is wanted", owner, row->name, path);
+	else if (!S_ISREG(is.st_mode))
+		quern_report_add(r->report, node->mark, "%s: %s: '%s' is %s; a file is wanted", owner, row->name,
+			path, S_ISDIR(is.st_mode) ? "a folder" : "no regular file");
 	const char *kept = quern_tree_keep(r->tree, path);
 	free(path);
 	return kept;
@@ -348,9 +355,11 @@ static void missing(const quern_reading *r, const char *owner, const quern_param
 	const char *doc = row->doc ? row->doc : "";
 	const size_t n = strlen(doc);
 	const bool stop = n && doc[n - 1] == '.', unit = row->unit && strcmp(row->unit, "1") != 0;
-	quern_report_add(r->report, mark, "%s: '%s' is missing: %.*s%s%s%s%s%s", owner, row->name,
-		(int)(n - stop), doc, unit ? " [" : "", unit ? row->unit : "", unit ? "]" : "",
-		row->from ? "; nothing in this scene gives " : "", row->from ? row->from : "");
+	/* whoever would give it may have stopped at a fault of its own */
+	(row->from ? quern_report_follow : quern_report_add)(r->report, mark,
+		"%s: '%s' is missing: %.*s%s%s%s%s%s", owner, row->name, (int)(n - stop), doc, unit ? " [" : "",
+		unit ? row->unit : "", unit ? "]" : "", row->from ? "; nothing in this scene gives " : "",
+		row->from ? row->from : "");
 }
 
 /* The value of a row that the scene leaves out; false if it must not be. */
@@ -363,7 +372,8 @@ static bool left_out(const quern_reading *r, const quern_param *row, void *membe
 				return true;
 			}
 	}
-	return !(row->flags & QUERN_REQUIRED);
+	const bool nowhere = row->from && !(row->flags & QUERN_MAYBE) && quern_param_default(row, r->dim) == 0;
+	return !(row->flags & QUERN_REQUIRED) && !nowhere;
 }
 
 void quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,

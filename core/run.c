@@ -1,5 +1,7 @@
 #include "run.h"
 #include "identity.h"
+#include "text.h"
+#include "watch.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -175,7 +177,10 @@ uint32_t quern_run_substeps(const quern_run *run) {
 	uint32_t n = 1;
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
-		if (s->ops->substeps) n = s->ops->substeps(s->solver->self);
+		if (!s->ops->substeps) continue;
+		quern_watch_enter(s->solver->file->plugin.id, "substeps");
+		n = s->ops->substeps(s->solver->self);
+		quern_watch_leave();
 	}
 	return n;
 }
@@ -218,6 +223,13 @@ static bool steps_grains(const quern_run *run, const quern_section *section) {
 	return false;
 }
 
+static double limit_of(const quern_section *s, const quern_step *step, double *hard, char why[160]) {
+	quern_watch_enter(s->solver->file->plugin.id, "limit");
+	const double limit = s->ops->limit(s->solver->self, step, hard, why);
+	quern_watch_leave();
+	return limit;
+}
+
 double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard_reason[200]) {
 	double least = INFINITY, least_hard = INFINITY;
 	const uint32_t n = quern_run_substeps(run);
@@ -230,7 +242,7 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 		const uint32_t times = steps_grains(run, s) ? n : 1;
 		char why[160] = "";
 		double beyond = INFINITY;
-		const double limit = times * s->ops->limit(s->solver->self, &step, &beyond, why);
+		const double limit = times * limit_of(s, &step, &beyond, why);
 		char factor[32] = "";
 		if (times > 1) snprintf(factor, sizeof factor, "%u times ", times);
 		if (limit < least) least = limit, snprintf(reason, 200, "%s%s", factor, why);
@@ -302,7 +314,9 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 	step.dt = dt;
 	step.use = stage->column;
 	run->stage = stage;
+	quern_watch_enter(stage->section->solver->file->plugin.id, stage->name);
 	quern_status status = stage->stage->run(stage->section->solver->self, &step);
+	quern_watch_leave();
 	arena_reset(&run->arena);
 	if (status == QUERN_OK) status = run->status;
 	else quern_run_stop(run, status, status == QUERN_E_MEMORY ? "out of memory" : "failed");
@@ -339,8 +353,7 @@ bool quern_run_settle(quern_run *run) {
 			const quern_section *s = &run->scene->sections[i];
 			const quern_step step = quern_run_record(run, s);
 			char why[160];
-			if (steps_grains(run, s) && s->ops->limit)
-				c->settle_dt = s->ops->limit(s->solver->self, &step, &hard, why);
+			if (steps_grains(run, s) && s->ops->limit) c->settle_dt = limit_of(s, &step, &hard, why);
 		}
 		if (!isfinite(c->settle_dt)) c->settle_dt = 0;
 	}
@@ -348,7 +361,9 @@ bool quern_run_settle(quern_run *run) {
 		const quern_section *s = &run->scene->sections[i];
 		if (!s->ops->settled) continue;
 		const quern_step step = quern_run_record(run, s);
+		quern_watch_enter(s->solver->file->plugin.id, "settled");
 		rest = s->ops->settled(s->solver->self, &step) && rest;
+		quern_watch_leave();
 	}
 	if (rest || run->status != QUERN_OK) {
 		c->settled = 1;
@@ -387,7 +402,10 @@ quern_account quern_run_account(quern_run *run) {
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
 		const quern_step step = quern_run_record(run, s);
-		if (s->ops->account) s->ops->account(s->solver->self, &step, &account);
+		if (!s->ops->account) continue;
+		quern_watch_enter(s->solver->file->plugin.id, "account");
+		s->ops->account(s->solver->self, &step, &account);
+		quern_watch_leave();
 	}
 	return account;
 }

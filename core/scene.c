@@ -1,6 +1,7 @@
 #include "scene.h"
 #include "section.h"
 #include "text.h"
+#include "watch.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -129,9 +130,7 @@ static void read_periodic(quern_scene *s, const quern_node *domain) {
 	}
 	for (size_t k = 0; k < node->n; k++) {
 		const quern_node *value = node->entries[k].value;
-		const char *t = value->kind == QUERN_NODE_SCALAR ? value->text : "";
-		s->general.periodic[k] = !strcmp(t, "true");
-		if (strcmp(t, "true") != 0 && strcmp(t, "false") != 0)
+		if (!quern_node_bool(value, &s->general.periodic[k]))
 			quern_report_add(s->report, value->mark, "scene: domain.periodic is %s, must be true or false",
 				quern_node_say(value, say));
 	}
@@ -340,6 +339,7 @@ static quern_scene *create(const quern_host *host) {
 	s->report = quern_report_create();
 	s->units = quern_units_create();
 	s->loader = quern_loader_create();
+	quern_watch_know(s->loader);
 	return s;
 }
 
@@ -380,6 +380,7 @@ void quern_scene_destroy(quern_scene *s) {
 	free(s->field_marks);
 	free(s->published);
 	quern_tree_destroy(s->tree);
+	quern_watch_know(NULL);
 	quern_loader_destroy(s->loader);
 	quern_units_destroy(s->units);
 	quern_report_destroy(s->report);

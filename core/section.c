@@ -1,5 +1,7 @@
 #include "section.h"
+#include "environment.h"
 #include "text.h"
+#include "watch.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,13 +36,26 @@ static void instance_read(quern_scene *s, quern_instance *it, const char *const 
 	quern_params_read(&r, it->file->plugin.id, it->file->params, it->map, it->mark, also, it->self);
 }
 
+static quern_status call_init(quern_scene *s, quern_instance *it) {
+	quern_err err = { s->report, it->map, it->mark, it->file->plugin.id };
+	const quern_setup setup = quern_scene_setup(s, it->path);
+	quern_environment before = quern_environment_take();
+	quern_watch_enter(it->file->plugin.id, "init");
+	const quern_status status = it->file->plugin.init(it->self, &setup, &err);
+	quern_watch_leave();
+	const char *changed = quern_environment_restore(&before);
+	quern_environment_drop(&before);
+	if (!changed) return status;
+	it->ready = status == QUERN_OK;
+	return quern_scene_fail(
+		&err, QUERN_E_PARAM, NULL, "init changes %s for the whole program: let it put that back", changed);
+}
+
 /* A faulty parameter must not reach init, which may rely on the ranges of its rows; nor must a faulty domain. */
 static void instance_init(quern_scene *s, quern_instance *it, size_t errors_before) {
 	if (quern_report_errors(s->report) != errors_before || !s->sound) return;
 	if (it->file->plugin.init) {
-		quern_err err = { s->report, it->map, it->mark, it->file->plugin.id };
-		const quern_setup setup = quern_scene_setup(s, it->path);
-		if (it->file->plugin.init(it->self, &setup, &err) != QUERN_OK) {
+		if (call_init(s, it) != QUERN_OK) {
 			if (quern_report_errors(s->report) == errors_before)
 				quern_report_add(s->report, it->mark, "%s: cannot be set up", it->file->plugin.id);
 			return;
@@ -295,7 +310,7 @@ static void section_ready(quern_scene *s, quern_section *section) {
 			bound[i] = (quern_bound) { .self = f->instance->self,
 				.ops = f->instance->file->plugin.ops,
 				.item = f->item,
-				.uses = f->instance->file->uses,
+				.uses = quern_table_uses_for(&f->instance->file->table, section->solver->file->library),
 				.n_uses = (uint32_t)f->instance->file->n_uses,
 				.id = f->instance->file->plugin.id,
 				.path = use->path,
@@ -308,11 +323,16 @@ static void section_ready(quern_scene *s, quern_section *section) {
 		slots[k] = bound;
 		counts[k] = (uint32_t)use->n;
 	}
-	if (section->ops->ready(section->solver->self, &setup, slots, counts, &err) != QUERN_OK &&
-		!quern_report_errors(s->report))
+	quern_watch_enter(section->solver->file->plugin.id, "ready");
+	const quern_status status = section->ops->ready(section->solver->self, &setup, slots, counts, &err);
+	quern_watch_leave();
+	if (status != QUERN_OK && !quern_report_errors(s->report))
 		quern_report_add(s->report, section->mark, "%s: cannot be set up", section->name);
 	for (size_t k = 0; k < section->n_slots; k++) {
-		for (size_t i = 0; i < counts[k]; i++) free((void *)(uintptr_t)slots[k][i].variant);
+		for (size_t i = 0; i < counts[k]; i++) {
+			free((void *)(uintptr_t)slots[k][i].variant);
+			free((void *)(uintptr_t)slots[k][i].uses);
+		}
 		free((void *)(uintptr_t)slots[k]);
 	}
 	free(slots);
@@ -388,7 +408,11 @@ void quern_slot_finish(quern_slot_use *use) {
 
 void quern_instance_destroy(quern_instance *it) {
 	if (!it) return;
-	if (it->ready && it->file->plugin.finish) it->file->plugin.finish(it->self);
+	if (it->ready && it->file->plugin.finish) {
+		quern_watch_enter(it->file->plugin.id, "finish");
+		it->file->plugin.finish(it->self);
+		quern_watch_leave();
+	}
 	quern_params_finish(it->file->params, it->self);
 	free(it->self);
 	free(it->path);

@@ -18,8 +18,12 @@
  * Units.    SI. A 2-D scene is a slab one metre thick: kg, N, Pa and kg/m^3 mean the same in both
  *           dimensions. 2-D vectors have two components, axial ones (spin, torque, slip) one.
  * Growth.   Structs grow at the end only. What a plugin fills carries its size (or a stride in
- *           quern_library); what the host fills needs none, since a host refuses a plugin whose minor
- *           version is newer than its own. A breaking change renames the exported symbol. */
+ *           quern_library), and the host takes an older, shorter one: what it does not know is zero. Sets,
+ *           slots, stages and outputs carry none yet, so they cannot grow. What the host fills needs none,
+ *           since a host refuses a plugin whose minor version is newer than its own. A breaking change
+ *           renames the exported symbol.
+ * Looks.    The host looks at all tables when it loads a plugin, and refuses by one sentence what cannot be
+ *           true: rows without an end, members outside the instance, a function missing for a dimension. */
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
@@ -86,11 +90,12 @@ enum {
 
 /* One row feeds the scene reader, `describe`, the JSON Schema, the resolved scene and the fuzzer. */
 typedef struct quern_param {
-	const char *name;               /* scene key; a dot opens a map: "radius.mean" */
-	const char *unit, *doc;         /* SI: "Pa", "kg/m^3", "1" */
-	const char *const *choices;     /* NULL-terminated, or NULL */
-	const char *text;               /* default of a T_TEXT */
-	const char *from;               /* default taken from this published quantity, see publish() */
+	const char *name;           /* scene key; a dot opens a map: "radius.mean" */
+	const char *unit, *doc;     /* SI: "Pa", "kg/m^3", "1" */
+	const char *const *choices; /* NULL-terminated, or NULL */
+	const char *text;           /* default of a T_TEXT */
+	const char *from; /* default taken from this published quantity, see publish(); where nobody publishes it,
+	                     `def` if that is not 0, else the scene must give the value, or may leave out a MAYBE */
 	const struct quern_param *rows; /* T_LIST: the rows of one item */
 	quern_real def, planar;
 	quern_real min, max;        /* inclusive unless *_OPEN; min == max: unbounded */

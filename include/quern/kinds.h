@@ -7,6 +7,10 @@
 extern "C" {
 #endif
 
+/* Most rows that the uses of one plugin in a slot may have, whatever its kind; a plugin with more is refused when it is
+ * loaded. Whoever calls plugins sizes its arrays of columns by it. The rows of a solver's stages are the solver's own. */
+enum { QUERN_MOST_USES = 32 };
+
 /* ---- contact: one law, one pair of materials, one dimension per batch ----
  * The first of a pair is the grain of lower id, for ever; against a body it is the grain. Open pairs may be in a
  * batch (overlap <= 0): a law without reach gives them exactly zero force and sets its history to `initial`, by

@@ -161,7 +161,7 @@ def refusals(folder):
                                 ([folder / "h2", "--field", "grain.radius", "-o", folder / "no/a.png"], 4, "written"),
                                 ([folder / "h2", "--field", "grain.radius.y"], 1, "no field"),
                                 ([folder / "h2", "--width", 10], 1, "between 600 and 8000"),
-                                ([folder / "h2", "--colour"], 1, "unknown argument"), ([], 1, "is missing")]:
+                                ([folder / "h2", "--colour"], 1, "unknown option '--colour'"), ([], 1, "is missing")]:
         said = run("render", *words, status=status)
         assert part in said, f"render {words}: {said}"
     print("every fault is refused in one sentence")
