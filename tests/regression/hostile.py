@@ -106,7 +106,7 @@ def try_force(folder, place):
             sentence(done, expected, *where, f"{out} keeps {frames} frames and a checkpoint of step ",
                      "from which --resume goes on")
     compile(source(LINEAR), "contact.linear", folder)
-    quern(folder, "run", scene, "-o", out, "--quiet", "--resume", status=0)
+    quern(folder, "run", scene, "-o", out, "--quiet", "--resume", "--force", status=0)  # another plugin
     print(f"{len(cases)} ends in a kernel leave frames and a checkpoint, and say so")
 
 
