@@ -1,6 +1,6 @@
 #include "checkpoint.h"
 #include "config.h"
-#include "h5.h"
+#include "state.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,118 +34,12 @@ static double *number(quern_run *run, size_t i) {
 	return (double *)(void *)((char *)run + numbers[i].offset);
 }
 
-static hid_t type_of(const quern_field *field) {
-	return field->shape == QUERN_INDEX ? H5T_NATIVE_INT32
-		   : field->shape == QUERN_ID  ? H5T_NATIVE_INT64
-									   : H5T_NATIVE_DOUBLE;
-}
-
-static bool is_column(const quern_store *store, const quern_field *field, int set) {
-	return field->set == set && field->kept && !store->sets[set].rows;
-}
-
-/* Rows are scratch of a step, unless somebody looks at them between two. */
-static bool keeps_rows(const quern_store *store, int set) {
-	for (size_t k = 0; k < store->n_fields && store->sets[set].rows; k++)
-		if (store->fields[k].set == set && store->fields[k].kept) return true;
-	return false;
-}
-
-static void component_name(const quern_field *field, int component, char out[64]) {
-	snprintf(out, 64, "%s.%d", strchr(field->name, '.') + 1, component);
-}
-
-static void close_set(hid_t set) {
-	if (set >= 0) H5Dclose(set);
-}
-
-/* ---- what state may hold ---- */
-
-/* Numbers are finite, but where a new entry's is not: then that value stands for "not yet". */
-static bool numbers_hold(const quern_store *store, const quern_field *field) {
-	const uint32_t n = store->sets[field->set].n;
-	for (uint8_t c = 0; c < field->n_components; c++) {
-		const quern_real *value = field->data[field->now][c], initial = field->initial;
-		for (uint32_t i = 0; i < n; i++)
-			if (!isfinite(value[i]) && !(isnan(value[i]) ? isnan(initial) : value[i] == initial))
-				return false;
-	}
-	return true;
-}
-
-/* Positions become numbers of cells. A fixed grain may lie outside of the domain by as much as that is wide. */
-static bool positions_hold(const quern_run *run, const quern_field *field) {
-	const quern_general *g = &run->scene->general;
-	const uint32_t n = run->plan->store.sets[field->set].n;
-	if (field->shape != QUERN_VECTOR || strcmp(strchr(field->name, '.'), ".position") != 0) return true;
-	for (uint8_t k = 0; k < field->n_components; k++) {
-		const double width = g->upper[k] - g->lower[k];
-		const quern_real *x = field->data[field->now][k];
-		for (uint32_t i = 0; i < n; i++)
-			if (!(x[i] >= g->lower[k] - 1.5 * width && x[i] <= g->upper[k] + 1.5 * width)) return false;
-	}
-	return true;
-}
-
-/* Indices are followed blindly later on, so they are looked at now. */
-static bool indices_hold(const quern_store *store, const quern_field *field) {
-	const int32_t *index = field->data[field->now][0];
-	const uint32_t n = store->sets[field->set].n, most = store->sets[field->target].n;
-	for (uint32_t i = 0; i < n; i++)
-		if ((index[i] < 0 || (uint32_t)index[i] >= most) &&
-			!(index[i] == QUERN_NO_TARGET && field->initial == QUERN_NO_TARGET))
-			return false;
-	return true;
-}
-
-/* A number is given once, in the order of counting. */
-static bool ids_hold(const quern_set_store *set, const quern_field *field) {
-	const int64_t *id = field->data[field->now][0];
-	for (uint32_t i = 0; i < set->n; i++)
-		if (id[i] < 0 || id[i] >= set->next_id) return false;
-	return true;
-}
-
-/* NULL, or what is wrong with a field. What is only looked at may hold anything: no step goes on from it. */
-static const char *fault_in(const quern_run *run, const quern_field *field) {
-	const quern_store *store = &run->plan->store;
-	if (!field->kept || store->sets[field->set].rows) return NULL;
-	if (field->shape == QUERN_ID)
-		return ids_hold(&store->sets[field->set], field) ? NULL : "a number that was never given";
-	if (field->shape == QUERN_INDEX)
-		return field->target < 0 || indices_hold(store, field) ? NULL : "an index out of its set";
-	if (!field->state) return NULL;
-	if (!numbers_hold(store, field)) return "a number that is not finite";
-	return positions_hold(run, field) ? NULL : "a position far outside of the domain";
-}
+static bool kept(const quern_field *field) { return field->kept; }
 
 /* ---- writing ---- */
 
-static void write_set(quern_h5 *h, const quern_run *run, int s) {
-	const quern_store *store = &run->plan->store;
-	const quern_set_store *set = &store->sets[s];
-	char name[64];
-	if (set->rows && !keeps_rows(store, s)) return;
-	const hid_t group = quern_h5_group(h, h->file, set->name);
-	quern_h5_integer(h, group, "n", set->n);
-	quern_h5_integer(h, group, "next_id", set->next_id);
-	quern_h5_integer(h, group, "n_blocks", set->n_blocks);
-	if (set->rows) close_set(quern_h5_write(h, group, "row", H5T_NATIVE_DOUBLE, set->n, 8, set->row));
-	if (set->n_blocks)
-		close_set(quern_h5_write(h, group, "block", H5T_NATIVE_UINT32, set->n_blocks + 1u, 1, set->block));
-	for (size_t k = 0; k < store->n_fields; k++) {
-		const quern_field *field = &store->fields[k];
-		if (!is_column(store, field, s)) continue;
-		for (int c = 0; c < field->n_components; c++) {
-			component_name(field, c, name);
-			close_set(quern_h5_write(h, group, name, type_of(field), set->n, 1, field->data[field->now][c]));
-		}
-	}
-	if (group >= 0) H5Gclose(group);
-}
-
 static void write_text(quern_h5 *h, const char *name, const char *text) {
-	close_set(quern_h5_write(h, h->file, name, H5T_NATIVE_UINT8, strlen(text), 1, text));
+	quern_h5_put(h, h->file, name, H5T_NATIVE_UINT8, strlen(text), 1, text);
 }
 
 static void write_plugins(quern_h5 *h, const quern_run *run) {
@@ -172,8 +66,8 @@ static void write_run(quern_h5 *h, quern_run *run, int64_t rows) {
 	write_plugins(h, run);
 	if (!run->has_grid) return;
 	const uint32_t n = run->grid.view.n_blocks;
-	close_set(quern_h5_write(h, h->file, "blocks", H5T_NATIVE_INT32, n, 3, run->grid.at));
-	close_set(quern_h5_write(h, h->file, "asked", H5T_NATIVE_UINT8, n, 1, run->grid.asked));
+	quern_h5_put(h, h->file, "blocks", H5T_NATIVE_INT32, n, 3, run->grid.at);
+	quern_h5_put(h, h->file, "asked", H5T_NATIVE_UINT8, n, 1, run->grid.asked);
 }
 
 quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
@@ -181,7 +75,7 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 	char why[256] = "out of memory";
 	if (!run->folder) return QUERN_OK;
 	for (size_t k = 0; k < run->plan->store.n_fields; k++) {
-		const char *fault = fault_in(run, &run->plan->store.fields[k]);
+		const char *fault = quern_state_fault(run, &run->plan->store.fields[k]);
 		if (fault)
 			return quern_run_stop(run, QUERN_E_NUMERIC, "%s holds %s at t = %.6g s (step %lld)",
 				run->plan->store.fields[k].name, fault, quern_run_time(run), (long long)run->clock.step);
@@ -190,7 +84,7 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 	bool good = quern_h5_create(&h, run->scene->general.compress, 512);
 	if (good) {
 		write_run(&h, run, rows);
-		for (int s = 0; s < (int)run->plan->store.n_sets; s++) write_set(&h, run, s);
+		for (int s = 0; s < (int)run->plan->store.n_sets; s++) quern_state_write(&h, run, s, kept);
 		good = quern_h5_save(&h, path, why);
 	}
 	free(path);
@@ -200,78 +94,22 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 /* ---- reading ---- */
 
 static bool fault(quern_text *why, const char *what, const char *name) {
-	quern_text_add(why, "the checkpoint does not fit this scene: %s of %s", what, name);
+	quern_text_add(why, "it does not fit this scene: %s of %s", what, name);
 	return false;
-}
-
-static bool read_partition(quern_run *run, hid_t group, int s, uint32_t n, quern_text *why) {
-	quern_store *store = &run->plan->store;
-	const char *name = store->sets[s].name;
-	int64_t n_blocks = -1;
-	if (!quern_h5_read_integer(group, "n_blocks", &n_blocks) || n_blocks < 0 || n_blocks > MOST_ENTRIES)
-		return fault(why, "n_blocks", name);
-	if (!n_blocks) return true;
-	uint32_t *block = malloc(((size_t)n_blocks + 1) * sizeof(uint32_t));
-	bool good = block && quern_h5_read(group, "block", H5T_NATIVE_UINT32, (size_t)n_blocks + 1, 1, block);
-	good = good && block[0] == 0 && block[n_blocks] == n;
-	for (int64_t b = 0; good && b < n_blocks; b++) good = block[b] <= block[b + 1];
-	good = good && quern_store_partition(store, s, (uint32_t)n_blocks, block) == QUERN_OK;
-	free(block);
-	return good || fault(why, "the partition", name);
-}
-
-static bool read_fields(quern_run *run, hid_t group, int s, quern_text *why) {
-	quern_store *store = &run->plan->store;
-	char name[64];
-	for (size_t k = 0; k < store->n_fields; k++) {
-		quern_field *field = &store->fields[k];
-		if (!is_column(store, field, s)) continue;
-		for (int c = 0; c < field->n_components; c++) {
-			component_name(field, c, name);
-			if (!quern_h5_read(group, name, type_of(field), store->sets[s].n, 1, field->data[field->now][c]))
-				return fault(why, name, store->sets[s].name);
-		}
-	}
-	return true;
-}
-
-/* Memory is taken only for what the file does hold. */
-static bool sizes_hold(const quern_store *store, hid_t group, int s, int64_t n) {
-	for (size_t k = 0; k < store->n_fields; k++) {
-		const quern_field *field = &store->fields[k];
-		char name[64];
-		size_t rows = 0, columns = 0;
-		if (!is_column(store, field, s)) continue;
-		component_name(field, 0, name);
-		if (!quern_h5_read_size(group, name, &rows, &columns) || rows != (size_t)n) return false;
-	}
-	return true;
-}
-
-static bool read_columns(quern_run *run, hid_t group, int s, int64_t n, quern_text *why) {
-	quern_store *store = &run->plan->store;
-	return quern_store_fill(store, s, (uint32_t)n) == QUERN_OK &&
-		   read_partition(run, group, s, (uint32_t)n, why) && read_fields(run, group, s, why);
 }
 
 static bool read_set(quern_run *run, quern_h5 *h, int s, quern_text *why) {
 	quern_store *store = &run->plan->store;
-	quern_set_store *set = &store->sets[s];
-	int64_t n = -1, next_id = -1;
-	if (set->rows && !keeps_rows(store, s)) return true;
-	const hid_t group = quern_h5_find(h->file, set->name);
-	if (group < 0) return fault(why, "the set", set->name);
-	bool good = quern_h5_read_integer(group, "n", &n) && quern_h5_read_integer(group, "next_id", &next_id) &&
-				n >= 0 && n <= MOST_ENTRIES && next_id >= 0;
-	if (good && set->grid) good = n == (int64_t)run->grid.view.n_blocks * 64 || n == 0;
-	good = good && (set->rows ? set->n == n : sizes_hold(store, group, s, n));
-	if (!good) fault(why, "the size", set->name);
-	else if (!set->rows) good = read_columns(run, group, s, n, why);
-	else if (n)
-		good = quern_h5_read(group, "row", H5T_NATIVE_DOUBLE, set->n, 8, set->row) ||
-			   fault(why, "rows", set->name);
-	set->next_id = next_id;
-	H5Gclose(group);
+	quern_state_group g;
+	bool kept_any = false;
+	for (size_t k = 0; k < store->n_fields; k++)
+		kept_any = kept_any || (store->fields[k].set == s && store->fields[k].kept);
+	if (store->sets[s].rows && !kept_any) return true;
+	if (!quern_state_find(run, h->file, s, kept, &g, why)) return false;
+	const bool room = store->sets[s].rows || quern_store_fill(store, s, g.n) == QUERN_OK;
+	const bool good =
+		room ? quern_state_read(run, &g, s, kept, why) : fault(why, "the memory", store->sets[s].name);
+	quern_state_leave(&g);
 	return good;
 }
 
@@ -419,7 +257,7 @@ static bool read_all(
 	for (int s = 0; s < (int)store->n_sets; s++)
 		if (!read_set(run, h, s, why)) return false;
 	for (size_t k = 0; k < store->n_fields; k++) {
-		const char *wrong = fault_in(run, &store->fields[k]);
+		const char *wrong = quern_state_fault(run, &store->fields[k]);
 		if (wrong) return fault(why, wrong, store->fields[k].name);
 	}
 	return rejoin(run, why);

@@ -101,6 +101,12 @@ bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
 
 /* ---- writing ---- */
 
+void quern_h5_put(
+	quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data) {
+	const hid_t set = quern_h5_write(h, group, name, type, rows, columns, data);
+	if (set >= 0) H5Dclose(set);
+}
+
 hid_t quern_h5_group(quern_h5 *h, hid_t parent, const char *name) {
 	const hid_t create = without_times(H5P_GROUP_CREATE);
 	const hid_t group = H5Gcreate2(parent, name, H5P_DEFAULT, create, H5P_DEFAULT);

@@ -27,6 +27,9 @@ void quern_h5_seal(void *image, size_t size);
 /* rows x columns numbers; columns 1 makes a list. The faults of all writes are collected in `failed`. */
 hid_t quern_h5_write(
 	quern_h5 *, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data);
+/* The same for what gets no attributes. */
+void quern_h5_put(
+	quern_h5 *, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data);
 hid_t quern_h5_group(quern_h5 *, hid_t parent, const char *name);
 void quern_h5_text(quern_h5 *, hid_t object, const char *name, const char *text);
 void quern_h5_number(quern_h5 *, hid_t object, const char *name, double value);

@@ -154,23 +154,18 @@ static void xdmf_entry(quern_text *out, const entry *e) {
 
 /* ---- VTKHDF stubs, whose data are links into the frame ---- */
 
-static void stub_list(quern_h5 *h, hid_t group, const char *name, hid_t type, size_t n, const void *data) {
-	const hid_t written = quern_h5_write(h, group, name, type, n, 1, data);
-	if (written >= 0) H5Dclose(written);
-}
-
 static void stub_topology(quern_h5 *h, hid_t group, size_t n) {
 	int64_t *index = quern_take(n + 1, sizeof(int64_t));
 	uint8_t *type = quern_take(n, 1);
 	const int64_t count = (int64_t)n;
 	for (size_t i = 0; i <= n; i++) index[i] = (int64_t)i;
 	memset(type, 1, n); /* VTK_VERTEX */
-	stub_list(h, group, "NumberOfPoints", H5T_NATIVE_INT64, 1, &count);
-	stub_list(h, group, "NumberOfCells", H5T_NATIVE_INT64, 1, &count);
-	stub_list(h, group, "NumberOfConnectivityIds", H5T_NATIVE_INT64, 1, &count);
-	stub_list(h, group, "Connectivity", H5T_NATIVE_INT64, n, index);
-	stub_list(h, group, "Offsets", H5T_NATIVE_INT64, n + 1, index);
-	stub_list(h, group, "Types", H5T_NATIVE_UINT8, n, type);
+	quern_h5_put(h, group, "NumberOfPoints", H5T_NATIVE_INT64, 1, 1, &count);
+	quern_h5_put(h, group, "NumberOfCells", H5T_NATIVE_INT64, 1, 1, &count);
+	quern_h5_put(h, group, "NumberOfConnectivityIds", H5T_NATIVE_INT64, 1, 1, &count);
+	quern_h5_put(h, group, "Connectivity", H5T_NATIVE_INT64, n, 1, index);
+	quern_h5_put(h, group, "Offsets", H5T_NATIVE_INT64, n + 1, 1, index);
+	quern_h5_put(h, group, "Types", H5T_NATIVE_UINT8, n, 1, type);
 	free(index);
 	free(type);
 }
