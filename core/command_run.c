@@ -5,6 +5,7 @@
 #include "frame.h"
 #include "options.h"
 #include "run_folder.h"
+#include "settled.h"
 #include "sidecar.h"
 #include "summary.h"
 #include "text.h"
@@ -20,7 +21,7 @@ typedef struct {
 	const char *scene, *out, *until;
 	quern_texts sets;
 	int64_t threads;
-	bool resume, force, quiet;
+	bool resume, force, quiet, no_cache;
 } options;
 
 typedef struct {
@@ -66,6 +67,8 @@ static int parse(options *o, int argc, char **argv) {
 		QUERN_FLAG(&o->resume, "resume", "go on from the checkpoint"),
 		QUERN_FLAG(&o->force, "force", "replace the run in the folder; with --resume, take other plugins"),
 		QUERN_TEXT(&o->until, 0, "until", "TIME", "stop at the first step at or after this time"),
+		QUERN_FLAG(
+			&o->no_cache, "no-cache", "let grains settle even if a state of the same beginning is kept"),
 		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"), QUERN_END_OPTIONS };
 	const int status = quern_options_read("run", known, &words, argc, argv);
 	o->scene = words.at[0];
@@ -130,16 +133,21 @@ static bool due(const session *s) {
 
 /* ---- the run ---- */
 
-static quern_status settle(session *s) {
+static quern_status settle(session *s, bool cache) {
 	quern_run *run = s->run;
 	const double begin = quern_wall();
+	if (cache && !run->clock.settled && !run->clock.settle_step) quern_settled_take(run);
+	const int warnings = quern_log_warnings(run->log); /* what was cut off would be taken for settled */
+	const bool settles = !run->clock.settled;
 	while (!run->clock.settled && !interrupted && run->status == QUERN_OK) {
 		quern_run_settle(run);
 		progress(s, true);
 		if (due(s)) checkpoint(s);
 	}
+	const bool rests = settles && run->clock.settled && run->status == QUERN_OK;
+	if (cache && rests && quern_log_warnings(run->log) == warnings) quern_settled_keep(run);
 	run->settle_wall += quern_wall() - begin;
-	if (run->clock.settled && run->clock.settle_step && run->clock.frame < 0)
+	if (settles && run->clock.settled && run->clock.settle_step)
 		quern_log_add(run->log, 1, "settled in %lld steps, %.1f s", (long long)run->clock.settle_step,
 			run->settle_wall);
 	return run->status;
@@ -312,7 +320,8 @@ static int drive(session *s, const options *o) {
 	}
 	quern_text_finish(&why);
 	if (s->begun) tell_what_stays(s);
-	if (s->begun && run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s);
+	if (s->begun && run->status == QUERN_OK && settle(s, !o->no_cache) == QUERN_OK && !interrupted)
+		step_on(s);
 	return finish(s);
 }
 

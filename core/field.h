@@ -11,6 +11,7 @@ typedef struct quern_field {
 	uint8_t shape, n_components;
 	bool twice;    /* read from one copy, written to the other, then swapped */
 	bool state;    /* a step goes on from it */
+	bool settles;  /* changed while settling */
 	bool kept;     /* checkpointed: state, and what is looked at between steps */
 	bool local;    /* born and used up within one stage: a worker's scratch, no memory here */
 	bool shown;    /* in every frame */

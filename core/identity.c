@@ -37,9 +37,11 @@ static void drop(quern_node *map, const char *path) {
 	}
 }
 
+quern_node *quern_run_tree(const quern_run *run) { return quern_scene_tree(run->scene, &by_contents); }
+
 const char *quern_run_identity(quern_run *run) {
 	if (run->identity) return run->identity;
-	quern_node *root = quern_scene_tree(run->scene, &by_contents);
+	quern_node *root = quern_run_tree(run);
 	quern_text whole = { 0 }, fixed = { 0 };
 	quern_node_print(root, 0, &whole);
 	for (int k = 0; k < N_FREE; k++) drop(root, may_change[k]);

@@ -7,6 +7,8 @@
 /* The resolved scene, with files named by their contents: what is compared. Made at the first call, of the files as they are
  * then; the run's own. */
 const char *quern_run_identity(quern_run *);
+/* The same as a tree, to destroy. */
+quern_node *quern_run_tree(const quern_run *);
 /* Of all that results depend on: equal for scenes that differ in title, end, compression, checkpoints and run alone. */
 uint64_t quern_run_scene_hash(quern_run *);
 

@@ -10,7 +10,7 @@
 struct quern_log {
 	FILE *file;
 	quern_text kept; /* lines from before there was a file */
-	int fault;
+	int fault, warnings;
 	bool quiet, terminal, dirty;
 	double shown;
 };
@@ -33,6 +33,7 @@ static void note_fault(quern_log *log, bool failed) {
 }
 
 int quern_log_fault(const quern_log *log) { return log->fault; }
+int quern_log_warnings(const quern_log *log) { return log->warnings; }
 
 static void put(quern_log *log, const char *line) {
 	if (!log->file) quern_text_add(&log->kept, "%s", line);
@@ -62,6 +63,7 @@ void quern_log_destroy(quern_log *log) {
 void quern_log_addv(quern_log *log, int level, const char *fmt, va_list list) {
 	quern_text text = { 0 };
 	const char *mark = level > 1 ? "warning: " : "";
+	log->warnings += level > 1;
 	quern_text_add(&text, "%s", mark);
 	quern_text_addv(&text, fmt, list);
 	quern_text_add(&text, "\n");

@@ -12,6 +12,8 @@ void quern_log_destroy(quern_log *);
 void quern_log_open(quern_log *, const char *path, bool append);
 /* 0, or the errno of the first line that could not be written. */
 int quern_log_fault(const quern_log *);
+/* How many warnings there were. */
+int quern_log_warnings(const quern_log *);
 /* level 0: file alone, 1: terminal too, 2: a warning */
 void quern_log_add(quern_log *, int level, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 void quern_log_addv(quern_log *, int level, const char *fmt, va_list) __attribute__((format(printf, 3, 0)));

@@ -466,6 +466,16 @@ static void mark_kept(quern_plan *p) {
 	}
 }
 
+/* What a settled state consists of. */
+static void mark_settles(quern_plan *p) {
+	for (size_t i = 0; i < p->n_uses; i++) {
+		const quern_plan_use *u = &p->uses[i];
+		if (u->target < 0 || u->stage < 0 || p->stages[u->stage].phase != QUERN_GRAINS) continue;
+		quern_field *field = &p->store.fields[u->target];
+		if (changes(u->row) && !(u->row->flags & QUERN_RELEASED) && field->state) field->settles = true;
+	}
+}
+
 static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(const quern_use *)) {
 	for (size_t i = 0; i < p->n_uses; i++)
 		if (p->uses[i].stage == stage && p->uses[i].target == field && test(p->uses[i].row)) return true;
@@ -543,6 +553,7 @@ quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
 	order_stages(p);
 	for (size_t k = 0; k < p->store.n_fields; k++) follow_field(p, (int)k);
 	mark_kept(p);
+	mark_settles(p);
 	mark_swaps_and_zeros(p);
 	for (size_t i = 0; i < p->n_stages; i++)
 		p->stages[i].column = quern_take(p->stages[i].n_uses, sizeof(quern_column));

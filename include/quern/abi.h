@@ -159,7 +159,8 @@ enum {
 	                       field is kept twice and the stage writes every entry of the new copy */
 	QUERN_BEFORE = 4,   /* this READ wants the value from before this phase's changes */
 	QUERN_SHOWN = 8,    /* in every frame, asked for or not */
-	QUERN_WANTED = 16   /* makes the field exist if anybody in the scene can write it; NULL otherwise */
+	QUERN_WANTED = 16,  /* makes the field exist if anybody in the scene can write it; NULL otherwise */
+	QUERN_RELEASED = 32 /* nothing is changed through this use while settling */
 };
 
 /* One use of one field by one plugin. A field exists if and only if a counting, non-optional use names
