@@ -243,6 +243,9 @@ typedef struct quern_host {
 	/* [stage] Allocates exactly these blocks of the grid and their neighbours; cells keep their fields. */
 	quern_status (*cover)(quern_run *, uint32_t n, const int32_t (*block)[3]);
 	const void *(*extension)(const char *id); /* [any] NULL if unknown */
+	/* [stage] Whether the scene has this section: "grains", "continuum", "hybrid", "bodies". A field or a set says
+	 * nothing about that, since a scene may have it made only to be written out. */
+	bool (*has)(quern_run *, const char *section);
 } quern_host;
 
 typedef struct quern_setup {

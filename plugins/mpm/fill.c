@@ -65,7 +65,7 @@ quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 	quern_real wanted = 0;
 	uint32_t total = 0;
 	s->use[FILL_UNSORTED].index[0] = 1;
-	if (s->use[FILL_WEIGHT].real[0]) return QUERN_OK;
+	if (s->host->has(s->run, "hybrid")) return QUERN_OK;
 	for (uint32_t f = 0; f < p->fill.n; f++) {
 		quern_real g = 0;
 		const lattice l = lattice_of(p, &item[f]);

@@ -213,8 +213,35 @@ static void thrown_and_fallen(void **unused) {
 	assert_true(good);
 }
 
+/* ==== a grid that goes with its material ==== */
+
+/* A block that crosses a domain of 700 cells has no more blocks of the grid than it needs, wherever it has been: a step
+ * costs the same at the end as at the start. */
+static void grid_follows_the_block(void **state) {
+	(void)state;
+	bool good = true;
+	table_head("blocks of the grid that a block of 16 cells has");
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [14, 0.4]},\n"
+		"time: {end: 10}, output: {every: 1}, observe: [mass],\n"
+		"continuum: {cell: 0.02, material: {elastic: {bulk_modulus: 100, density: 1000}},\n"
+		"  fill: [{region: {box: {lower: [0.14, 0.14], upper: [0.22, 0.22]}}, velocity: [5, 0]}]}}\n");
+	uint32_t most = 0, at_last = 0;
+	assert_int_equal(harness_count(run, "point"), 64);
+	while (quern_run_time(run) < 2.7) {
+		harness_steps(run, 20);
+		at_last = harness_count(run, "cell") / 64;
+		most = at_last > most ? at_last : most;
+	}
+	good &= table_row("at most", most, 8, 8); /* it lies in four at most, which have twelve neighbours */
+	good &= table_row("after 13.5 m", at_last, 12, 4);
+	harness_close(run);
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(weight_at_rest),
-		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen) };
+		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen),
+		cmocka_unit_test(grid_follows_the_block) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
