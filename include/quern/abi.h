@@ -234,9 +234,10 @@ typedef struct quern_host {
 	quern_status (*stop)(quern_run *, quern_status, const char *set, int64_t id, const char *fmt, ...)
 		__attribute__((format(printf, 5, 6)));
 	quern_set_view (*set)(quern_run *, const char *name); /* [stage] n = 0 if there is none */
-	/* [stage] The one structural change: new entry i is old entry from[i], or fresh if from[i] < 0. Carries
-	 * every field of the set, rewrites every INDEX that points into it, drops entries whose target is gone,
-	 * and refreshes every column pointer the host handed out. `block` (n_blocks + 1 entries) is copied. */
+	/* [stage] The one structural change: new entry i is old entry from[i]; fresh if from[i] == -1; and below that a
+	 * copy of old entry -2 - from[i], with an ID of its own. Carries every field of the set, rewrites every INDEX
+	 * that points into it, drops entries whose target is gone, and refreshes every column pointer the host handed
+	 * out. `block` (n_blocks + 1 entries) is copied. */
 	quern_status (*remap)(quern_run *, const char *set, uint32_t n, const int32_t *from, uint32_t n_blocks,
 		const uint32_t *block);
 	const quern_grid_view *(*grid)(quern_run *); /* [stage] valid until cover() */
