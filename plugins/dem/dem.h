@@ -88,7 +88,9 @@ enum {
 	FORCE_DAMPED,
 	FORCE_RUBBED,
 	FORCE_ID,
-	FORCE_TREMBLING
+	FORCE_TREMBLING,
+	FORCE_CONTACT_COUPLE,
+	FORCE_TOUCH_COUPLE
 };
 
 /* moment of inertia over mass times radius squared */

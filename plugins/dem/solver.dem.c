@@ -153,6 +153,10 @@ static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUE
 	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."), F("grain.id", "1", QUERN_READ, QUERN_ID),
 	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
 		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
+	F("contact.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
+		.doc = "On the first, unweighted."),
+	F("touch.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
+		.doc = "On the grain, unweighted."),
 	QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "dem.fill",

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { N = QUERN_BLOCK_CELLS, MOST_ROWS = 8 };
+enum { N = QUERN_BLOCK_CELLS };
 
 /* ---- which grains belong to which block ---- */
 
@@ -249,7 +249,7 @@ typedef struct {
 	stencil stencil;
 	_Alignas(64) quern_real pic[3][STENCIL], change[3][STENCIL], echo[3][STENCIL], send[3][STENCIL],
 		velocity[3][STENCIL];
-	quern_real rows[MOST_ROWS][9][STENCIL];
+	quern_real rows[QUERN_MOST_USES][9][STENCIL];
 	int32_t grain[STENCIL];
 } back_memory;
 
@@ -285,9 +285,9 @@ QUERN_INLINE uint32_t load_coupled(
 static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool last) {
 	const quern_bound *transfer = &w->s->slot[SLOT_TRANSFER][0];
 	const uint32_t dim = w->s->dim;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_transfer_batch t = { .n = n, .cap = STENCIL, .pass = w->pass, .dt = w->s->dt, .use = own };
-	for (uint32_t r = 0; r < transfer->n_uses && r < MOST_ROWS; r++) {
+	for (uint32_t r = 0; r < transfer->n_uses; r++) {
 		own[r] = (quern_column) { .real = { NULL } };
 		for (uint32_t k = 0; k < quern_shape_size(transfer->uses[r].shape, dim); k++) {
 			const quern_real *whole = transfer->column[r].real[k];

@@ -4,8 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-enum { MOST_ROWS = 8 };
-
 typedef struct {
 	const quern_step *s;
 	const quern_grid_view *g;
@@ -47,9 +45,9 @@ QUERN_INLINE void collect_chunk(
 static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n, bool last) {
 	const quern_bound *transfer = &w->s->slot[SLOT_TRANSFER][0];
 	const uint32_t dim = w->s->dim;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_transfer_batch b = { .n = n, .cap = STENCIL, .pass = w->pass, .dt = w->s->dt, .use = own };
-	for (uint32_t r = 0; r < transfer->n_uses && r < MOST_ROWS; r++)
+	for (uint32_t r = 0; r < transfer->n_uses; r++)
 		own[r] = quern_column_from(transfer->column[r], transfer->uses[r].shape, begin);
 	for (uint32_t k = 0; k < dim; k++) {
 		b.pic[k] = m->pic[k];
@@ -101,7 +99,7 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 	const quern_bound *material = &w->s->slot[SLOT_MATERIAL][0];
 	const quern_column *u = w->s->use;
 	const uint32_t dim = w->s->dim;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_material_batch b = { .n = n,
 		.cap = STENCIL,
 		.dt = w->s->dt,
@@ -113,7 +111,7 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 		b.stress[k] = u[GATHER_STRESS].real[k] + begin;
 	if (u[GATHER_WAVE].real[0]) b.wave_speed = u[GATHER_WAVE].real[0] + begin;
 	if (u[GATHER_ENERGY].real[0]) b.energy = u[GATHER_ENERGY].real[0] + begin;
-	for (uint32_t r = 0; r < material->n_uses && r < MOST_ROWS; r++)
+	for (uint32_t r = 0; r < material->n_uses; r++)
 		own[r] = quern_column_from(material->column[r], material->uses[r].shape, begin);
 	((const quern_material_ops *)material->ops)->update[dim - 2](material->self, &b);
 }
