@@ -118,7 +118,9 @@ typedef struct quern_body_batch {
 typedef struct quern_body_ops {
 	uint32_t size, pad;
 	void (*closest)(const void *self, const quern_body_batch *); /* [batch] */
-	/* [batch] features of this body within reach of a sphere; returns how many there are. NULL: feature 0 alone */
+	/* [batch] features of this body, numbers from 0 on, whose surface may lie within `reach` of x; returns how many
+	 * there are, and writes at most `cap`. A grain touches each of them that closest() finds near, with a history for
+	 * each. NULL: the body is one feature, its nearest place */
 	uint32_t (*features)(const void *self, const quern_pose *, const quern_real x[3], quern_real reach,
 		uint32_t cap, int32_t *feature);
 	/* [setup] box around it in its own frame, infinite where unbounded */

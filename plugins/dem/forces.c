@@ -70,6 +70,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	w->first = carve(&c, cap * sizeof(int32_t));
 	w->second = carve(&c, cap * sizeof(int32_t));
 	w->slot = carve(&c, cap * sizeof(int32_t));
+	if (sh->d->features) w->feature = carve(&c, cap * sizeof(int32_t));
 	carve_columns(&c, w->grains, 34, GRAINS);
 	w->row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	if (sh->energy) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);

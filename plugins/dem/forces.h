@@ -34,7 +34,7 @@ typedef struct forces_work {
 	quern_real *force[3], *couple[3], *dashpot[3], *drag_couple[3], *stored, *sheared, *rubbed, *torque[3],
 		*drag_torque[3];
 	law_row *rows; /* of all laws, one after the other */
-	int32_t *first, *second, *slot;
+	int32_t *first, *second, *slot, *feature;
 	quern_real (*row)[8], (*drag_row)[8]; /* per grain of the block, one more for partners outside */
 	quern_real *grains[34];
 } forces_work;

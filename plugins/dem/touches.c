@@ -19,16 +19,19 @@ QUERN_INLINE void touch_body(const forces_shared *sh, forces_work *w, uint32_t b
 		if (weight) w->weight[q] = weight[i];
 		for (int k = 0; k < dim; k++) x[k][q] = u[FORCE_OLD_POSITION].real[k][i];
 	}
+	const quern_body_ops *ops = bound->ops;
+	for (uint32_t q = 0; q < n && ops->features; q++) w->feature[q] = u[FORCE_FEATURE].index[begin + q];
 	const quern_body_batch batch = { .n = n,
 		.cap = sh->cap,
 		.dim = (uint32_t)dim,
 		.pose = &still,
 		.radius = w->radius,
+		.feature = ops->features ? w->feature : NULL,
 		.position = { x[0], x[1], x[2] },
 		.gap = w->overlap,
 		.normal = { w->normal[0], w->normal[1], w->normal[2] },
 		.velocity = { w->velocity[0], w->velocity[1], w->velocity[2] } };
-	((const quern_body_ops *)bound->ops)->closest(bound->self, &batch);
+	ops->closest(bound->self, &batch);
 	for (uint32_t q = 0; q < n; q++) {
 		const int32_t i = grain[q];
 		w->overlap[q] = -w->overlap[q];

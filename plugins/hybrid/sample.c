@@ -105,7 +105,9 @@ static void sample_touches(sampling *p) {
 			force2 += f[k] * f[k];
 		}
 		if (!(force2 > 0)) continue;
-		const quern_real gap = quern_body_gap(body, s->dim, x, radius, branch);
+		const bool several = ((const quern_body_ops *)body->ops)->features;
+		const int32_t *feature = several ? u[S_TOUCH_FEATURE].index + q : NULL;
+		const quern_real gap = quern_body_gap_of(body, feature, s->dim, x, radius, branch);
 		for (uint32_t k = 0; k < s->dim; k++) {
 			branch[k] *= radius + gap;
 			x[k] -= branch[k];
