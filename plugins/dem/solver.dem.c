@@ -221,6 +221,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
 	if (isnan(d->drag)) d->drag = 0.1 * sqrt(gravity / diameter);
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
+	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
+	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->density);
 	setup->host->publish(setup, "grain.radius_spread", "1", d->radii.spread);
 	setup->host->publish(setup, "grain.radius_law", "1", d->radii.law);

@@ -174,6 +174,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			height = extent > height ? extent : height;
 		}
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
+	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
 	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(sqrt(g2) / height) : 0);
 	return QUERN_OK;
 }

@@ -213,6 +213,44 @@ static void thrown_and_fallen(void **unused) {
 	assert_true(good);
 }
 
+/* ==== a lattice of points as the grid sees it ==== */
+
+/* Particles as wide as their points are apart fill space: for any number of points per cell and axis every node that is
+ * wholly within them has the density of the points. */
+static void lattice_is_uniform(void **state) {
+	(void)state;
+	bool good = true;
+	table_head("density on the grid over that of the points, less 1: worst node inside");
+	for (int dim = 2; dim <= 3; dim++)
+		for (int points = 1; points <= 4; points++) {
+			char name[40];
+			quern_run *run = harness_open(1,
+				"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
+				"time: {end: 1e-6, step: 1e-9}, output: {fields: [motion.density]},\n"
+				"continuum: {cell: 0.1, points: %d, material: {elastic: {bulk_modulus: 1, density: 1000}},\n"
+				"  fill: [{region: {box: {lower: %s, upper: %s}}}]}}\n",
+				dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
+				dim == 2 ? "[1, 1]" : "[1, 1, 1]", points, dim == 2 ? "[0.2, 0.2]" : "[0.2, 0.2, 0.2]",
+				dim == 2 ? "[0.8, 0.8]" : "[0.8, 0.8, 0.8]");
+			harness_steps(run, 1);
+			const quern_column row = harness_field(run, "motion.density");
+			const quern_grid_view *g = quern_host_table.grid(run);
+			const int edge = (int)g->edge;
+			double worst = 0;
+			for (uint32_t i = 0; i < g->n_blocks * 64; i++) {
+				const int k = (int)i % 64, at[3] = { g->at[i / 64][0] * edge + k % edge,
+					g->at[i / 64][1] * edge + k / edge % edge, g->at[i / 64][2] * edge + k / (edge * edge) };
+				bool inside = true;
+				for (int a = 0; a < dim; a++) inside = inside && at[a] >= 3 && at[a] <= 7;
+				if (inside) worst = fmax(worst, fabs(row.real[0][8 * i] / 1000 - 1));
+			}
+			snprintf(name, sizeof name, "%d-D, %d per cell and axis", dim, points);
+			good &= table_row(name, worst, 0, 1e-12);
+			harness_close(run);
+		}
+	assert_true(good);
+}
+
 /* ==== a grid that goes with its material ==== */
 
 /* A block that crosses a domain of 700 cells has no more blocks of the grid than it needs, wherever it has been: a step
@@ -242,6 +280,6 @@ static void grid_follows_the_block(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(weight_at_rest),
 		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen),
-		cmocka_unit_test(grid_follows_the_block) };
+		cmocka_unit_test(lattice_is_uniform), cmocka_unit_test(grid_follows_the_block) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
