@@ -7,32 +7,6 @@ bool quern_dem_is_history(const quern_use *row) { return !strncmp(row->field, "c
 /* The row says that there are couples; they are the solver's own column. */
 static bool is_couple(const quern_use *row) { return !strcmp(row->field, "contact.couple"); }
 
-static void take(uint8_t shape, void *to, const void *from, uint32_t begin, const int32_t *at, uint32_t n) {
-	if (shape == QUERN_INDEX) {
-		const int32_t *restrict whole = (const int32_t *)from + begin;
-		for (uint32_t q = 0; q < n; q++) ((int32_t *)to)[q] = whole[at[q]];
-	} else if (shape == QUERN_ID) {
-		const int64_t *restrict whole = (const int64_t *)from + begin;
-		for (uint32_t q = 0; q < n; q++) ((int64_t *)to)[q] = whole[at[q]];
-	} else {
-		const quern_real *restrict whole = (const quern_real *)from + begin;
-		quern_real *restrict mine = to;
-		for (uint32_t q = 0; q < n; q++) mine[q] = whole[at[q]];
-	}
-}
-
-static const void *component(const quern_column *c, uint8_t shape, uint32_t k) {
-	if (shape == QUERN_INDEX) return c->index;
-	if (shape == QUERN_ID) return c->id;
-	return c->real[k];
-}
-
-static void put(quern_column *c, uint8_t shape, uint32_t k, void *column) {
-	if (shape == QUERN_INDEX) c->index = column;
-	else if (shape == QUERN_ID) c->id = column;
-	else c->real[k] = column;
-}
-
 /* Own columns of the contacts, or of both grains; against a body both are the first's. */
 static void gather_rows(const forces_shared *sh, const forces_work *w, const quern_bound *law, law_row *rows,
 	bool against_body, uint32_t begin, uint32_t n, quern_column *use, quern_column *use_second) {
@@ -42,14 +16,26 @@ static void gather_rows(const forces_shared *sh, const forces_work *w, const que
 		const bool history = quern_dem_is_history(row);
 		use[r] = use_second[r] = (quern_column) { .real = { NULL } };
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim) && !is_couple(row); k++) {
-			const void *whole = component(&columns[r], row->shape, k);
+			const void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole) continue;
-			take(row->shape, rows[r].mine[k], whole, history ? begin : 0, history ? w->slot : w->first, n);
-			put(&use[r], row->shape, k, rows[r].mine[k]);
+			quern_gather(
+				row->shape, rows[r].mine[k], whole, history ? begin : 0, history ? w->slot : w->first, n);
+			quern_set_component(&use[r], row->shape, k, rows[r].mine[k]);
 			if (history) continue;
-			if (!against_body) take(row->shape, rows[r].other[k], whole, 0, w->second, n);
-			put(&use_second[r], row->shape, k, against_body ? rows[r].mine[k] : rows[r].other[k]);
+			if (!against_body) quern_gather(row->shape, rows[r].other[k], whole, 0, w->second, n);
+			quern_set_component(
+				&use_second[r], row->shape, k, against_body ? rows[r].mine[k] : rows[r].other[k]);
 		}
+	}
+}
+
+static void forget(uint8_t shape, void *column, uint32_t begin, uint32_t n, quern_real initial) {
+	if (shape == QUERN_INDEX) {
+		int32_t *restrict to = (int32_t *)column + begin;
+		for (uint32_t q = 0; q < n; q++) to[q] = (int32_t)initial;
+	} else {
+		quern_real *restrict to = (quern_real *)column + begin;
+		for (uint32_t q = 0; q < n; q++) to[q] = initial;
 	}
 }
 
@@ -60,18 +46,11 @@ static void scatter_rows(const forces_shared *sh, const forces_work *w, const qu
 	for (uint32_t r = 0; r < law->n_uses; r++) {
 		const quern_use *row = &law->uses[r];
 		if (!quern_dem_is_history(row) || is_couple(row) || row->access == QUERN_READ) continue;
-		if (row->shape == QUERN_ID || !columns[r].real[0]) continue; /* who numbers is the host */
-		if (row->shape == QUERN_INDEX) {
-			int32_t *restrict whole = columns[r].index + begin;
-			for (uint32_t q = 0; q < n_slots; q++) whole[q] = (int32_t)row->initial;
-			for (uint32_t q = 0; q < n; q++) whole[w->slot[q]] = ((const int32_t *)rows[r].mine[0])[q];
-			continue;
-		}
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
-			quern_real *restrict whole = columns[r].real[k] + begin;
-			const quern_real *restrict mine = rows[r].mine[k];
-			for (uint32_t q = 0; q < n_slots; q++) whole[q] = row->initial;
-			for (uint32_t q = 0; q < n; q++) whole[w->slot[q]] = mine[q];
+			void *whole = quern_component(&columns[r], row->shape, k);
+			if (!whole || row->shape == QUERN_ID) continue;
+			forget(row->shape, whole, begin, n_slots, row->initial);
+			quern_scatter(row->shape, whole, rows[r].mine[k], begin, w->slot, n);
 		}
 	}
 }
