@@ -23,6 +23,13 @@ QUERN_INLINE uint32_t quern_shape_size(uint8_t shape, uint32_t dim) {
 	return (dim == 2 ? planar : spatial)[shape];
 }
 
+/* Brought back through a periodic face, and inside: what is less than half an ulp below `lower` would round to `upper`. */
+static inline quern_real quern_brought_back(quern_real x, quern_real lower, quern_real upper) {
+	x = x >= upper ? x - (upper - lower) : x;
+	x = x < lower ? x + (upper - lower) : x;
+	return x >= upper ? lower : x;
+}
+
 /* A column by its number, of whatever kind. */
 static inline void *quern_component(const quern_column *c, uint8_t shape, uint32_t k) {
 	if (shape == QUERN_INDEX) return c->index;

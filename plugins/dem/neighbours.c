@@ -327,12 +327,10 @@ static quern_status keep_inside(const listing *l) {
 	const int32_t *fixed = s->use[NEAR_FIXED].index;
 	for (uint32_t k = 0; k < s->dim; k++) {
 		quern_real *x = s->use[NEAR_POSITION].real[k];
-		const quern_real lower = s->lower[k], upper = s->upper[k], length = upper - lower;
+		const quern_real lower = s->lower[k], upper = s->upper[k];
 		for (uint32_t i = 0; i < n; i++) {
-			if (s->periodic[k]) {
-				x[i] = x[i] >= upper ? x[i] - length : x[i];
-				x[i] = x[i] < lower ? x[i] + length : x[i];
-			} else if (!(x[i] >= lower && x[i] <= upper) && !(fixed && fixed[i]))
+			if (s->periodic[k]) x[i] = quern_brought_back(x[i], lower, upper);
+			else if (!(x[i] >= lower && x[i] <= upper) && !(fixed && fixed[i]))
 				return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", s->use[NEAR_ID].id[i],
 					"left the domain along axis %u, at %.4g m: put a body there or make the domain larger", k,
 					x[i]);

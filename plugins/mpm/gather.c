@@ -19,7 +19,7 @@ typedef struct {
 	quern_row tile[QUERN_TILE_MOST], other[QUERN_TILE_MOST], trip[QUERN_TILE_MOST];
 	stencil stencil;
 	_Alignas(64) quern_real pic[3][STENCIL], change[3][STENCIL], gradient[9][STENCIL], grid_density[STENCIL],
-		density[STENCIL], echo[3][STENCIL], send[3][STENCIL], wave[STENCIL], energy[STENCIL];
+		density[STENCIL], moved[STENCIL], echo[3][STENCIL], send[3][STENCIL], wave[STENCIL], energy[STENCIL];
 } gather_memory;
 
 /* What the nodes say at the points of a chunk. */
@@ -65,7 +65,8 @@ QUERN_INLINE void move_chunk(
 	const quern_column *u = w->s->use;
 	const quern_real dt = w->s->dt;
 	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin;
-	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin, *restrict density = m->density;
+	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin, *restrict density = m->density,
+						 *restrict moved = m->moved;
 	const quern_real *restrict l0 = m->gradient[0], *restrict l1 = m->gradient[1],
 							   *restrict l2 = m->gradient[2];
 	const quern_real *restrict l3 = m->gradient[3], *restrict l4 = m->gradient[4],
@@ -91,6 +92,7 @@ QUERN_INLINE void move_chunk(
 				  dt * l2[i] * (dt * l3[i] * dt * l7[i] - e * dt * l6[i]);
 		}
 		volume[i] *= det;
+		moved[i] = volume[i];
 		density[i] = mass[i] / volume[i];
 	}
 }
@@ -123,7 +125,8 @@ static void finish_chunk(
 	const uint32_t dim = w->s->dim;
 	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, most = w->g->cell / w->s->dt;
 	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin;
-	for (uint32_t i = 0; i < n; i++) volume[i] = mass[i] / m->density[i];
+	/* whatever a material makes of a negative density, a point that was turned inside out stays so */
+	for (uint32_t i = 0; i < n; i++) volume[i] = m->moved[i] > 0 ? mass[i] / m->density[i] : m->moved[i];
 	for (int row = GATHER_GRADIENT; row <= GATHER_AFFINE; row++)
 		for (uint32_t k = 0; k < dim * dim && u[row].real[0]; k++)
 			memcpy(u[row].real[k] + begin, m->gradient[k], n * sizeof(quern_real));
@@ -230,16 +233,16 @@ static quern_status lost(const gather_work *w, int32_t i) {
 	if (!isfinite(v2))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 			"point.velocity is not a number after %s: is the step of %.3g s too long?", material, s->dt);
-	if (!isfinite(stress))
-		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
-			"point.stress at (%.4g, %.4g) m is not a number after %s: is the step of %.3g s too long?", x, y,
-			material, s->dt);
 	if (!(volume > 0 && volume < INFINITY))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 			"point.volume at (%.4g, %.4g) m is turned inside out by one step of %.3g s (%s): unstable, or "
 			"the step is "
 			"too long",
 			x, y, s->dt, material);
+	if (!isfinite(stress))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
+			"point.stress at (%.4g, %.4g) m is not a number after %s: is the step of %.3g s too long?", x, y,
+			material, s->dt);
 	return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 		"at (%.4g, %.4g) m, point.velocity %.3g m/s, goes farther than a cell in one step of %.3g s (%s): "
 		"unstable, or "

@@ -10,6 +10,7 @@
 #include "harness.h"
 #include "table.h"
 #include <stdlib.h>
+#include <string.h>
 
 static const double pi = 3.14159265358979312, gravity = 9.81, density = 1500;
 
@@ -251,6 +252,36 @@ static void lattice_is_uniform(void **state) {
 	assert_true(good);
 }
 
+/* ==== what ends a run ==== */
+
+/* A point that one step turns inside out, det(1 + dt L) = -1/2, ends the run, whatever its material makes of it. */
+static void inside_out_ends_the_run(void **state) {
+	static const char *const laws[] = { "elastic: {bulk_modulus: 1, density: 1000}",
+		"drucker_prager: {bulk_modulus: 1, density: 1000}",
+		"mu_i: {bulk_modulus: 1, diameter: 2 mm, grain_density: 2500, critical_density: 1000}" };
+	const double dt = 1e-3;
+	(void)state;
+	for (int dim = 2; dim <= 3; dim++)
+		for (int m = 0; m < 3; m++) {
+			quern_run *run = harness_open(1,
+				"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
+				"time: {end: 1, step: %g, force: true}, output: {every: 0.1},\n"
+				"continuum: {cell: 0.1, rasterise: affine, material: {%s},\n"
+				"  fill: [{region: {box: {lower: %s, upper: %s}}}]}}\n",
+				dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
+				dim == 2 ? "[1, 1]" : "[1, 1, 1]", dt, laws[m], dim == 2 ? "[0.4, 0.4]" : "[0.4, 0.4, 0.4]",
+				dim == 2 ? "[0.5, 0.5]" : "[0.5, 0.5, 0.5]");
+			const quern_column x = harness_field(run, "point.position"),
+							   v = harness_field(run, "point.velocity"),
+							   l = harness_field(run, "point.affine");
+			for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+				l.real[0][i] = -1.5 / dt, v.real[0][i] = l.real[0][i] * (x.real[0][i] - 0.45);
+			assert_int_equal(harness_try(run, 1), QUERN_E_NUMERIC);
+			assert_non_null(strstr(run->message, "inside out"));
+			harness_close(run);
+		}
+}
+
 /* ==== a grid that goes with its material ==== */
 
 /* A block that crosses a domain of 700 cells has no more blocks of the grid than it needs, wherever it has been: a step
@@ -277,9 +308,30 @@ static void grid_follows_the_block(void **state) {
 	assert_true(good);
 }
 
+/* A point less than half an ulp below a periodic face is brought back to the lower face, not to the upper one, which is
+ * beyond the last cell. */
+static void seams_keep_points_inside(void **state) {
+	(void)state;
+	quern_run *run =
+		harness_open(1, "{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [0.8, "
+						"0.8], periodic: [true, "
+						"true]},\n"
+						"time: {end: 1, step: 1e-4}, output: {every: 0.1},\n"
+						"continuum: {cell: 0.1, material: {elastic: {bulk_modulus: 1, density: 1000}},\n"
+						"  fill: [{region: {box: {lower: [0, 0], upper: [0.8, 0.8]}}}]}}\n");
+	const quern_column x = harness_field(run, "point.position");
+	x.real[0][0] = -1e-30, x.real[1][5] = -1e-18, x.real[0][9] = 0.8;
+	harness_steps(run, 1);
+	const quern_column now = harness_field(run, "point.position");
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		for (int k = 0; k < 2; k++) assert_true(now.real[k][i] >= 0 && now.real[k][i] < 0.8);
+	harness_close(run);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(weight_at_rest),
 		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen),
-		cmocka_unit_test(lattice_is_uniform), cmocka_unit_test(grid_follows_the_block) };
+		cmocka_unit_test(lattice_is_uniform), cmocka_unit_test(inside_out_ends_the_run),
+		cmocka_unit_test(grid_follows_the_block), cmocka_unit_test(seams_keep_points_inside) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
