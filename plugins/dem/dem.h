@@ -13,7 +13,8 @@ typedef struct dem {
 	bool fixed;    /* some grains do not move */
 	bool features; /* some bodies have several */
 	bool settles;
-	quern_real reach; /* m, of the laws beyond touching */
+	quern_real reach;  /* m, of the laws beyond touching */
+	quern_real height; /* m, of the fill, or of the domain where there is none */
 	uint32_t dim;
 } dem;
 

@@ -1,4 +1,5 @@
 /* solver.dem - grains: discs and spheres with contact laws. docs/theory/grains.md */
+#include "../common/height.h"
 #include "dem.h"
 #include <math.h>
 #include <quern/math.h>
@@ -190,7 +191,8 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	dem *d = self;
-	quern_real g2 = 0, height = 0;
+	quern_real g2 = 0;
+	fill_height loose = fill_height_of(setup);
 	d->dim = setup->dim;
 	d->radii.stream = setup->stream;
 	const dem_fill *fill = d->fill.items;
@@ -206,9 +208,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			if (fill[i].lower[k] < setup->lower[k] - slack || fill[i].upper[k] > setup->upper[k] + slack)
 				return setup->host->fail(
 					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
-			const quern_real extent = fill[i].upper[k] - fill[i].lower[k];
-			height = !fill[i].fixed && extent > height ? extent : height;
 		}
+		if (!fill[i].fixed) fill_height_add(&loose, fill[i].lower, fill[i].upper);
 		d->fixed = d->fixed || fill[i].fixed;
 		d->settles = d->settles || fill[i].settle;
 	}
@@ -226,8 +227,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->density);
 	setup->host->publish(setup, "grain.radius_spread", "1", d->radii.spread);
 	setup->host->publish(setup, "grain.radius_law", "1", d->radii.law);
-	setup->host->publish(
-		setup, "fill.height", "m", height > 0 ? height : setup->upper[d->dim - 1] - setup->lower[d->dim - 1]);
+	const quern_real height = fill_height_all(&loose);
+	d->height = height > 0 ? height : setup->upper[loose.axis] - setup->lower[loose.axis];
+	setup->host->publish(setup, "fill.height", "m", d->height);
 	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
 	return QUERN_OK;
 }
@@ -244,11 +246,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
 	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
-	quern_real height = setup->upper[d->dim - 1] - setup->lower[d->dim - 1];
-	const dem_fill *fill = d->fill.items;
-	for (uint32_t i = 0; i < d->fill.n; i++)
-		if (!fill[i].fixed) height = fill[i].upper[d->dim - 1] - fill[i].lower[d->dim - 1];
-	const quern_real pressure = packing * d->density * sqrt(g2) * height;
+	const quern_real pressure = packing * d->density * sqrt(g2) * d->height;
 	const quern_real force = pressure * diameter * (d->dim == 3 ? diameter : 1);
 	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
 		const quern_bound *law = &slot[SLOT_CONTACT][l];

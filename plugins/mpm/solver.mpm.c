@@ -1,4 +1,5 @@
 /* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
+#include "../common/height.h"
 #include "mpm.h"
 #include <math.h>
 #include <stdio.h>
@@ -148,7 +149,8 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mpm *p = self;
-	quern_real g2 = 0, height = 0;
+	quern_real g2 = 0;
+	fill_height loose = fill_height_of(setup);
 	p->dim = setup->dim;
 	p->affine = p->rasterise == RASTERISE_AFFINE;
 	for (uint32_t k = 0; k < p->dim; k++) {
@@ -171,8 +173,10 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			if (fill[i].lower[k] < setup->lower[k] - slack || fill[i].upper[k] > setup->upper[k] + slack)
 				return setup->host->fail(
 					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
-			height = extent > height ? extent : height;
 		}
+	for (uint32_t i = 0; i < p->fill.n; i++) fill_height_add(&loose, fill[i].lower, fill[i].upper);
+	const quern_real height = fill_height_all(&loose);
+	setup->host->publish(setup, "fill.height", "m", height);
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
 	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
 	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(sqrt(g2) / height) : 0);
