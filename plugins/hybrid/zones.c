@@ -19,7 +19,7 @@ typedef struct {
 	heap_entry *heap;
 	size_t n, cap;
 	quern_real *distance; /* by cell */
-	int16_t (*way)[3];    /* by cell: to its source, in cells */
+	int32_t (*way)[3];    /* by cell: to its source, in cells */
 	bool boxes;           /* the source is a whole cell, not its centre */
 	bool failed;
 } spreading;
@@ -56,7 +56,7 @@ static heap_entry pop(spreading *p) {
 	return top;
 }
 
-static quern_real length_of(const spreading *p, const int16_t way[3]) {
+static quern_real length_of(const spreading *p, const int32_t way[3]) {
 	quern_real sum = 0;
 	for (uint32_t k = 0; k < p->d->g->dim; k++) {
 		quern_real x = abs(way[k]);
@@ -66,7 +66,7 @@ static quern_real length_of(const spreading *p, const int16_t way[3]) {
 	return sqrt(sum) * p->d->g->cell;
 }
 
-static void offer(spreading *p, uint32_t cell, const int16_t way[3]) {
+static void offer(spreading *p, uint32_t cell, const int32_t way[3]) {
 	const quern_real distance = length_of(p, way);
 	if (!(distance < p->distance[cell])) return;
 	p->distance[cell] = distance;
@@ -86,10 +86,10 @@ static void spread(spreading *p, const bool *open) {
 				for (int x = -1; x <= 1; x++) {
 					const int step[3] = { x, y, z };
 					int32_t to[3];
-					int16_t way[3];
+					int32_t way[3];
 					for (uint32_t k = 0; k < 3; k++) {
 						to[k] = cell[k] + step[k];
-						way[k] = (int16_t)(p->way[e.cell][k] - step[k]);
+						way[k] = p->way[e.cell][k] - step[k];
 					}
 					const int32_t c = quern_hybrid_entry(p->d, to);
 					if (c >= 0 && (!open || open[c])) offer(p, (uint32_t)c, way);
@@ -110,7 +110,7 @@ quern_status quern_hybrid_nearest(update *d, const bool *source, int32_t *neares
 	quern_real *distance = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	if (!spreading_init(&p, d, false, distance)) return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++)
-		if (source[c]) offer(&p, c, (const int16_t[3]) { 0, 0, 0 });
+		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
 	spread(&p, NULL);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
@@ -208,8 +208,8 @@ static quern_status surface_distance(
 				const bool wall = what == BESIDE_WALL || (what == BESIDE_CELL && f.solid[other]);
 				const bool nothing = what == BESIDE_OPEN && flags & QUERN_SURFACE_FLOOD;
 				const bool open = nothing || (what == BESIDE_CELL && f.outside[other]);
-				int16_t way[3] = { 0 };
-				way[k] = (int16_t)step;
+				int32_t way[3] = { 0 };
+				way[k] = step;
 				if (open || (wall && flags & QUERN_SURFACE_WALLS)) offer(&p, c, way);
 			}
 	}
