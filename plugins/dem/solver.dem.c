@@ -110,8 +110,8 @@ static const quern_use open_uses[] = { F("grain.position", "m", QUERN_UPDATE, QU
 	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
 	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
 	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), FIXED(QUERN_READ), DISPLACEMENT, QUERN_END_USES };
-static const quern_use near_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
-										   .flags = QUERN_OTHERS),
+/* positions are brought back through periodic faces in place, all of them before anybody looks at others */
+static const quern_use near_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
 	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
 	F("grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS), FIXED(QUERN_READ), DISPLACEMENT,
 	F("grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made."),

@@ -74,7 +74,7 @@ static const quern_use fill_uses[] = { F("point.position", "m", QUERN_WRITE, QUE
 	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
 		.doc = "Stored elastic energy."),
 	UNSORTED, F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
-static const quern_use sort_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR), UNSORTED,
+static const quern_use sort_uses[] = { F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR), UNSORTED,
 	QUERN_END_USES };
 static const quern_use scatter_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR),
 	F("point.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
