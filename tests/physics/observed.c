@@ -8,6 +8,8 @@
 #include <cmocka.h>
 
 #include "harness.h"
+#include "table.h"
+#include <observe.h>
 #include <string.h>
 
 static quern_run *grains(const char *fields) {
@@ -62,7 +64,36 @@ static void weights(void **state) {
 	compare_runs(&(scene) { continuum, "point", "[point.weight, point.gradient, point.pressure]" });
 }
 
+/* Two observers of one body say the same: the weight that rests on it. */
+static void two_observers_of_one_body(void **state) {
+	const double weight = 9.81 * 2500 * 3.141592653589793 * 1e-6;
+	bool good = true;
+	quern_series series;
+	(void)state;
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [0.03, 0.05]},\n"
+		"time: {end: 1}, output: {every: 0.1}, observe: [{wall_force: {body: 1}}, {wall_force: {body: 1}}],\n"
+		"bodies: [{plane: {point: [0, 0], normal: [1, 0]}}, {plane: {point: [0, 0], normal: [0, 1]}}],\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.001}}, contact: {linear: {stiffness: 1e4}},\n"
+		"  place: [{position: [0.01, %.17g]}]}}\n",
+		0.001 - weight / 1e4);
+	assert_int_equal(quern_series_init(&series, run, 0), QUERN_OK);
+	assert_int_equal(series.n, 4 + 2 * 3); /* time, step, grains, points; x, y, z of either */
+	table_head("force of a grain on the floor over its weight, by two observers");
+	harness_settle(run);
+	for (int k = 0; k < 3; k++) {
+		assert_int_equal(quern_series_add(&series, run), QUERN_OK);
+		good &= table_row("first", series.column[5].last / weight, k ? -1 : 0, 1e-9);
+		good &= table_row("second", series.column[8].last / weight, k ? -1 : 0, 1e-9);
+		harness_steps(run, 100);
+	}
+	quern_series_finish(&series);
+	harness_close(run);
+	assert_true(good);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(weights) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(weights),
+		cmocka_unit_test(two_observers_of_one_body) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
