@@ -47,6 +47,9 @@ typedef struct quern_contact_ops {
 	/* [setup] N/m, tangent normal stiffness at a normal force of `force` N */
 	quern_real (*stiffness)(const void *self, uint32_t dim, quern_real radius, quern_real force);
 	quern_real (*reach)(const void *self, quern_real radius); /* [setup] m beyond touching; NULL: 0 */
+	/* [setup] damping ratio gamma/(2 sqrt(k m)) of the mode that is damped most, at the stiffness that `period` is of: an
+	 * explicit dashpot has a limit of its own; NULL: 0 */
+	quern_real (*damping)(const void *self, uint32_t dim);
 } quern_contact_ops;
 
 /* ---- neighbours: sort keys, then the candidate pairs of one block ---- */
