@@ -50,7 +50,28 @@ static void part_centre(const update *d, const int32_t cell[3], uint32_t part, q
 		x[k] = k < d->s->dim ? d->g->lower[k] + (cell[k] + (part >> k & 1 ? 0.75 : 0.25)) * d->g->cell : 0;
 }
 
-/* As many points as the mass is worth, a power of two, where the grains are. */
+/* Marks the parts whose middle cannot be seen from particle i of the cell, since a body is in the way, unless that is true
+ * of all; returns how many are left. */
+static uint32_t close_parts(
+	const update *d, uint32_t c, const int32_t cell[3], quern_real *const x[3], int32_t i, bool closed[8]) {
+	const uint32_t parts = parts_of(d);
+	uint32_t n = 0;
+	for (uint32_t p = 0; p < parts; p++) {
+		quern_real to[3], from[3] = { 0 };
+		part_centre(d, cell, p, to);
+		for (uint32_t k = 0; k < d->s->dim; k++) {
+			const quern_real length = d->g->cells[k] * d->g->cell;
+			from[k] = x[k][i];
+			if (d->g->periodic[k]) from[k] -= length * floor((from[k] - to[k]) / length + 0.5);
+		}
+		closed[p] = quern_hybrid_walled(d, c, from, to);
+		n += !closed[p];
+	}
+	if (!n) memset(closed, 0, parts * sizeof *closed);
+	return n ? n : parts;
+}
+
+/* As many points as the mass is worth, a power of two if bodies leave the room, where the grains are. */
 static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]) {
 	const uint32_t parts = parts_of(d);
 	uint32_t count = 1;
@@ -58,7 +79,12 @@ static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]
 	quern_real held[8] = { 0 };
 	bool taken[8] = { false };
 	quern_hybrid_cell(d, c, cell);
+	const bool any = d->grain_begin[c + 1] > d->grain_begin[c];
+	const uint32_t open =
+		any ? close_parts(d, c, cell, d->u[U_GRAIN_POSITION].real, d->grain[d->grain_begin[c]], taken)
+			: parts;
 	while (count < parts && mass / d->nominal >= 1.5 * count) count *= 2;
+	count = count < open ? count : open;
 	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++)
 		held[part_of(d, cell, d->u[U_GRAIN_POSITION].real, d->grain[q])] +=
 			d->u[U_GRAIN_MASS].real[0][d->grain[q]];
@@ -164,6 +190,7 @@ static void split(update *d, uint32_t c) {
 	uint32_t free_part = parts;
 	if (!n || n >= parts || held * share < 0.25 * d->nominal) return;
 	quern_hybrid_cell(d, c, cell);
+	close_parts(d, c, cell, u[U_POINT_POSITION].real, d->point[d->point_begin[c]], taken);
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
 		taken[part_of(d, cell, u[U_POINT_POSITION].real, d->point[q])] = true;
 	for (uint32_t p = parts; p-- > 0;)

@@ -130,28 +130,19 @@ typedef struct {
 	uint32_t *queue;
 } surface;
 
-/* A place is behind a body if it lies in one that is there now. */
-static bool in_body(const update *d, const quern_real x[3]) {
-	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
-		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
-		if (quern_body_is_there(body, d->s->settling) && quern_body_gap(body, d->s->dim, x, 0, NULL) < 0)
-			return true;
-	}
-	return false;
-}
-
-/* What lies one step from a cell: nothing that counts, open space, or a wall. */
+/* What lies one step from a cell: another one, open space, or a wall, which may stand between two cells. */
 enum { BESIDE_CELL, BESIDE_OPEN, BESIDE_WALL };
 
-static int beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t *entry) {
+static int beside(
+	const update *d, uint32_t c, const int32_t cell[3], uint32_t axis, int step, int32_t *entry) {
 	int32_t other[3];
-	quern_real x[3];
+	quern_real from[3], to[3];
 	*entry = quern_hybrid_beside(d, cell, axis, step, other);
-	if (*entry >= 0) return BESIDE_CELL;
-	if (*entry == -1) return BESIDE_OPEN; /* not allocated: nothing is there */
-	quern_hybrid_centre(d, cell, x);
-	x[axis] += step * d->g->cell;
-	return in_body(d, x) ? BESIDE_WALL : BESIDE_OPEN;
+	quern_hybrid_centre(d, cell, from);
+	quern_hybrid_centre(d, cell, to);
+	to[axis] += step * d->g->cell;
+	if (quern_hybrid_walled(d, c, from, to)) return BESIDE_WALL;
+	return *entry < 0 ? BESIDE_OPEN : BESIDE_CELL; /* not allocated: nothing is there */
 }
 
 /* Outside is what the open boundary reaches through cells that are marked so; a void within does not count. */
@@ -163,16 +154,16 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 		if (!quern_hybrid_cell(d, c, cell) || f->solid[c] || level[c] > 0) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2)
-				open = open || beside(d, cell, k, step, &other) == BESIDE_OPEN;
+				open = open || beside(d, c, cell, k, step, &other) == BESIDE_OPEN;
 		if (open) f->outside[c] = true, f->queue[n++] = c;
 	}
 	for (uint32_t q = 0; q < n; q++) {
-		int32_t cell[3], other[3];
+		int32_t cell[3], c;
 		quern_hybrid_cell(d, f->queue[q], cell);
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2) {
-				const int32_t c = quern_hybrid_beside(d, cell, k, step, other);
-				if (c < 0 || f->outside[c] || f->solid[c] || level[c] > 0) continue;
+				if (beside(d, f->queue[q], cell, k, step, &c) != BESIDE_CELL) continue;
+				if (f->outside[c] || f->solid[c] || level[c] > 0) continue;
 				f->outside[c] = true;
 				f->queue[n++] = (uint32_t)c;
 			}
@@ -191,10 +182,8 @@ static quern_status surface_distance(
 		return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
-		quern_real x[3];
 		if (!quern_hybrid_cell(d, c, cell)) continue;
-		quern_hybrid_centre(d, cell, x);
-		f.solid[c] = in_body(d, x);
+		f.solid[c] = d->open[c] == 0;
 		if (!(flags & QUERN_SURFACE_FLOOD)) f.outside[c] = !f.solid[c] && level[c] <= 0;
 	}
 	if (flags & QUERN_SURFACE_FLOOD) flood(d, &f, level);
@@ -204,7 +193,7 @@ static quern_status surface_distance(
 		if (!f.inside[c] || !quern_hybrid_cell(d, c, cell)) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2) {
-				const int what = beside(d, cell, k, step, &other);
+				const int what = beside(d, c, cell, k, step, &other);
 				const bool wall = what == BESIDE_WALL || (what == BESIDE_CELL && f.solid[other]);
 				const bool nothing = what == BESIDE_OPEN && flags & QUERN_SURFACE_FLOOD;
 				const bool open = nothing || (what == BESIDE_CELL && f.outside[other]);

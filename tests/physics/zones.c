@@ -66,7 +66,69 @@ static void far_entries_find_a_cell(void **state) {
 	harness_close(run);
 }
 
+/* A box whose walls cut its cells, or are a quarter of a cell thick, filled with grains: `walls` is false, so that only the
+ * top is a surface. Below its zone no grain is left, along the walls and the floor neither. */
+static void walls_are_no_surface(void **state) {
+	static const struct {
+		const char *name, *bodies;
+		double left, right, floor;
+	} boxes[] = {
+		{ "planes on cell faces",
+			"{plane: {point: [0.008, 0], normal: [1, 0]}}, {plane: {point: [0.112, 0], normal: [-1, 0]}}, "
+			"{plane: "
+			"{point: [0, 0.008], normal: [0, 1]}}",
+			0.008, 0.112, 0.008 },
+		{ "planes that halve cells",
+			"{plane: {point: [0.006, 0], normal: [1, 0]}}, {plane: {point: [0.114, 0], normal: [-1, 0]}}, "
+			"{plane: "
+			"{point: [0, 0.006], normal: [0, 1]}}",
+			0.006, 0.114, 0.006 },
+		{ "planes that leave two fifths",
+			"{plane: {point: [0.0064, 0], normal: [1, 0]}}, {plane: {point: [0.1136, 0], normal: [-1, 0]}}, "
+			"{plane: {point: [0, 0.0064], normal: [0, 1]}}",
+			0.0064, 0.1136, 0.0064 },
+		{ "thin boxes",
+			"{box: {lower: [0.007, 0], upper: [0.008, 0.12]}}, {box: {lower: [0.112, 0], upper: [0.113, "
+			"0.12]}}, "
+			"{box: {lower: [0, 0.007], upper: [0.12, 0.008]}}",
+			0.008, 0.112, 0.008 },
+		{ "thin boxes within cells",
+			"{box: {lower: [0.0055, 0], upper: [0.0065, 0.12]}}, {box: {lower: [0.1135, 0], upper: [0.1145, "
+			"0.12]}}, {box: {lower: [0, 0.0055], upper: [0.12, 0.0065]}}",
+			0.0065, 0.1135, 0.0065 },
+	};
+	const double top = 0.08;
+	bool good = true;
+	(void)state;
+	table_head("grains left below the zone of the free surface");
+	for (size_t k = 0; k < sizeof boxes / sizeof *boxes; k++) {
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.12, 0.12]}\n"
+			"time: {end: 1e-6, step: 1e-9}\nbodies: [%s]\n"
+			"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
+			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
+			"  fill: {region: {box: {lower: [%g, %g], upper: [%g, %g]}}}}\n"
+			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+			"hybrid: {oracle: [{packing_fraction: {depth: 12 mm, half_width: 4 mm}}], substeps: 1, update: "
+			"1}\n",
+			boxes[k].bodies, boxes[k].left, boxes[k].floor, boxes[k].right, top, cell);
+		harness_steps(run, 4);
+		const quern_column x = harness_field(run, "grain.position");
+		int left = 0;
+		for (uint32_t i = 0; i < harness_count(run, "grain"); i++) left += x.real[1][i] < top - 0.026;
+		good &= table_row(boxes[k].name, left, 0, 0);
+		const quern_column p = harness_field(run, "point.position"); /* and no point was made within a wall */
+		for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+			assert_true(p.real[0][i] > boxes[k].left && p.real[0][i] < boxes[k].right &&
+						p.real[1][i] > boxes[k].floor);
+		assert_true(harness_count(run, "point") > 500);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell),
+		cmocka_unit_test(walls_are_no_surface) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
