@@ -234,6 +234,31 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
+/* The largest grain that any source brings; a table that cannot be read is found later, with its place. */
+static quern_real widest(const dem *d) {
+	const dem_place *place = d->place.items;
+	quern_real most = quern_radius_most(&d->radii);
+	grain_table table = { 0 };
+	char why[200];
+	for (uint32_t i = 0; i < d->place.n; i++) most = place[i].radius > most ? place[i].radius : most;
+	if (d->file && quern_grain_table_load(d->file, d->dim, &table, why))
+		for (uint32_t i = 0; i < table.n; i++)
+			most = table.grain[i].radius > most ? table.grain[i].radius : most;
+	quern_grain_table_finish(&table);
+	return most;
+}
+
+/* How far the law acts beyond touching, between two of the largest grains and of one on each body. */
+static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32_t bodies) {
+	const quern_contact_ops *ops = law->ops;
+	quern_real reach = ops->reach(law->self, 0.5 * radius);
+	for (uint32_t b = 0; b < bodies; b++) {
+		const quern_real on_body = ops->reach(law->n_variant ? law->variant[b] : law->self, radius);
+		reach = on_body > reach ? on_body : reach;
+	}
+	d->reach = reach > d->reach ? reach : d->reach;
+}
+
 /* A random packing's bulk modulus, from the affine estimates of docs/theory/grains.md, section 5, with what real
  * packings reach of them: 0.3 k_n for discs, 0.6 of z phi k_n / (3 pi D) for spheres (z = 5). */
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
@@ -252,8 +277,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 		const quern_bound *law = &slot[SLOT_CONTACT][l];
 		const quern_contact_ops *ops = law->ops;
 		if (ops->stiffness) kn += ops->stiffness(law->self, d->dim, 0.5 * d->radii.mean, 0.5 * force);
-		const quern_real reach = ops->reach ? ops->reach(law->self, 0.5 * quern_radius_most(&d->radii)) : 0;
-		d->reach = reach > d->reach ? reach : d->reach;
+		if (ops->reach) find_reach(d, law, widest(d), n_slot[SLOT_BODIES]);
 	}
 	const quern_real bulk =
 		d->dim == 2 ? 0.3 * kn : 0.6 * 5 * packing * kn / (3 * 3.141592653589793 * diameter);

@@ -9,6 +9,8 @@
 #include "harness.h"
 #include "table.h"
 #include "text.h"
+#include <stdlib.h>
+#include <unistd.h>
 
 /* Two grains and a floor, all in touch; the second grain may be fixed. Steps so short that nothing moves. */
 static quern_run *touching(int dim, const char *laws, bool fixed) {
@@ -83,8 +85,58 @@ static void rows_of_every_kind(void **state) {
 		}
 }
 
+/* A law that acts at a distance reaches as far as the largest grains need it, wherever they come from, and as far as any
+ * body's own parameters say: just within its range it pulls. */
+static void laws_reach_the_farthest(void **state) {
+	static const double mean = 1e-3, large = 5e-3;
+	bool good = true;
+	(void)state;
+	table_head("pull of 2 N at a distance");
+	for (int from_file = 0; from_file <= 1; from_file++) {
+		char path[] = "/tmp/quern-laws-XXXXXX", source[160];
+		const double apart = 2 * large + 0.99 * 0.5 * (0.5 * large);
+		if (from_file) {
+			const int file = mkstemp(path);
+			FILE *out = file < 0 ? NULL : fdopen(file, "w");
+			assert_non_null(out);
+			fprintf(out, "x y radius\n0.02 0.05 %g\n%.17g 0.05 %g\n", large, 0.02 + apart, large);
+			fclose(out);
+			snprintf(source, sizeof source, "file: %s", path);
+		} else
+			snprintf(source, sizeof source,
+				"place: [{position: [0.02, 0.05], radius: %g}, {position: [%.17g, 0.05], radius: %g}]", large,
+				0.02 + apart, large);
+		quern_run *run = harness_open(1,
+			"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [0.1, 0.1]},\n"
+			"time: {end: 1e-6, step: 1e-9}, output: {fields: [contact.force]},\n"
+			"grains: {material: {density: 2500, radius: {mean: %g}}, contact: {pulling: {force: 2}}, %s}}\n",
+			mean, source);
+		if (from_file) unlink(path);
+		harness_steps(run, 1);
+		assert_int_equal(harness_count(run, "contact"), 1);
+		good &= table_row(from_file ? "two large grains of a file" : "two large grains",
+			fabs(harness_field(run, "contact.force").real[0][0]), 2, 1e-12);
+		harness_close(run);
+	}
+	for (int own = 0; own <= 1; own++) { /* a range of 0.5 is the law's, of 4 the body's */
+		quern_run *run = harness_open(1,
+			"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [0.1, 0.1]},\n"
+			"time: {end: 1e-6, step: 1e-9}, output: {fields: [touch.force]},\n"
+			"bodies: [{plane: {point: [0, 0], normal: [0, 1]%s}}],\n"
+			"grains: {material: {density: 2500, radius: {mean: %g}}, contact: {pulling: {force: 2}},\n"
+			"  place: [{position: [0.02, %.17g]}]}}\n",
+			own ? ", contact: {range: 4}" : "", mean, mean * (1 + 0.99 * (own ? 4 : 0.5)));
+		harness_steps(run, 1);
+		assert_int_equal(harness_count(run, "touch"), 1);
+		good &= table_row(own ? "a body with a range of its own" : "a body",
+			-harness_field(run, "touch.force").real[1][0], 2, 1e-12);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(every_law_counts),
-		cmocka_unit_test(rows_of_every_kind) };
+		cmocka_unit_test(rows_of_every_kind), cmocka_unit_test(laws_reach_the_farthest) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
