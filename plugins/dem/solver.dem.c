@@ -189,6 +189,15 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 		.run = quern_dem_forces },
 	{ .name = NULL } };
 
+static quern_status refuse_settling(const dem *d, const quern_setup *setup, quern_err *err, const char *why) {
+	const dem_fill *fill = d->fill.items;
+	char param[40];
+	uint32_t i = 0;
+	while (i + 1 < d->fill.n && !fill[i].settle) i++;
+	snprintf(param, sizeof param, "fill.%u.settle", i);
+	return setup->host->fail(err, QUERN_E_PARAM, param, "%s", why);
+}
+
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	dem *d = self;
 	quern_real g2 = 0;
@@ -219,6 +228,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
 	if (d->file) d->fixed = true; /* its header may say so */
 	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
+	if (d->settles && !(g2 > 0))
+		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
 	if (isnan(d->drag)) d->drag = 0.1 * sqrt(gravity / diameter);
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
@@ -265,7 +276,8 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	const uint32_t *n_slot, quern_err *err) {
 	dem *d = self;
 	quern_real kn = 0, g2 = 0;
-	(void)err;
+	if (d->settles && !n_slot[SLOT_CONTACT])
+		return refuse_settling(d, setup, err, "without a contact law grains fall for ever: give contact one");
 	d->features = false;
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
