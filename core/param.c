@@ -363,10 +363,12 @@ static bool left_out(const quern_reading *r, const quern_param *row, void *membe
 	return !(row->flags & QUERN_REQUIRED);
 }
 
-void quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,
+bool quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,
 	const quern_node *map, quern_mark mark, const char *const *also, void *instance) {
 	char say[64];
 	const quern_node *given = map;
+	const bool faults = quern_report_errors(r->report) > 0;
+	bool whole = true;
 	if (map && !quern_node_is_null(map)) {
 		if (map->kind == QUERN_NODE_MAP) check_keys(r, owner, rows, map, "", also);
 		else {
@@ -383,8 +385,11 @@ void quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 		for (const quern_param *other = rows; other->name; other++)
 			opens = opens || is_prefix(row->name, other->name);
 		if (node && opens && node->kind == QUERN_NODE_MAP) node = NULL;
-		if (!node && !left_out(r, row, member) && !is_known_fault(rows, given, row->name, also))
-			missing(r, owner, row, mark);
+		if (!node && !left_out(r, row, member)) {
+			const bool late = row->from && faults;
+			if (!late && !is_known_fault(rows, given, row->name, also)) missing(r, owner, row, mark);
+			whole = whole && !late;
+		}
 		if (row->type == QUERN_T_LIST) {
 			read_list(r, owner, row, node, also, member);
 			continue;
@@ -405,6 +410,7 @@ void quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 		default: break;
 		}
 	}
+	return whole;
 }
 
 void quern_params_finish(const quern_param *rows, void *instance) {

@@ -22,8 +22,9 @@ typedef struct quern_reading {
 
 /* Fills `instance` from `map` (NULL or null: defaults alone). `owner` names the plugin in messages, `mark` is
  * where it stands. Keys that `rows` do not know are faults unless they are in `also` (full dotted names,
- * NULL-terminated, may be NULL). Lists are allocated; quern_params_finish frees them. */
-void quern_params_read(const quern_reading *, const char *owner, const quern_param *rows,
+ * NULL-terminated, may be NULL). Lists are allocated; quern_params_finish frees them. False if a number is lacking that
+ * another part of the scene gives, which may be at fault itself: that is no fault of its own where there is one already. */
+bool quern_params_read(const quern_reading *, const char *owner, const quern_param *rows,
 	const quern_node *map, quern_mark mark, const char *const *also, void *instance);
 /* The check for unknown keys alone. */
 void quern_params_check(const quern_reading *, const char *owner, const quern_param *rows,

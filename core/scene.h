@@ -10,7 +10,8 @@ typedef struct quern_instance {
 	quern_mark mark;
 	char *path; /* "grains.contact" */
 	void *self;
-	bool ready; /* init has succeeded: finish is owed */
+	bool lacking; /* a number that a part at fault would have given: init is not called */
+	bool ready;   /* init has succeeded: finish is owed */
 } quern_instance;
 
 /* One entry of a slot: a plugin, the slot's own rows, and instances with another entry's overrides. */

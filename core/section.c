@@ -26,12 +26,13 @@ static void instance_read(quern_scene *s, quern_instance *it, const char *const 
 	if (!(it->file->plugin.dims & (s->general.dimension == 2 ? QUERN_2D : QUERN_3D)))
 		quern_report_add(s->report, it->mark, "%s does not work in %d dimensions", it->file->plugin.id,
 			s->general.dimension);
-	quern_params_read(&r, it->file->plugin.id, it->file->params, it->map, it->mark, also, it->self);
+	it->lacking =
+		!quern_params_read(&r, it->file->plugin.id, it->file->params, it->map, it->mark, also, it->self);
 }
 
 /* A faulty parameter must not reach init, which may rely on the ranges of its rows; nor must a faulty domain. */
 static void instance_init(quern_scene *s, quern_instance *it, size_t errors_before) {
-	if (quern_report_errors(s->report) != errors_before || !s->sound) return;
+	if (quern_report_errors(s->report) != errors_before || it->lacking || !s->sound) return;
 	if (it->file->plugin.init) {
 		quern_err err = { s->report, it->map, it->mark, it->file->plugin.id };
 		const quern_setup setup = quern_scene_setup(s, it->path);
