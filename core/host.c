@@ -5,10 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Without a log, as in `plan`, a warning goes to the terminal all the same. */
 static void host_log(quern_run *run, int level, const char *fmt, ...) {
 	va_list list;
 	va_start(list, fmt);
 	if (run->log) quern_log_addv(run->log, level, fmt, list);
+	else if (level >= 2) {
+		fputs("warning: ", stderr);
+		vfprintf(stderr, fmt, list);
+		fputs("\n", stderr);
+	}
 	va_end(list);
 }
 

@@ -82,8 +82,45 @@ static void stiffness_is_that_of_the_whole(void **state) {
 	assert_true(bulk[0] > 0 && fabs(bulk[1] / bulk[0] - 1) < 1e-12 && fabs(bulk[2] / bulk[0] - 1) < 1e-12);
 }
 
+/* What of a fill lies in a body that acts on the continuum is left out, and no more: the mass is that of the room. */
+static void points_in_bodies_are_left_out(void **state) {
+	static const struct {
+		const char *name, *bodies;
+		double room; /* m^2, of the fill's 0.64 */
+	} scenes[] = { { "no body", "", 0.64 },
+		{ "a plane under it", "{plane: {point: [0, 0.3], normal: [0, 1]}}", 0.8 * 0.6 },
+		{ "an oblique plane", "{plane: {point: [0.1, 0.1], normal: [1, 1]}}", 0.64 },
+		{ "a plane through its corners", "{plane: {point: [0.5, 0.5], normal: [1, 1]}}", 0.34 },
+		{ "a box within", "{box: {lower: [0.3, 0.3], upper: [0.5, 0.6]}}", 0.64 - 0.06 },
+		{ "two that overlap",
+			"{box: {lower: [0.3, 0.3], upper: [0.5, 0.6]}}, {plane: {point: [0, 0.4], normal: [0, 1]}}",
+			0.8 * 0.5 - 0.2 * 0.2 },
+		{ "one of settling", "{plane: {point: [0, 0.3], normal: [0, 1], while: settling}}", 0.64 },
+		{ "one that does nothing to the grid", "{plane: {point: [0, 0.3], normal: [0, 1], boundary: none}}",
+			0.64 } };
+	bool good = true;
+	(void)state;
+	table_head("mass of a fill over its density, m^2");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		quern_run *run = harness_open(1,
+			"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [1, 1]}, time: "
+			"{end: "
+			"1},\nbodies: [%s],\ncontinuum: {cell: 0.1, material: {elastic: {bulk_modulus: 1e6, density: "
+			"1500}},\n  fill: [{region: {box: {lower: [0.1, 0.1], upper: [0.9, 0.5]}}}, {region: {box: "
+			"{lower: "
+			"[0.1, 0.5], upper: [0.9, 0.9]}}}]}}\n",
+			scenes[k].bodies);
+		const quern_column m = harness_field(run, "point.mass");
+		double mass = 0;
+		for (uint32_t i = 0; i < harness_count(run, "point"); i++) mass += m.real[0][i];
+		good &= table_row(scenes[k].name, mass / 1500, scenes[k].room, 1e-9);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(height_is_along_gravity),
-		cmocka_unit_test(stiffness_is_that_of_the_whole) };
+		cmocka_unit_test(stiffness_is_that_of_the_whole), cmocka_unit_test(points_in_bodies_are_left_out) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
