@@ -94,6 +94,16 @@ static bool overlaps(const placer *p, const quern_spot *a, const quern_spot *b) 
 	return d2 < reach * reach;
 }
 
+/* Over the smaller radius. */
+static quern_real overlap_of(const placer *p, const quern_spot *a, const quern_spot *b) {
+	quern_real d2 = 0;
+	for (uint32_t k = 0; k < p->dim; k++) {
+		const quern_real d = nearest_image(p, k, a->x[k] - b->x[k]);
+		d2 += d * d;
+	}
+	return (a->radius + b->radius - sqrt(d2)) / (a->radius < b->radius ? a->radius : b->radius);
+}
+
 static bool meets_body(const placer *p, const quern_spot *s) {
 	for (uint32_t b = 0; b < p->n_bodies; b++)
 		if (quern_body_gap(&p->body[b], p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
@@ -116,6 +126,25 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 					if (overlaps(p, s, &p->spot[i])) return false;
 			}
 	return !meets_body(p, s);
+}
+
+int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real share, quern_real *by) {
+	const int depth = p->dim == 3 ? 1 : 0;
+	int32_t middle[3] = { 0 }, worst = -1;
+	*by = share;
+	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, s->x[k]);
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -1; y <= 1; y++)
+			for (int x = -1; x <= 1; x++) {
+				const int offset[3] = { x, y, z };
+				int32_t c[3] = { 0 };
+				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
+				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i]) {
+					const quern_real overlap = overlap_of(p, s, &p->spot[i]);
+					if (overlap > *by) *by = overlap, worst = i;
+				}
+			}
+	return worst;
 }
 
 uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const quern_real upper[3],

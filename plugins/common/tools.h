@@ -23,6 +23,14 @@ QUERN_INLINE uint32_t quern_shape_size(uint8_t shape, uint32_t dim) {
 	return (dim == 2 ? planar : spatial)[shape];
 }
 
+/* Faster than light by v, or by v times a length: what such a number stands for is not known, but its energy is none. */
+static inline bool quern_too_fast(const quern_real v[3], quern_real times) {
+	const quern_real light = 299792458;
+	quern_real sum = 0;
+	for (uint32_t k = 0; k < 3; k++) sum += v[k] / light * times * (v[k] / light * times);
+	return !(sum < 1);
+}
+
 /* Brought back through a periodic face, and inside: what is less than half an ulp below `lower` would round to `upper`. */
 static inline quern_real quern_brought_back(quern_real x, quern_real lower, quern_real upper) {
 	x = x >= upper ? x - (upper - lower) : x;

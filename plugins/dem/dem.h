@@ -9,6 +9,7 @@ typedef struct dem {
 	radius_law radii;
 	quern_list fill, place;
 	const char *file;
+	quern_real overlap_most, overlap_start; /* over the smaller radius */
 	int32_t settle_most;
 	bool fixed;    /* some grains do not move */
 	bool features; /* some bodies have several */

@@ -39,6 +39,14 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
+	QUERN_PARAM_AS(dem, overlap_most, "overlap.most", "1",
+		"Overlap over the smaller radius that ends the run where it lasts for several contact durations; 0: "
+		"none "
+		"does, not even a centre behind a body's surface.",
+		.def = 0.1, .max = 1e6),
+	QUERN_PARAM_AS(dem, overlap_start, "overlap.start", "1",
+		"Overlap over the smaller radius that grains of place and file may have at the start.", .def = 0.01,
+		.max = 1e6),
 	QUERN_PARAM_AS(dem, rest, "settle.energy", "1",
 		"At rest when the mean kinetic energy of a grain is below this share of m g d.", .def = 1e-5,
 		.flags = QUERN_MIN_OPEN, .max = 1),
@@ -218,6 +226,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 				return setup->host->fail(
 					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
 		}
+		if (quern_too_fast(fill[i].velocity, 1))
+			return setup->host->fail(err, QUERN_E_PARAM, "fill", "the velocity is beyond that of light");
 		if (!fill[i].fixed) fill_height_add(&loose, fill[i].lower, fill[i].upper);
 		d->fixed = d->fixed || fill[i].fixed;
 		d->settles = d->settles || fill[i].settle;

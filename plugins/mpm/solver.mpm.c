@@ -174,7 +174,11 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 				return setup->host->fail(
 					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
 		}
-	for (uint32_t i = 0; i < p->fill.n; i++) fill_height_add(&loose, fill[i].lower, fill[i].upper);
+	for (uint32_t i = 0; i < p->fill.n; i++) {
+		if (quern_too_fast(fill[i].velocity, 1))
+			return setup->host->fail(err, QUERN_E_PARAM, "fill", "the velocity is beyond that of light");
+		fill_height_add(&loose, fill[i].lower, fill[i].upper);
+	}
 	const quern_real height = fill_height_all(&loose);
 	setup->host->publish(setup, "fill.height", "m", height);
 	setup->host->publish(setup, "grid.cell", "m", p->cell);

@@ -65,7 +65,7 @@ static quern_run *pair(int dim, const char *observe) {
 	return harness_open(1,
 		"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
 		"time: {end: 1, step: 2e-7}, output: {every: 0.1, fields: [grain.weight]}, observe: [%s],\n"
-		"grains: {material: {density: 2500, radius: {mean: 1 mm}},\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, overlap: {start: 0.02},\n"
 		"  contact: [{linear: {stiffness: %g, friction: 0, restitution: 0.9}}, " ROLLING "],\n"
 		"  place: [{position: %s, spin: %s}, {position: %s, radius: 0.7 mm, spin: %s}]}}\n",
 		dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",

@@ -62,7 +62,8 @@ static quern_run *open_contact(const law *l, bool hertz) {
 		"{quern: 1, dimension: 2, gravity: [0, %.17g], domain: {lower: [-1, -1], upper: [1, 100]},\n"
 		"time: {end: 1000}, output: {every: 1000, fields: [grain.force]},\n"
 		"bodies: [{plane: {point: [0, 0], normal: [0, 1]}}],\n"
-		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, contact: {%s},\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, contact: {%s}, overlap: {start: 3, most: "
+		"0},\n"
 		"  place: [{position: [0, %.17g]}]}, observe: [energy]}\n",
 		-l->load / mass, l->parameters, radius - depth * (1 - 1e-3));
 }
