@@ -346,6 +346,7 @@ typedef struct quern_step {
 	const uint32_t *n_slot;
 	const quern_host *host;
 	quern_run *run;
+	bool before_output; /* after this long step frames and observers look at the state */
 } quern_step;
 
 typedef struct quern_stage {

@@ -95,7 +95,10 @@ enum {
 	FORCE_TREMBLING,
 	FORCE_CONTACT_COUPLE,
 	FORCE_TOUCH_COUPLE,
-	FORCE_FEATURE
+	FORCE_FEATURE,
+	FORCE_DEEP_FIRST,
+	FORCE_DEEP_SECOND,
+	FORCE_DEEP_TIME
 };
 
 /* moment of inertia over mass times radius squared */
@@ -105,6 +108,8 @@ quern_status quern_dem_fill(const void *self, const quern_step *);
 quern_status quern_dem_open(const void *self, const quern_step *);
 quern_status quern_dem_neighbours(const void *self, const quern_step *);
 quern_status quern_dem_forces(const void *self, const quern_step *);
+/* Ends the run for a grain that is out of the domain along an axis. */
+quern_status quern_dem_left(const quern_step *, int64_t id, uint32_t axis, quern_real x);
 bool quern_dem_settled(const void *self, const quern_step *);
 
 /* ---- grain_file.c ---- */

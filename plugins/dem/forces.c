@@ -122,6 +122,7 @@ static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	if (sh->contact) quern_dem_pairs(sh, &w, b, sums);
 	if (sh->touch) quern_dem_touches(sh, &w, b, sums);
 	quern_dem_integrate(sh, &w, b, sums);
+	if (sh->looks) quern_dem_look_at_grains(sh, b);
 }
 
 static bool any_couples(const quern_step *s) {
@@ -160,8 +161,16 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->farthest = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(quern_real));
 	sh->turned = s->host->memory(s->run, (size_t)grains.n_blocks * 2 * sizeof(quern_real));
 	sh->bad = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(int32_t));
-	for (uint32_t b = 0; b < grains.n_blocks && sh->bad; b++) sh->bad[b] = -1;
-	return sh->impulse && sh->sums && sh->farthest && sh->turned && sh->bad;
+	quern_dem_decide_looks(sh);
+	sh->outside = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(int32_t));
+	if (sh->deep) {
+		sh->worst = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(deep_contact));
+		sh->watched = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(deep_contact));
+		if (!sh->worst || !sh->watched) return false;
+	}
+	if (!sh->bad || !sh->outside) return false;
+	for (uint32_t b = 0; b < grains.n_blocks; b++) sh->bad[b] = sh->outside[b] = -1;
+	return sh->impulse && sh->sums && sh->farthest && sh->turned;
 }
 
 /* Blocks in order, so that sums do not depend on who did what. */
@@ -195,6 +204,13 @@ static quern_status lost(const forces_shared *sh, int32_t i) {
 	quern_real v2 = 0;
 	for (uint32_t k = 0; k < s->dim; k++) v2 += u[FORCE_VELOCITY].real[k][i] * u[FORCE_VELOCITY].real[k][i];
 	const char *law = sh->n_laws ? s->slot[SLOT_CONTACT][0].id : "gravity";
+	quern_real turn2 = 0;
+	for (uint32_t k = 0; k < (s->dim == 3 ? 3u : 1u) && sh->spin; k++)
+		turn2 += u[FORCE_SPIN].real[k][i] * s->dt * (u[FORCE_SPIN].real[k][i] * s->dt);
+	if (isfinite(v2) && !(turn2 <= 1))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", u[FORCE_ID].id[i],
+			"grain.spin turns it by %.3g radian in one step of %.3g s (%s): unstable, or the spin is absurd",
+			sqrt(turn2), s->dt, law);
 	if (!isfinite(v2))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", u[FORCE_ID].id[i],
 			"grain.velocity is not a number after %s: is the step of %.3g s too long?", law, s->dt);
@@ -234,5 +250,7 @@ quern_status quern_dem_forces(const void *self, const quern_step *s) {
 	for (uint32_t b = 0; b < grains.n_blocks; b++)
 		if (sh.bad[b] >= 0) return lost(&sh, sh.bad[b]);
 	collect(&sh, grains.n_blocks);
-	return look_for_trembling(&sh, grains.n_blocks);
+	quern_status status = sh.looks ? quern_dem_judge_grains(&sh, grains.n_blocks) : QUERN_OK;
+	if (status == QUERN_OK && sh.deep) status = quern_dem_judge_contacts(&sh, grains.n_blocks);
+	return status == QUERN_OK ? look_for_trembling(&sh, grains.n_blocks) : status;
 }

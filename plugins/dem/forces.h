@@ -6,6 +6,13 @@
 enum { GRAINS = 128 }; /* integrated at once */
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
+/* A contact deeper than is allowed. */
+typedef struct deep_contact {
+	quern_real by, force, period, stiffness; /* over the smaller radius; N; s; N/m; by 0: there is none */
+	int64_t first, second;                   /* ids; -1 - k for body k */
+	const char *law;
+} deep_contact;
+
 /* What all blocks share. */
 typedef struct forces_shared {
 	const dem *d;
@@ -21,6 +28,9 @@ typedef struct forces_shared {
 	quern_real *farthest; /* [block] square of the way since the last list */
 	quern_real *turned;   /* [block][2] sums of m v.v', of old and new velocity, and of m */
 	int32_t *bad;         /* [block] first grain that is lost, or -1 */
+	bool looks, deep;     /* grains are looked at in this step; contacts are */
+	int32_t *outside;     /* [block] first grain out of the domain, or -1 */
+	deep_contact *worst, *watched; /* [block] */
 } forces_shared;
 
 /* A law's own columns of a batch: of the contacts, or of the first and of the second grains. */
@@ -57,6 +67,15 @@ void quern_dem_add_couples(const forces_shared *, const forces_work *, quern_rea
 /* Stores what the pairs kept were given, such as their force; the others get zero. */
 void quern_dem_keep(const forces_work *, quern_real *const given[3], quern_column out, uint32_t components,
 	uint32_t begin, uint32_t n_slots, uint32_t n);
+/* ---- look.c ---- */
+void quern_dem_decide_looks(forces_shared *);
+void quern_dem_look_at_contacts(
+	const forces_shared *, const forces_work *, uint32_t b, int32_t body, uint32_t n);
+void quern_dem_look_at_grains(const forces_shared *, uint32_t b);
+quern_status quern_dem_judge_contacts(const forces_shared *, uint32_t n_blocks);
+quern_status quern_dem_judge_grains(const forces_shared *, uint32_t n_blocks);
+
+/* ---- forces.c ---- */
 /* Books energies of the pairs whose first grain is in [first, last), and what springs that opened still held. */
 void quern_dem_book(const forces_shared *, const forces_work *, quern_column held, uint32_t begin,
 	uint32_t n_slots, uint32_t n, uint32_t first, uint32_t last, const int32_t *first_of, quern_real *sums);

@@ -320,6 +320,11 @@ static quern_status check_periodic(const listing *l) {
 	return QUERN_OK;
 }
 
+quern_status quern_dem_left(const quern_step *s, int64_t id, uint32_t axis, quern_real x) {
+	return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", id,
+		"left the domain along axis %u, at %.4g m: put a body there or make the domain larger", axis, x);
+}
+
 /* A closed domain has bodies that keep grains inside; periodic axes bring them back here, where lists are remade. */
 static quern_status keep_inside(const listing *l) {
 	const quern_step *s = l->s;
@@ -331,9 +336,7 @@ static quern_status keep_inside(const listing *l) {
 		for (uint32_t i = 0; i < n; i++) {
 			if (s->periodic[k]) x[i] = quern_brought_back(x[i], lower, upper);
 			else if (!(x[i] >= lower && x[i] <= upper) && !(fixed && fixed[i]))
-				return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", s->use[NEAR_ID].id[i],
-					"left the domain along axis %u, at %.4g m: put a body there or make the domain larger", k,
-					x[i]);
+				return quern_dem_left(s, s->use[NEAR_ID].id[i], k, x[i]);
 		}
 	}
 	return QUERN_OK;

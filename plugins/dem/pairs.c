@@ -184,6 +184,7 @@ QUERN_INLINE void block(
 		motion(sh, w, n, dim, spin);
 		masses(sh, w, n);
 		quern_dem_call_laws(sh, w, -1, begin, n_slots, n);
+		if (sh->deep) quern_dem_look_at_contacts(sh, w, b, -1, n);
 		if (spin) dem_torques(w, w->force, w->torque, n, dim);
 		add_pairs(sh, w, w->row, w->force, w->torque, first, last, n, dim, spin);
 		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->row, w->couple, -1, first, last, n);

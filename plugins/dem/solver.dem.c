@@ -172,7 +172,14 @@ static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUE
 		.doc = "On the first, unweighted."),
 	F("touch.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
 		.doc = "On the grain, unweighted."),
-	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"), QUERN_END_USES };
+	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"),
+	F("total.deep_first", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", .initial = -1,
+		.doc = "Id of the grain whose deep contact is watched; -1: none is."),
+	F("total.deep_second", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
+		.doc = "Id of its partner; -1 - k for body k."),
+	F("total.deep_time", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
+		.doc = "For how long the contact has been deep."),
+	QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "dem.fill",
 										  .doc = "Places the first grains.",

@@ -78,6 +78,7 @@ QUERN_INLINE void block(
 		for (n = 1; begin + n < end && n < sh->cap && body[begin + n] == body[begin]; n++) {}
 		touch_body(sh, w, (uint32_t)body[begin], begin, n, dim, spin);
 		quern_dem_call_laws(sh, w, body[begin], begin, n, n);
+		if (sh->deep) quern_dem_look_at_contacts(sh, w, b, body[begin], n);
 		if (spin) dem_torques(w, w->force, w->torque, n, dim);
 		add_touches(sh, w, w->row, w->force, w->torque, first, n, dim, spin);
 		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->row, w->couple, body[begin], first, last, n);

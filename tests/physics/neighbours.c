@@ -157,7 +157,7 @@ static quern_run *collapse(const char *search, uint32_t dim, bool periodic) {
 		"time: {end: 1}, output: {every: 0.01},\n"
 		"bodies: [{plane: {point: [0, 0%s], normal: [0, 1%s]}}%s],\n"
 		"grains: {material: {density: 2500, radius: {mean: 0.01, spread: 0.4, law: uniform}},\n"
-		"  contact: {linear: {stiffness: 1e5, friction: 0.5}}, neighbours: %s,\n"
+		"  overlap: {most: 0}, contact: {linear: {stiffness: 1e5, friction: 0.5}}, neighbours: %s,\n"
 		"  fill: [{region: {box: {lower: [0.02, 0.02%s], upper: [%s]}}, velocity: [0.3, -1%s]}]}}\n",
 		dim, deep ? ", 1" : "", deep ? ", 0" : "", deep ? "0.2, 1, 0.2" : "0.4, 1",
 		periodic ? (deep ? "true, false, true" : "true, false")
