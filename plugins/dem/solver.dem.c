@@ -40,9 +40,7 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
 	QUERN_PARAM_AS(dem, overlap_most, "overlap.most", "1",
-		"Overlap over the smaller radius that ends the run where it lasts for several contact durations; 0: "
-		"none "
-		"does, not even a centre behind a body's surface.",
+		"Overlap over the smaller radius that ends the run where it lasts; 0: none does.",
 		.def = 0.1, .max = 1e6),
 	QUERN_PARAM_AS(dem, overlap_start, "overlap.start", "1",
 		"Overlap over the smaller radius that grains of place and file may have at the start.", .def = 0.01,
