@@ -6,8 +6,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+void check_environment(const check *c) {
+	const char *changed = quern_environment_restore(c->home);
+	if (changed && !*c->shared->left)
+		snprintf(c->shared->left, sizeof c->shared->left, "%s.%s: changes %s",
+			quern_id_name(c->file->plugin.id), c->shared->place, changed);
+}
+
 void check_place(const check *c, const char *fmt, ...) {
 	va_list list;
+	if (quern_arithmetic() != c->home->arithmetic) check_environment(c);
 	va_start(list, fmt);
 	vsnprintf(c->shared->place, sizeof c->shared->place, fmt, list);
 	va_end(list);
@@ -97,10 +105,6 @@ void check_kernel_finish(check_kernel *k) {
 }
 
 static int add_column(check_kernel *k, const char *text, check_role role, bool integer) {
-	if (k->n_columns == CHECK_COLUMNS) {
-		fputs("quern check: the plugin uses too many columns\n", stderr);
-		exit(2);
-	}
 	check_column *c = &k->column[k->n_columns];
 	*c = (check_column) { .name = text, .role = role, .integer = integer };
 	c->given = quern_take(k->n, sizeof(quern_real));
@@ -176,11 +180,10 @@ void check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) 
 	k->hook = hook;
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
 		const quern_use *row = &rows[r];
-		if (row->hook != hook || row->access > QUERN_ADD || row->shape == QUERN_ID) continue;
+		if (row->hook != hook || row->shape == QUERN_ID) continue;
+		if (!strcmp(row->field, "contact.couple")) continue; /* a batch brings it, beside the force */
 		if ((row->with || row->flags & (QUERN_OPTIONAL | QUERN_WANTED)) && !optional) continue;
 		if (!check_counts(k->check, k->instance, row)) continue;
-		if (!strcmp(row->field, "contact.couple"))
-			continue; /* says that there are couples: a column of its own */
 		for (uint32_t side = 0; side <= second; side++) {
 			int *use = side ? k->use_second : k->use;
 			const bool history = !strncmp(row->field, "contact.", 8);
@@ -219,12 +222,6 @@ typedef struct {
 	const char **culprit;
 } runner;
 
-static uint32_t control_word(void) {
-	uint16_t x87;
-	__asm__ volatile("fnstcw %0" : "=m"(x87));
-	return (__builtin_ia32_stmxcsr() & ~63u) ^ (uint32_t)x87 << 16;
-}
-
 static void load_column(
 	const check_column *c, char *to, uint32_t begin, uint32_t n, uint32_t cap, size_t stride) {
 	const size_t size = entry_bytes(c);
@@ -238,10 +235,9 @@ static void load_column(
 		memcpy(to + i * size, (const char *)c->given + (begin + n - 1) * size, size);
 }
 
+/* The first byte is, and each is like the one before. */
 static bool is_poison(const char *bytes, size_t n) {
-	for (size_t i = 0; i < n; i++)
-		if ((unsigned char)bytes[i] != POISON) return false;
-	return true;
+	return (unsigned char)*bytes == POISON && !memcmp(bytes, bytes + 1, n - 1);
 }
 
 static void store_column(runner *r, uint32_t worker, const check_column *c, const char *from, uint32_t begin,
@@ -265,9 +261,9 @@ static void run_piece(void *arg, uint32_t piece, uint32_t worker) {
 		load_column(&k->column[c], column, begin, n, b.cap, r->stride);
 		b.at[c] = column;
 	}
-	const uint32_t before = control_word();
+	const unsigned before = quern_arithmetic();
 	k->call(k, &b);
-	r->environment[worker] += control_word() != before;
+	if (quern_arithmetic() != before) r->environment[worker]++, quern_arithmetic_set(before);
 	for (uint32_t c = 0; c < k->n_columns; c++)
 		store_column(r, worker, &k->column[c], b.at[c], begin, n, b.cap);
 }

@@ -3,23 +3,30 @@
  * A kernel is a function of a plugin that is called with batches, together with the columns it gets. Every call gets
  * copies of its own: cut as wished, padded with harmless lanes, with guards on both ends. */
 #pragma once
+#include "environment.h"
 #include "pool.h"
 #include "scene.h"
 
 /* What a child process tells its parent, in memory that both see. */
 typedef struct check_shared {
 	char place[160]; /* what is being called, for the message about a crash */
+	char left[240];  /* what a call has left behind in the environment; "": nothing */
 	uint32_t properties, failed;
 } check_shared;
 
 typedef struct check {
 	const quern_plugin_file *file;
 	const quern_node *given; /* parameters of --set */
+	uint32_t dimension;      /* 0: all that the plugin has */
 	quern_units *units;
 	check_shared *shared;
+	quern_environment *home; /* what every call is to leave as it is */
 } check;
 
+/* Names the next call. If the last one has changed arithmetic, that is noted and put back. */
 __attribute__((format(printf, 2, 3))) void check_place(const check *, const char *fmt, ...);
+/* The same for all of the environment, after calls that may do more than compute. */
+void check_environment(const check *);
 
 /* Uniform in [low, high), a function of its arguments. */
 double check_uniform(uint64_t key, uint64_t counter, double low, double high);
@@ -47,6 +54,7 @@ typedef struct check_instance {
 	uint32_t dim;
 	quern_tree *tree; /* keeps texts */
 	quern_report *report;
+	uint64_t setting;
 	bool ready;
 	char why[240]; /* why there is none */
 } check_instance;
@@ -56,6 +64,9 @@ typedef enum { CHECK_READY, CHECK_REFUSED, CHECK_RUDE } check_outcome;
 /* Setting 0: ordinary parameters; 1 .. 2 n: one of them at its lower or upper bound; above: any mixture. RUDE: init
  * fails without a word, or complains and goes on; REFUSED: the reason is in `why`. Finish in any case. */
 check_outcome check_instance_create(const check *, uint32_t dim, uint64_t setting, check_instance *);
+/* The same setting with every parameter that contains a mass, such as N/m or J/kg, for masses that are `factor` times as
+ * large. */
+check_outcome check_instance_scaled(const check *, const check_instance *, double factor, check_instance *);
 void check_instance_finish(const check *, check_instance *);
 uint64_t check_settings(const check *); /* how many single ones there are, setting 0 included */
 /* A value of ordinary size in this unit: 1e-3 for m, 1500 for kg/m^3. */
@@ -63,7 +74,8 @@ double check_ordinary(const check *, const char *unit);
 bool check_counts(const check *, const check_instance *, const quern_use *);
 
 /* ---- kernels ---- */
-enum { CHECK_COLUMNS = 128, CHECK_ROWS = 24, CHECK_NAMES = 20 };
+/* Columns: all uses on both sides as tensors, and what a kind knows by a name. */
+enum { CHECK_ROWS = QUERN_MOST_USES, CHECK_COLUMNS = 2 * 9 * CHECK_ROWS + 64, CHECK_NAMES = 20 };
 typedef enum { CHECK_IN, CHECK_CHANGED, CHECK_OUT } check_role;
 
 typedef struct check_column {
@@ -125,7 +137,7 @@ bool check_finite(const check_kernel *, const char **column);
 
 static inline uint32_t check_axial(uint32_t dim) { return dim == 3 ? 3 : 1; }
 static inline bool check_has_dim(const check *c, uint32_t dim) {
-	return c->file->plugin.dims & (dim == 2 ? QUERN_2D : QUERN_3D);
+	return (!c->dimension || c->dimension == dim) && c->file->plugin.dims & (dim == 2 ? QUERN_2D : QUERN_3D);
 }
 uint32_t check_components(uint8_t shape, uint32_t dim);
 

@@ -135,8 +135,10 @@ static void check_pose(
 					 pose->position[a];
 		for (uint32_t a = 0; a < k->dim; a++) {
 			const uint32_t b = (a + 1) % 3, c = (a + 2) % 3;
-			const double v =
-				pose->velocity[a] + (spins ? pose->spin[b] * arm[c] - pose->spin[c] * arm[b] : 0);
+			double v = pose->velocity[a] + (spins ? pose->spin[b] * arm[c] - pose->spin[c] * arm[b] : 0);
+			for (uint32_t e = 0; e < k->dim;
+				 e++) /* the surface's own, as that of a drum, turns with the pose */
+				v += pose->turn[3 * a + e] * check_found(k, SPEED, e)[i];
 			check_measure(t, fabs(check_found(posed, SPEED, a)[i] - v), 1e-9,
 				"%u-D: the surface moves with %.9g m/s, should with %.9g", k->dim,
 				check_found(posed, SPEED, a)[i], v);

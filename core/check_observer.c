@@ -121,14 +121,9 @@ static void try_map(const check *c, const check_instance *it, bool optional, tal
 static void check_outputs(const check *c) {
 	check_tally t = { .name = "outputs" };
 	const quern_observer_ops *ops = c->file->plugin.ops;
-	check_expect(&t, outputs(c) > 0, "there are no outputs");
-	check_expect(&t, (ops->map != NULL) != (ops->whole != NULL), "give map or whole, one of them");
-	check_expect(&t, !ops->map || ops->set, "map runs over no set");
 	for (const quern_output *o = ops->outputs; o && o->name; o++) {
-		check_expect(&t, quern_is_name(o->name), "'%s' must be letters, digits and underscores", o->name);
 		check_expect(&t, o->doc && *o->doc, "%s: no doc", o->name);
 		check_expect(&t, check_is_unit(c, o->unit), "%s: '%s' is no unit", o->name, o->unit ? o->unit : "");
-		check_expect(&t, o->combine <= QUERN_MIN, "%s: combine %u is unknown", o->name, o->combine);
 		for (const quern_output *other = ops->outputs; other != o; other++)
 			check_expect(&t, strcmp(other->name, o->name) != 0, "%s stands twice", o->name);
 	}

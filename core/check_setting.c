@@ -36,7 +36,10 @@ static double within(const quern_param *row, double x) {
 	return x;
 }
 
-static bool needs_a_value(const quern_param *row) { return row->flags & QUERN_REQUIRED; }
+/* Nobody publishes anything here. */
+static bool needs_a_value(const quern_param *row) {
+	return row->flags & QUERN_REQUIRED || (row->from && !(row->flags & QUERN_MAYBE));
+}
 
 static double usual(const check *c, uint32_t dim, const quern_param *row) {
 	if (needs_a_value(row) || row->from || row->flags & QUERN_MAYBE)
@@ -178,6 +181,7 @@ static check_outcome call_init(const check *c, check_instance *it, uint64_t sett
 	setup.gravity[up] = -9.81;
 	check_place(c, "init, %u-D, with setting %llu of its parameters", it->dim, (unsigned long long)setting);
 	const quern_status status = c->file->plugin.init(it->self, &setup, &err);
+	check_environment(c);
 	const bool spoke = quern_report_errors(it->report) > 0;
 	it->ready = status == QUERN_OK;
 	if (it->ready && !spoke) return CHECK_READY;
@@ -188,10 +192,23 @@ static check_outcome call_init(const check *c, check_instance *it, uint64_t sett
 	return CHECK_RUDE;
 }
 
-static check_outcome create(const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
+static void scale_rows(const check *c, const quern_param *rows, double factor, void *self) {
+	for (; rows && rows->name; rows++) {
+		quern_real *at = (quern_real *)(void *)((char *)self + rows->offset);
+		const quern_list *list = (const quern_list *)(const void *)at;
+		const double times = pow(factor, quern_units_mass(c->units, rows->unit ? rows->unit : "1"));
+		const uint32_t n = rows->type == QUERN_T_REAL ? 1 : rows->type == QUERN_T_VECTOR ? 3 : 0;
+		for (uint32_t k = 0; k < n; k++) at[k] *= times;
+		for (uint32_t i = 0; rows->type == QUERN_T_LIST && i < list->n; i++)
+			scale_rows(c, rows->rows, factor, (char *)list->items + (size_t)i * list->item_size);
+	}
+}
+
+static check_outcome create(
+	const check *c, uint32_t dim, uint64_t setting, double factor, check_instance *it) {
 	const quern_plugin *p = &c->file->plugin;
 	const size_t size = (p->instance_size + 127u) & ~(size_t)63;
-	*it = (check_instance) { .dim = dim };
+	*it = (check_instance) { .dim = dim, .setting = setting };
 	it->report = quern_report_create();
 	it->tree = quern_take(1, sizeof *it->tree);
 	it->tree->root = quern_node_create(QUERN_NODE_MAP);
@@ -203,6 +220,7 @@ static check_outcome create(const check *c, uint32_t dim, uint64_t setting, chec
 	const quern_reading reading = { it->report, c->units, dim, NULL, 0, it->tree };
 	quern_params_read(&reading, p->id, c->file->params, it->tree->root, (quern_mark) { 0 }, NULL, it->self);
 	if (quern_report_errors(it->report)) return say_why(it, ""), CHECK_REFUSED;
+	if (factor != 1) scale_rows(c, c->file->params, factor, it->self);
 	if (p->init) return call_init(c, it, setting);
 	it->ready = true;
 	return CHECK_READY;
@@ -210,9 +228,9 @@ static check_outcome create(const check *c, uint32_t dim, uint64_t setting, chec
 
 check_outcome check_instance_create(const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
 	check_instance other;
-	check_outcome outcome = create(c, dim, setting, it);
+	check_outcome outcome = create(c, dim, setting, 1, it);
 	for (uint64_t i = 0; !setting && outcome == CHECK_REFUSED && i < 200; i++) {
-		if (create(c, dim, nearby + i, &other) == CHECK_READY) {
+		if (create(c, dim, nearby + i, 1, &other) == CHECK_READY) {
 			check_instance_finish(c, it);
 			*it = other;
 			return CHECK_READY;
@@ -222,9 +240,15 @@ check_outcome check_instance_create(const check *c, uint32_t dim, uint64_t setti
 	return outcome;
 }
 
+check_outcome check_instance_scaled(
+	const check *c, const check_instance *base, double factor, check_instance *it) {
+	return create(c, base->dim, base->setting, factor, it);
+}
+
 void check_instance_finish(const check *c, check_instance *it) {
 	check_place(c, "finish, %u-D", it->dim);
 	if (it->ready && c->file->plugin.finish) c->file->plugin.finish(it->self);
+	check_environment(c);
 	if (it->self) quern_params_finish(c->file->params, it->self);
 	free(it->self);
 	quern_tree_destroy(it->tree);

@@ -3,5 +3,5 @@
 #include "check.h"
 
 bool check_is_unit(const check *, const char *unit);
-void check_parameter_rows(const check *, check_tally *, const quern_param *, size_t size, int depth);
-void check_use_rows(const check *, check_tally *, const quern_use *, const quern_param *params);
+void check_parameter_rows(const check *, check_tally *, const quern_param *);
+void check_use_rows(const check *, check_tally *, const quern_use *);

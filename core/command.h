@@ -1,5 +1,6 @@
 /* command - what the program does from the command line; each returns the exit status */
 #pragma once
+#include <stdio.h>
 
 enum {
 	QUERN_EXIT_DONE,
@@ -19,5 +20,7 @@ int quern_command_new(int argc, char **argv);
 int quern_command_check(int argc, char **argv);
 int quern_command_render(int argc, char **argv);
 
-/* A line to stderr that ends with how to get help; returns QUERN_EXIT_USAGE. */
+/* "usage: quern COMMAND ...", without the end of the line. */
+void quern_print_usage(const char *command, FILE *);
+/* A sentence to stderr, and below it how to get help; returns QUERN_EXIT_USAGE. */
 int quern_usage(const char *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));

@@ -1,16 +1,13 @@
 /* quern check - conformance tests of one plugin, each group in a process of its own, so that a crash is one sentence */
 #include "check.h"
+#include "child.h"
 #include "command.h"
-#include "text.h"
-#include <signal.h>
+#include "level.h"
+#include "options.h"
 #include <stdlib.h>
-#include <string.h>
-#include <sys/mman.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 /* A group of tests takes a few seconds; one that goes on for ever is stopped. */
-static unsigned seconds = 120;
+static int64_t seconds = 120;
 
 static const check_kind *const kinds[QUERN_KINDS] = { [QUERN_CONTACT] = &check_contact,
 	[QUERN_NEIGHBOURS] = &check_neighbours,
@@ -29,56 +26,38 @@ static void group_parameters(const check *c) { check_parameters(c, kinds[c->file
 static void group_batches(const check *c) { check_batches(c, kinds[c->file->plugin.kind]); }
 static void group_law(const check *c) { kinds[c->file->plugin.kind]->law(c); }
 
-static const char *signal_name(int number) {
-	switch (number) {
-	case SIGSEGV: return "SIGSEGV";
-	case SIGBUS: return "SIGBUS";
-	case SIGFPE: return "SIGFPE";
-	case SIGILL: return "SIGILL";
-	case SIGABRT: return "SIGABRT";
-	default: return strsignal(number);
-	}
+/* ---- groups of tests, each in a child ---- */
+
+typedef struct {
+	const check *c;
+	void (*group)(const check *);
+} errand;
+
+static void run_errand(void *arg) {
+	const errand *e = arg;
+	e->group(e->c);
+	check_environment(e->c);
 }
 
-static void tell_end(const check *c, const char *group, int status) {
-	const char *id = c->file->plugin.id, *name = strchr(id, '.') + 1;
-	const check_shared *s = c->shared;
-	if (WIFEXITED(status) && !WEXITSTATUS(status)) return;
-	if (WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM)
-		printf("  FAILED  %s: %s: did not come back within %u s from %s.%s\n", group, id, seconds, name,
-			s->place);
-	else if (WIFSIGNALED(status))
-		printf("  FAILED  %s: %s: crashed (%s) in %s.%s\n", group, id, signal_name(WTERMSIG(status)), name,
-			s->place);
-	else printf("  FAILED  %s: %s: ended the program in %s.%s\n", group, id, name, s->place);
+static void run_group(const check *c, const char *name, void (*group)(const check *)) {
+	errand e = { c, group };
+	char what[80];
+	check_place(c, "its tables");
+	const quern_child how = quern_child_run(run_errand, &e, (unsigned)seconds);
+	if (how.end == QUERN_CHILD_DONE) return;
+	quern_child_say(&how, (unsigned)seconds, what);
+	printf("  FAILED  %s: %s: %s %s %s.%s\n", name, c->file->plugin.id, what,
+		how.end == QUERN_CHILD_LATE ? "from" : "in", quern_id_name(c->file->plugin.id), c->shared->place);
 	c->shared->properties++;
 	c->shared->failed++;
 }
 
-/* The child returns through _exit, so that nothing of the parent is closed or written twice. */
-static void run_group(const check *c, const char *name, void (*group)(const check *)) {
-	int status = 0;
-	fflush(stdout);
-	check_place(c, "its tables");
-	const pid_t child = fork();
-	if (child < 0) {
-		perror("quern check: fork");
-		exit(QUERN_EXIT_IO);
-	}
-	if (!child) {
-		alarm(seconds);
-		group(c);
-		fflush(stdout);
-		_exit(0);
-	}
-	while (waitpid(child, &status, 0) < 0) continue;
-	tell_end(c, name, status);
-}
-
 static int run_checks(check *c) {
 	const quern_plugin *p = &c->file->plugin;
-	c->shared = mmap(NULL, sizeof *c->shared, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-	if (c->shared == MAP_FAILED) return perror("quern check: mmap"), QUERN_EXIT_IO;
+	c->shared = quern_shared_take(sizeof *c->shared);
+	if (!c->shared) return perror("quern check"), QUERN_EXIT_IO;
+	quern_environment home = quern_environment_take();
+	c->home = &home;
 	printf("%s, %s\n", p->id, c->file->path);
 	run_group(c, "tables", group_table);
 	if (p->kind == QUERN_SOLVER) run_group(c, "solver", check_solver);
@@ -87,45 +66,57 @@ static int run_checks(check *c) {
 		if (kinds[p->kind]->make) run_group(c, "batches", group_batches);
 		run_group(c, "law", group_law);
 	}
+	check_tally left = { .name = "environment" };
+	check_expect(&left, !*c->shared->left, "%s", c->shared->left);
+	check_tell(c, &left, "arithmetic and the working folder are as they were after every call");
 	const uint32_t n = c->shared->properties, failed = c->shared->failed;
 	if (failed) printf("%s: %u of %u properties FAILED\n", p->id, failed, n);
 	else printf("%s: %u properties, all ok\n", p->id, n);
-	munmap(c->shared, sizeof *c->shared);
+	quern_environment_drop(&home);
+	quern_shared_drop(c->shared, sizeof *c->shared);
 	return failed ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
 }
 
-static const quern_plugin_file *open_plugin(quern_loader *loader, const char *path, quern_report *report) {
-	const size_t n = strlen(path);
+/* ---- the command ---- */
+
+static const quern_plugin_file *open_plugin(
+	quern_loader *loader, const char *path, int64_t dimension, quern_report *report) {
 	const quern_plugin_file *file = quern_loader_open(loader, path, report, (quern_mark) { 0 });
-	if (!file || file->level <= quern_loader_best_level()) return file;
-	quern_report_add(report, (quern_mark) { 0 }, "%.*s is for x86-64-v%d, which this processor is not",
-		(int)n, path, file->level);
+	if (!file) return NULL;
+	if (file->level > quern_level_here())
+		quern_report_add(report, (quern_mark) { 0 }, "%s is for x86-64-v%d, which this processor is not",
+			path, file->level);
+	else if (dimension && !(file->plugin.dims & (dimension == 2 ? QUERN_2D : QUERN_3D)))
+		quern_report_add(
+			report, (quern_mark) { 0 }, "%s does not work in %d dimensions", file->plugin.id, (int)dimension);
+	else return file;
 	return NULL;
 }
 
 int quern_command_check(int argc, char **argv) {
-	const char *path = NULL;
+	quern_texts sets = { 0 };
+	int64_t dimension = 0;
+	quern_words words = { .missing = "a plugin is missing", .least = 1, .most = 1 };
+	const quern_option options[] = { QUERN_TEXTS(&sets, "set", "KEY=VALUE",
+										 "a parameter of the plugin; may stand several times"),
+		QUERN_NUMBER(&dimension, "dimension", 2, 3, "try this one alone; default: all it has"),
+		QUERN_NUMBER(&seconds, "seconds", 1, 86400, "when a group of tests is stopped; default: 120"),
+		QUERN_END_OPTIONS };
+	int status = quern_options_read("check", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return free(sets.at), status;
 	quern_report *report = quern_report_create();
 	quern_tree *tree = quern_tree_parse("--set", "{}", 2, report);
-	int status = QUERN_EXIT_DONE;
-	for (int i = 1; i < argc && status == QUERN_EXIT_DONE; i++) {
-		if (!strcmp(argv[i], "--set") && i + 1 < argc) quern_tree_set(tree, argv[++i], report);
-		else if (!strcmp(argv[i], "--seconds") && i + 1 < argc && atoi(argv[i + 1]) > 0)
-			seconds = (unsigned)atoi(argv[++i]);
-		else if (argv[i][0] == '-' || path) status = quern_usage("check", "unknown argument '%s'", argv[i]);
-		else path = argv[i];
-	}
-	if (status == QUERN_EXIT_DONE && !path) status = quern_usage("check", "a plugin is missing");
-	if (status == QUERN_EXIT_DONE) {
-		quern_loader *loader = quern_loader_create();
-		check c = { .given = tree->root, .units = quern_units_create() };
-		if (!quern_report_errors(report)) c.file = open_plugin(loader, path, report);
-		quern_report_print(report, stderr);
-		status = c.file ? run_checks(&c) : QUERN_EXIT_SCENE;
-		quern_units_destroy(c.units);
-		quern_loader_destroy(loader);
-	}
+	for (size_t i = 0; i < sets.n; i++) quern_tree_set(tree, sets.at[i], report);
+	quern_loader *loader = quern_loader_create();
+	check c = { .given = tree->root, .dimension = (uint32_t)dimension, .units = quern_units_create() };
+	quern_loader_beware(loader);
+	if (!quern_report_errors(report)) c.file = open_plugin(loader, words.at[0], dimension, report);
+	quern_report_print(report, stderr);
+	status = c.file ? run_checks(&c) : QUERN_EXIT_SCENE;
+	quern_units_destroy(c.units);
+	quern_loader_destroy(loader);
 	quern_tree_destroy(tree);
 	quern_report_destroy(report);
+	free(sets.at);
 	return status;
 }

@@ -1,6 +1,7 @@
 /* quern list, quern describe - what is installed, from the plugins' own tables */
 #include "command.h"
 #include "loader.h"
+#include "options.h"
 #include "param.h"
 #include "text.h"
 #include <jansson.h>
@@ -13,12 +14,12 @@ static const char *const type_names[] = { "", "number", "whole number", "true or
 	"list" };
 
 static const quern_plugin_file *load(quern_loader *loader, const char *id, quern_report *report) {
-	const char *dot = strchr(id, '.');
+	const char *name = quern_id_name(id);
 	char *kind = quern_copy(id);
-	if (dot) kind[dot - id] = 0;
-	const uint32_t k = dot ? quern_kind_of(kind) : 0;
+	kind[strcspn(kind, ".")] = 0;
 	const quern_plugin_file *f = NULL;
-	if (k) f = quern_loader_find(loader, (quern_kind)k, dot + 1, report, (quern_mark) { 0 });
+	if (name)
+		f = quern_loader_find(loader, (quern_kind)quern_kind_of(kind), name, report, (quern_mark) { 0 });
 	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id such as contact.linear", id);
 	free(kind);
 	return f;
@@ -27,12 +28,17 @@ static const quern_plugin_file *load(quern_loader *loader, const char *id, quern
 /* ---- list ---- */
 
 int quern_command_list(int argc, char **argv) {
-	const bool json = argc == 2 && !strcmp(argv[1], "--json");
-	if (argc > 1 && !json) return quern_usage("list", "unknown argument '%s'", argv[1]);
+	bool json = false;
+	quern_words words = { 0 };
+	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
+	int status = quern_options_read("list", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
+	quern_loader_beware(loader);
 	char **ids = quern_loader_ids(loader);
 	json_t *list = json_array();
+	quern_loader_report_strays(loader, report);
 	for (size_t i = 0; ids[i]; i++) {
 		const quern_plugin_file *f = load(loader, ids[i], report);
 		if (!f) continue;
@@ -45,7 +51,7 @@ int quern_command_list(int argc, char **argv) {
 	if (json) json_dumpf(list, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 	json_decref(list);
 	quern_report_print(report, stderr);
-	const int status = quern_report_errors(report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
+	status = quern_report_errors(report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
 	quern_loader_free_ids(ids);
 	quern_report_destroy(report);
 	quern_loader_destroy(loader);
@@ -175,7 +181,7 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 	size_t n = 0;
 	quern_text all = { 0 };
 	for (size_t i = 0; ids[i]; i++)
-		if (!strcmp(strchr(ids[i], '.') + 1, name)) quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
+		if (!strcmp(quern_id_name(ids[i]), name)) quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
 	if (n == 1) found = load(loader, quern_text_string(&all), report);
 	else if (n)
 		quern_report_add(
@@ -191,17 +197,15 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 }
 
 int quern_command_describe(int argc, char **argv) {
-	const char *name = NULL;
 	bool json = false;
-	for (int i = 1; i < argc; i++) {
-		if (!strcmp(argv[i], "--json")) json = true;
-		else if (argv[i][0] == '-' || name) return quern_usage("describe", "unknown argument '%s'", argv[i]);
-		else name = argv[i];
-	}
-	if (!name) return quern_usage("describe", "a plugin is missing");
+	quern_words words = { .missing = "a plugin is missing", .least = 1, .most = 1 };
+	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
+	const int status = quern_options_read("describe", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
-	const quern_plugin_file *f = find(loader, name, report);
+	quern_loader_beware(loader);
+	const quern_plugin_file *f = find(loader, words.at[0], report);
 	if (f && json) {
 		json_t *root = plugin_json(f);
 		json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");

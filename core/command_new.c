@@ -1,6 +1,8 @@
 /* quern new - a plugin of one's own, from a template that works */
 #include "command.h"
+#include "folder.h"
 #include "loader.h"
+#include "options.h"
 #include "templates.h"
 #include "text.h"
 #include <errno.h>
@@ -8,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 enum { LONGEST_NAME = 48 };
@@ -94,7 +95,7 @@ static int write_all(const char *folder, const char *kind, const char *name) {
 		quern_copy("README.md.txt") };
 	char *path[3] = { quern_format("%s/%s.%s.c", folder, kind, name), quern_format("%s/meson.build", folder),
 		quern_format("%s/README.md", folder) };
-	int status = mkdir(folder, 0777) && errno != EEXIST ? refuse(folder) : QUERN_EXIT_DONE;
+	int status = quern_folder_make(folder) ? QUERN_EXIT_DONE : refuse(folder);
 	for (int k = 0; k < 3 && status == QUERN_EXIT_DONE; k++)
 		if (!access(path[k], F_OK)) {
 			fprintf(stderr, "quern new: %s is there already, and nothing was written\n", path[k]);
@@ -111,16 +112,15 @@ static int write_all(const char *folder, const char *kind, const char *name) {
 }
 
 int quern_command_new(int argc, char **argv) {
-	const char *kind = NULL, *name = NULL, *out = NULL;
-	for (int i = 1; i < argc; i++) {
-		if (!strcmp(argv[i], "-o") && i + 1 < argc) out = argv[++i];
-		else if (!strcmp(argv[i], "-o")) return quern_usage("new", "-o needs a folder");
-		else if (argv[i][0] == '-' || name) return quern_usage("new", "unknown argument '%s'", argv[i]);
-		else if (!kind) kind = argv[i];
-		else name = argv[i];
-	}
-	if (!name) return quern_usage("new", "a kind and a name are missing");
-	int status = check_kind(kind);
+	const char *out = NULL;
+	quern_words words = { .missing = "a kind and a name are missing", .least = 2, .most = 2 };
+	const quern_option options[] = {
+		QUERN_TEXT(&out, 'o', "output", "DIR", "the folder to make; default: KIND.NAME"), QUERN_END_OPTIONS
+	};
+	int status = quern_options_read("new", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
+	const char *kind = words.at[0], *name = words.at[1];
+	status = check_kind(kind);
 	if (status == QUERN_EXIT_DONE) status = check_name(kind, name);
 	if (status != QUERN_EXIT_DONE) return status;
 	char *folder = out ? quern_copy(out) : quern_format("%s.%s", kind, name);

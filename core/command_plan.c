@@ -1,8 +1,10 @@
 /* quern plan - everything short of running: what is loaded, in which order it works, what is allocated and what not */
 #include "command.h"
 #include "config.h"
+#include "options.h"
 #include "run.h"
 #include "text.h"
+#include "watch.h"
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -175,21 +177,17 @@ static quern_status check_step(quern_run *run) {
 }
 
 int quern_command_plan(int argc, char **argv) {
-	const char *path = NULL;
-	const char **sets = quern_take((size_t)argc + 1, sizeof(char *));
-	size_t n_sets = 0;
+	quern_texts sets = { 0 };
+	quern_words words = { .missing = "a scene is missing", .least = 1, .most = 1 };
 	bool json = false;
-	int status = QUERN_EXIT_DONE;
-	for (int i = 1; i < argc && status == QUERN_EXIT_DONE; i++) {
-		if (!strcmp(argv[i], "--json")) json = true;
-		else if (!strcmp(argv[i], "--set") && i + 1 < argc) sets[n_sets++] = argv[++i];
-		else if (!strncmp(argv[i], "--set=", 6)) sets[n_sets++] = argv[i] + 6;
-		else if (argv[i][0] == '-') status = quern_usage("plan", "unknown option '%s'", argv[i]);
-		else path = argv[i];
-	}
-	if (status == QUERN_EXIT_DONE && !path) status = quern_usage("plan", "a scene is missing");
-	if (status != QUERN_EXIT_DONE) return free(sets), status;
-	quern_scene *scene = quern_scene_read(path, sets, &quern_host_table);
+	const quern_option options[] = { QUERN_TEXTS(&sets, "set", "PATH=VALUE",
+										 "a key of the scene; may stand several times"),
+		QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
+	int status = quern_options_read("plan", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return free(sets.at), status;
+	status = QUERN_EXIT_DONE;
+	quern_watch_begin();
+	quern_scene *scene = quern_scene_read(words.at[0], sets.at, &quern_host_table);
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, 0);
 	quern_report_print(scene->report, stderr);
 	if (!run || quern_report_errors(scene->report)) status = QUERN_EXIT_SCENE;
@@ -204,6 +202,6 @@ int quern_command_plan(int argc, char **argv) {
 	}
 	if (run) quern_run_destroy(run);
 	else quern_scene_destroy(scene);
-	free(sets);
+	free(sets.at);
 	return status;
 }

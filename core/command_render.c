@@ -1,47 +1,38 @@
 /* quern render - a picture of a frame, to look at and to print */
 #include "command.h"
 #include "h5.h"
+#include "options.h"
 #include "render.h"
 #include "text.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { LEAST_WIDTH = 600, MOST_WIDTH = 8000 };
+#include <strings.h>
 
 typedef struct {
 	const char *folder, *field, *out;
-	long long frame;
-	long width;
+	int64_t frame, width;
 } options;
 
+/* A picture under another name would not be what its name says. */
+static int check_name(const char *out) {
+	const char *slash = out ? strrchr(out, '/') : NULL, *name = slash ? slash + 1 : out;
+	const char *dot = name ? strrchr(name, '.') : NULL;
+	if (!dot || !strcasecmp(dot, ".png")) return QUERN_OPTIONS_READ;
+	return quern_usage("render", "only PNG can be written: let %s end in .png", out);
+}
+
 static int read_options(int argc, char **argv, options *o) {
-	for (int i = 1; i < argc; i++) {
-		char *end = NULL;
-		const char *value = i + 1 < argc ? argv[i + 1] : NULL;
-		if (argv[i][0] != '-') {
-			if (o->folder) return quern_usage("render", "one folder at a time, not also '%s'", argv[i]);
-			o->folder = argv[i];
-			continue;
-		}
-		const bool frame = !strcmp(argv[i], "--frame"), width = !strcmp(argv[i], "--width");
-		const bool field = !strcmp(argv[i], "--field"), out = !strcmp(argv[i], "-o");
-		if (!frame && !width && !field && !out)
-			return quern_usage("render", "unknown argument '%s'", argv[i]);
-		if (!value) return quern_usage("render", "%s needs a value", argv[i]);
-		if (frame) o->frame = strtoll(value, &end, 10);
-		if (width) o->width = strtol(value, &end, 10);
-		if (field) o->field = value;
-		if (out) o->out = value;
-		if (end && (end == value || *end))
-			return quern_usage("render", "%s: '%s' is no number", argv[i], value);
-		if (frame && o->frame < 0) return quern_usage("render", "--frame counts from 0");
-		i++;
-	}
-	if (!o->folder) return quern_usage("render", "the folder of a run is missing");
-	if (o->width < LEAST_WIDTH || o->width > MOST_WIDTH)
-		return quern_usage("render", "--width must be between %d and %d pixels", LEAST_WIDTH, MOST_WIDTH);
-	return QUERN_EXIT_DONE;
+	quern_words words = { .missing = "the folder of a run is missing", .least = 1, .most = 1 };
+	const quern_option known[] = { QUERN_NUMBER(&o->frame, "frame", 0, INT64_MAX,
+									   "which one, from 0; default: the last"),
+		QUERN_TEXT(&o->field, 0, "field", "NAME", "what to colour by: grain.velocity"),
+		QUERN_TEXT(&o->out, 'o', "output", "FILE.png", "where to write it"),
+		QUERN_NUMBER(&o->width, "width", 600, 8000, "in pixels; default: 1600"), QUERN_END_OPTIONS };
+	const int status = quern_options_read("render", known, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
+	o->folder = words.at[0];
+	return check_name(o->out);
 }
 
 typedef struct {
@@ -73,7 +64,7 @@ int quern_command_render(int argc, char **argv) {
 	render_frame frame;
 	quern_text why = { 0 };
 	int status = read_options(argc, argv, &o);
-	if (status != QUERN_EXIT_DONE) return status;
+	if (status != QUERN_OPTIONS_READ) return status;
 	status = render_frame_read(&frame, o.folder, o.frame, o.field, &why);
 	if (status == QUERN_EXIT_DONE) {
 		char *path = o.out ? quern_copy(o.out)

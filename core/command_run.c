@@ -1,76 +1,75 @@
 /* quern run - reads, settles, steps, writes; ends with a checkpoint whatever stops it in between */
 #include "checkpoint.h"
 #include "command.h"
+#include "config.h"
 #include "frame.h"
-#include "h5.h"
+#include "options.h"
+#include "run_folder.h"
 #include "sidecar.h"
 #include "summary.h"
 #include "text.h"
+#include "watch.h"
 #include <errno.h>
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 typedef struct {
 	const char *scene, *out, *until;
-	const char **sets;
-	size_t n_sets, capacity;
-	uint32_t threads;
-	bool resume, quiet;
+	quern_texts sets;
+	int64_t threads;
+	bool resume, force, quiet;
 } options;
 
 typedef struct {
 	quern_run *run;
+	quern_run_folder folder;
 	quern_series series;
 	double start, saved; /* on the clock */
-	int64_t progress_step;
+	double until;        /* s; negative: to the end */
+	bool begun;          /* the folder is this run's: what happens is noted there */
+	int64_t saved_step;  /* of the last checkpoint; -1: none */
 } session;
 
+/* ---- signals ---- */
+
 static volatile sig_atomic_t interrupted;
+
+/* The first one asks for an end after the step; who asks twice does not want to wait. */
 static void on_signal(int number) {
-	(void)number;
-	interrupted = 1;
+	if (interrupted++) {
+		signal(number, SIG_DFL);
+		raise(number);
+	}
+}
+
+/* What the run was started to ignore, under nohup or in the background, it goes on ignoring. */
+static void catch_signals(void) {
+	const int stops[] = { SIGINT, SIGTERM, SIGHUP };
+	struct sigaction ours = { .sa_handler = on_signal }, was;
+	for (size_t i = 0; i < sizeof stops / sizeof *stops; i++)
+		if (!sigaction(stops[i], NULL, &was) && was.sa_handler != SIG_IGN) sigaction(stops[i], &ours, NULL);
+	signal(SIGPIPE, SIG_IGN); /* nobody reads the messages any more: no reason to stop */
+	signal(SIGXFSZ, SIG_IGN); /* a file beyond the limit is a fault of writing, with its message */
 }
 
 /* ---- the command line ---- */
 
-static bool take_value(int argc, char **argv, int *i, const char *name, const char **value) {
-	const size_t n = strlen(name);
-	if (strncmp(argv[*i], name, n) != 0) return false;
-	if (argv[*i][n] == '=') return *value = argv[*i] + n + 1, true;
-	if (argv[*i][n]) return false;
-	*value = *i + 1 < argc ? argv[++*i] : NULL;
-	return true;
-}
-
 static int parse(options *o, int argc, char **argv) {
-	for (int i = 1; i < argc; i++) {
-		const char *value = NULL;
-		if (take_value(argc, argv, &i, "--set", &value)) {
-			if (!value) return quern_usage("run", "--set needs path.to.key=value");
-			o->sets = quern_grow(o->sets, o->n_sets + 1, &o->capacity, sizeof(char *));
-			o->sets[o->n_sets++] = value;
-		} else if (take_value(argc, argv, &i, "--threads", &value)) {
-			char *end;
-			const long n = value ? strtol(value, &end, 10) : 0;
-			if (!value || *end || n < 1 || n > 256)
-				return quern_usage("run", "--threads needs a number from 1 to 256");
-			o->threads = (uint32_t)n;
-		} else if (take_value(argc, argv, &i, "--until", &value)) {
-			if (!value) return quern_usage("run", "--until needs a time");
-			o->until = value;
-		} else if (!strcmp(argv[i], "-o")) {
-			if (i + 1 == argc) return quern_usage("run", "-o needs a folder");
-			o->out = argv[++i];
-		} else if (!strcmp(argv[i], "--resume")) o->resume = true;
-		else if (!strcmp(argv[i], "--quiet")) o->quiet = true;
-		else if (argv[i][0] == '-') return quern_usage("run", "unknown option '%s'", argv[i]);
-		else if (o->scene) return quern_usage("run", "one scene at a time: '%s' is a second one", argv[i]);
-		else o->scene = argv[i];
-	}
-	return o->scene ? QUERN_EXIT_DONE : quern_usage("run", "a scene is missing");
+	quern_words words = { .missing = "a scene is missing", .least = 1, .most = 1 };
+	const quern_option known[] = { QUERN_TEXT(&o->out, 'o', "output", "DIR",
+									   "the folder of the run; default: out/NAME"),
+		QUERN_TEXTS(&o->sets, "set", "PATH=VALUE", "a key of the scene; may stand several times"),
+		QUERN_NUMBER(&o->threads, "threads", 1, 256, "how many work; results do not depend on it"),
+		QUERN_FLAG(&o->resume, "resume", "go on from the checkpoint"),
+		QUERN_FLAG(&o->force, "force", "replace the run in the folder; with --resume, take other plugins"),
+		QUERN_TEXT(&o->until, 0, "until", "TIME", "stop at the first step at or after this time"),
+		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"), QUERN_END_OPTIONS };
+	const int status = quern_options_read("run", known, &words, argc, argv);
+	o->scene = words.at[0];
+	return status;
 }
 
 /* ---- the folder ---- */
@@ -84,54 +83,6 @@ static char *folder_of(const options *o) {
 	char *folder = quern_format("out/%s", base);
 	free(base);
 	return folder;
-}
-
-static bool make_folders(const char *path) {
-	char *copy = quern_copy(path);
-	bool good = true;
-	for (char *p = copy + 1; good; p++)
-		if (*p == '/' || !*p) {
-			const char kept = *p;
-			*p = 0;
-			good = !mkdir(copy, 0777) || errno == EEXIST;
-			*p = kept;
-			if (!kept) break;
-		}
-	free(copy);
-	return good;
-}
-
-static void remove_frames(const char *folder) {
-	for (int64_t k = 0;; k++) {
-		char *path = quern_format("%s/frames/%06lld.h5", folder, (long long)k);
-		const bool gone = unlink(path) != 0;
-		free(path);
-		if (gone) break;
-	}
-}
-
-static quern_status open_folder(quern_run *run, bool fresh) {
-	char why[256];
-	char *frames = quern_format("%s/frames", run->folder),
-		 *scene = quern_format("%s/scene.yaml", run->folder);
-	quern_status status = QUERN_OK;
-	if (!make_folders(frames))
-		status = quern_run_stop(run, QUERN_E_IO, "folder %s cannot be made: %s", frames, strerror(errno));
-	else {
-		char *resolved = quern_scene_resolved(run->scene);
-		if (fresh) {
-			char *checkpoint = quern_format("%s/checkpoint.h5", run->folder);
-			unlink(checkpoint);
-			free(checkpoint);
-			remove_frames(run->folder);
-		}
-		if (!quern_save_bytes(scene, resolved, strlen(resolved), why))
-			status = quern_run_stop(run, QUERN_E_IO, "%s", why);
-		free(resolved);
-	}
-	free(frames);
-	free(scene);
-	return status;
 }
 
 /* ---- progress and checkpoints ---- */
@@ -150,10 +101,26 @@ static void progress(session *s, bool settling) {
 	}
 }
 
+/* For the sentence about a plugin that ends the program between here and the next frame or checkpoint. */
+static void tell_what_stays(const session *s) {
+	const quern_run *run = s->run;
+	char checkpoint[96] = "no checkpoint";
+	if (s->saved_step >= 0)
+		snprintf(checkpoint, sizeof checkpoint, "a checkpoint of step %lld, from which --resume goes on",
+			(long long)s->saved_step);
+	quern_watch_keep("%s keeps %lld frame%s and %s", run->folder, (long long)run->clock.frame + 1,
+		run->clock.frame ? "s" : "", checkpoint);
+}
+
 static quern_status checkpoint(session *s) {
 	s->run->wall_before += quern_wall() - s->start;
 	s->start = s->saved = quern_wall();
-	return quern_checkpoint_write(s->run, s->series.rows);
+	/* rows that a checkpoint counts must be there after a power cut too */
+	if (quern_series_flush(&s->series, s->run) != QUERN_OK) return s->run->status;
+	const quern_status status = quern_checkpoint_write(s->run, s->series.rows);
+	if (status == QUERN_OK) s->saved_step = s->run->clock.step;
+	tell_what_stays(s);
+	return status;
 }
 
 static bool due(const session *s) {
@@ -172,25 +139,39 @@ static quern_status settle(session *s) {
 		if (due(s)) checkpoint(s);
 	}
 	run->settle_wall += quern_wall() - begin;
-	if (run->clock.settled && run->clock.settle_step)
+	if (run->clock.settled && run->clock.settle_step && run->clock.frame < 0)
 		quern_log_add(run->log, 1, "settled in %lld steps, %.1f s", (long long)run->clock.settle_step,
 			run->settle_wall);
 	return run->status;
 }
 
-static quern_status output(session *s) {
-	quern_run *run = s->run;
-	run->clock.frame++;
-	run->clock.at = run->clock.steps_in = 0;
-	if (quern_series_add(&s->series, run) != QUERN_OK) return run->status;
-	return quern_frame_write(run, run->clock.frame);
+static quern_status check_log(quern_run *run) {
+	const int fault = quern_log_fault(run->log);
+	if (!fault) return QUERN_OK;
+	return quern_run_stop(run, QUERN_E_IO, "%s/log.txt cannot be written: %s", run->folder, strerror(fault));
 }
 
-static quern_status step_on(session *s, int64_t last) {
+static quern_status output(session *s) {
+	quern_run *run = s->run;
+	quern_run_frame(run);
+	if (quern_series_add(&s->series, run) != QUERN_OK || quern_run_check_account(run) != QUERN_OK ||
+		quern_frame_write(run, run->clock.frame) != QUERN_OK)
+		return run->status;
+	tell_what_stays(s);
+	return check_log(run);
+}
+
+/* A time that is later only by round-off has come. */
+static bool has_come(const quern_run *run, double time) {
+	return time >= 0 && run->clock.frame >= 0 && quern_run_time(run) >= time - 1e-9 * run->clock.dt;
+}
+
+static quern_status step_on(session *s) {
 	quern_run *run = s->run;
 	quern_clock *c = &run->clock;
-	if (c->frame < 0 && output(s) != QUERN_OK) return run->status;
-	while (c->frame < last && !interrupted && run->status == QUERN_OK) {
+	/* what settling has cost is not lost again */
+	if (c->frame < 0 && output(s) == QUERN_OK) checkpoint(s);
+	while (run->status == QUERN_OK && !quern_run_over(run) && !has_come(run, s->until) && !interrupted) {
 		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
 		if (c->step == 0 && c->at == 0)
 			quern_log_add(run->log, 1, "step %.4g s, set by %s", c->dt, run->limit_reason);
@@ -208,69 +189,130 @@ static int exit_status(const quern_run *run) {
 	return run->status == QUERN_OK ? QUERN_EXIT_DONE : QUERN_EXIT_FAILED;
 }
 
+/* ---- the end ---- */
+
 static void report_end(session *s, const char *status) {
 	quern_run *run = s->run;
 	const double wall = run->wall_before + quern_wall() - s->start;
 	quern_log_add(run->log, 1, "%s: t = %.6g s, %lld steps, %.1f s (settling %.1f s), %s", status,
 		quern_run_time(run), (long long)run->clock.step, wall, run->settle_wall, run->folder);
+	if (run->status == QUERN_OK && !quern_run_over(run))
+		quern_log_add(
+			run->log, 1, "to go on: quern run %s/scene.yaml -o %s --resume", run->folder, run->folder);
 	char why[256];
 	if (!quern_summary_write(run, &s->series, status, wall, why)) quern_run_stop(run, QUERN_E_IO, "%s", why);
 }
 
 static int finish(session *s) {
 	quern_run *run = s->run;
-	const bool stopped = interrupted && run->status == QUERN_OK;
-	const char *status = run->status != QUERN_OK ? "failed" : stopped ? "interrupted" : "done";
-	if (run->status == QUERN_OK) checkpoint(s);
-	report_end(s, run->status == QUERN_OK ? status : "failed");
+	const bool over = quern_run_over(run), stopped = interrupted && !over;
+	if (s->begun) {
+		if (run->status == QUERN_OK) checkpoint(s);
+		report_end(s, run->status != QUERN_OK ? "failed"
+					  : over                  ? "done"
+					  : stopped               ? "interrupted"
+											  : "stopped");
+		check_log(run);
+	}
 	if (run->status != QUERN_OK) {
 		quern_run_complain(run, stderr);
-		if (run->log) quern_log_add(run->log, 0, "error: %s", run->message ? run->message : "the run failed");
+		if (s->begun) quern_log_add(run->log, 0, "error: %s", run->message ? run->message : "the run failed");
 		return exit_status(run);
 	}
 	return stopped ? QUERN_EXIT_INTERRUPTED : QUERN_EXIT_DONE;
 }
 
-static bool resume(session *s, int64_t *rows, int *status) {
-	char why[256];
-	char *path = quern_format("%s/checkpoint.h5", s->run->folder);
-	bool there = !access(path, F_OK);
-	if (there && quern_checkpoint_read(s->run, path, rows, why) != QUERN_OK) {
-		fprintf(stderr, "quern: error: %s: %s; remove it to start anew\n", path, why);
-		*status = QUERN_EXIT_SCENE;
-	}
-	free(path);
-	return there;
-}
+/* ---- the beginning ---- */
 
-static int64_t last_frame(const quern_run *run, double until) {
-	const int64_t last = quern_run_frames(run);
-	if (!(until >= 0)) return last;
-	int64_t k = 0;
-	while (k < last && quern_run_frame_time(run, k) < until * (1 - 1e-12)) k++;
-	return k;
-}
-
-static int drive(session *s, const options *o, double until) {
+/* The folder is this run's from here on; `again`: it was before. */
+static quern_status take_over(session *s, bool again) {
 	quern_run *run = s->run;
+	char why[256] = "";
+	if (!quern_run_folder_begin(&s->folder, run->scene, why))
+		return quern_run_stop(run, QUERN_E_IO, "%s", why);
+	char *path = quern_format("%s/log.txt", run->folder);
+	quern_log_open(run->log, path, again);
+	free(path);
+	s->begun = true;
+	run->sidecars = quern_sidecars_create(run->folder, again ? run->clock.frame + 1 : 0, why);
+	if (!run->sidecars) return quern_run_stop(run, QUERN_E_IO, "%s", why);
+	if (!again && quern_series_init(&s->series, run, 0) != QUERN_OK) return run->status;
+	return check_log(run);
+}
+
+/* The set-up may find the scene at fault, and then nothing was touched. */
+static quern_status begin_anew(session *s, const options *o) {
+	quern_run *run = s->run;
+	quern_text why = { 0 };
+	const bool good = o->resume ? quern_run_folder_is_begun(&s->folder, &why)
+								: quern_run_folder_is_free(&s->folder, run->scene, o->force, &why);
+	if (!good) quern_run_stop(run, QUERN_E_IO, "%s", quern_text_string(&why));
+	quern_text_finish(&why);
+	if (!good) return run->status;
+	if (o->resume) quern_log_add(run->log, 1, "no checkpoint yet: starting from the beginning");
+	quern_run_identity(run); /* of the files as they are now */
+	if (quern_run_setup(run) != QUERN_OK) return run->status;
+	run->mass_initial = quern_run_account(run).mass;
+	quern_run_folder_clear(&s->folder, run->scene);
+	return take_over(s, false);
+}
+
+static void note_changes(quern_run *run, const char *said) {
+	quern_log_add(
+		run->log, 1, "resumed at t = %.6g s, step %lld", quern_run_time(run), (long long)run->clock.step);
+	while (said && *said) {
+		const size_t n = strcspn(said, "\n");
+		quern_log_add(run->log, 1, "changed: %.*s", (int)n, said);
+		said += n + (said[n] != 0);
+	}
+}
+
+static quern_status go_on(session *s, const options *o, const char *path) {
+	quern_run *run = s->run;
+	quern_text said = { 0 }, why = { 0 };
 	int64_t rows = 0;
-	int status = QUERN_EXIT_DONE;
-	const bool again = o->resume && resume(s, &rows, &status);
-	if (status != QUERN_EXIT_DONE) return status;
-	if (open_folder(run, !again) == QUERN_OK) {
-		char *path = quern_format("%s/log.txt", run->folder);
-		run->log = quern_log_create(path, o->quiet, again);
+	if (quern_checkpoint_read(run, path, o->force, &rows, &said, &why) != QUERN_OK)
+		quern_run_stop(run, QUERN_E_PARAM, "%s: %s (to start anew: --force without --resume)", path,
+			quern_text_string(&why));
+	else if (has_come(run, s->until))
+		fprintf(stderr, "quern: the run has come to t = %.9g s already: nothing to do until %.9g s\n",
+			quern_run_time(run), s->until);
+	else if (quern_series_init(&s->series, run, rows) == QUERN_OK) {
+		note_changes(run, said.data);
+		s->saved_step = run->clock.step;
+		quern_run_folder_trim(&s->folder, run->clock.frame + 1);
+		take_over(s, true);
+	}
+	quern_text_finish(&said);
+	quern_text_finish(&why);
+	return run->status;
+}
+
+/* The command as it was given, so that a log says by itself how a run came about. */
+static void log_command(quern_log *log, int argc, char **argv) {
+	quern_text line = { 0 };
+	for (int i = 0; i < argc; i++) {
+		const bool plain = argv[i][strcspn(argv[i], " \t\n'\"{}[]()*?$&;<>|#~\\")] == 0 && *argv[i];
+		quern_text_add(&line, plain ? " %s" : " '%s'", argv[i]);
+	}
+	quern_log_add(log, 0, "quern " QUERN_VERSION ": quern%s", quern_text_string(&line));
+	quern_text_finish(&line);
+}
+
+static int drive(session *s, const options *o) {
+	quern_run *run = s->run;
+	quern_text why = { 0 };
+	if (!quern_run_folder_take(&s->folder, run->folder, &why))
+		quern_run_stop(run, QUERN_E_IO, "%s", quern_text_string(&why));
+	else {
+		char *path = quern_format("%s/checkpoint.h5", run->folder);
+		if (o->resume && !access(path, F_OK)) go_on(s, o, path);
+		else begin_anew(s, o);
 		free(path);
-		if (o->resume && !again) quern_log_add(run->log, 1, "no checkpoint yet: starting from the beginning");
-		run->sidecars = quern_sidecars_create(run->folder, again ? run->clock.frame + 1 : 0);
-		quern_series_init(&s->series, run, rows);
 	}
-	if (run->status != QUERN_OK) {
-		quern_run_complain(run, stderr);
-		return exit_status(run);
-	}
-	if (!again && quern_run_setup(run) == QUERN_OK) run->mass_initial = quern_run_account(run).mass;
-	if (run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s, last_frame(run, until));
+	quern_text_finish(&why);
+	if (s->begun) tell_what_stays(s);
+	if (s->begun && run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s);
 	return finish(s);
 }
 
@@ -278,36 +320,39 @@ static bool parse_until(const options *o, quern_run *run, double *until) {
 	char why[160];
 	*until = -1;
 	if (!o->until) return true;
-	if (quern_quantity_read(run->scene->units, o->until, "s", until, why) && *until >= 0) return true;
-	quern_usage("run", "--until: %s", *until < 0 ? "must not be negative" : why);
+	const bool good = quern_quantity_read(run->scene->units, o->until, "s", until, why);
+	if (good && !signbit(*until)) return true;
+	quern_usage("run", "--until: %s", good ? "must not be negative" : why);
 	return false;
 }
 
 int quern_command_run(int argc, char **argv) {
 	options o = { 0 };
 	int status = parse(&o, argc, argv);
-	if (status != QUERN_EXIT_DONE) return free(o.sets), status;
-	signal(SIGINT, on_signal);
-	signal(SIGTERM, on_signal);
-	quern_scene *scene = quern_scene_read(o.scene, o.sets, &quern_host_table);
-	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, o.threads);
-	quern_report_print(scene->report, stderr);
-	session s = { .run = run, .start = quern_wall(), .saved = quern_wall() };
-	double until;
+	if (status != QUERN_OPTIONS_READ) return free(o.sets.at), status;
+	catch_signals();
+	quern_watch_begin();
+	quern_scene *scene = quern_scene_read(o.scene, o.sets.at, &quern_host_table);
+	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, (uint32_t)o.threads);
+	const size_t faults = quern_report_print(scene->report, stderr);
+	session s = {
+		.run = run, .folder = { .lock = -1 }, .saved_step = -1, .start = quern_wall(), .saved = quern_wall()
+	};
 	if (!run || quern_report_errors(scene->report)) {
-		fprintf(stderr, "quern: %zu fault%s in %s\n", quern_report_errors(scene->report),
-			quern_report_errors(scene->report) == 1 ? "" : "s", o.scene);
+		fprintf(stderr, "quern: %zu fault%s in %s\n", faults, faults == 1 ? "" : "s", o.scene);
 		status = QUERN_EXIT_SCENE;
-	} else if (!parse_until(&o, run, &until)) status = QUERN_EXIT_USAGE;
+	} else if (!parse_until(&o, run, &s.until)) status = QUERN_EXIT_USAGE;
 	else {
-		signal(SIGXFSZ, SIG_IGN); /* a file beyond the limit is a fault of writing, with its message */
 		run->folder = folder_of(&o);
-		status = drive(&s, &o, until);
+		run->log = quern_log_create(o.quiet);
+		log_command(run->log, argc, argv);
+		status = drive(&s, &o);
 	}
 	quern_series_finish(&s.series);
+	quern_run_folder_give_back(&s.folder);
 	if (run) quern_sidecars_destroy(run->sidecars);
 	if (run) quern_run_destroy(run);
 	else quern_scene_destroy(scene);
-	free(o.sets);
+	free(o.sets.at);
 	return status;
 }

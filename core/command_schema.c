@@ -1,9 +1,11 @@
 /* quern schema - a JSON Schema of scenes from the rows of all installed plugins, for completion in editors */
 #include "command.h"
 #include "h5.h"
+#include "options.h"
 #include "scene.h"
 #include "text.h"
 #include <jansson.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,65 +16,154 @@ typedef struct {
 	char **ids;
 } context;
 
-static json_t *row_schema(const quern_param *row, uint32_t dim);
+/* ---- objects ---- */
 
-/* The node of a dotted name, its maps opened on the way. */
-static void put(json_t *properties, const char *name, json_t *value) {
+static json_t *object_schema(void) {
+	return json_pack("{s:s, s:{}, s:b}", "type", "object", "properties", "additionalProperties", false);
+}
+
+static void require(json_t *object, const char *name) {
+	json_t *list = json_object_get(object, "required"), *one;
+	size_t i;
+	if (!list) json_object_set_new(object, "required", list = json_array());
+	json_array_foreach(list, i, one) if (!strcmp(json_string_value(one), name)) return;
+	json_array_append_new(list, json_string(name));
+}
+
+/* The map that stands under a name, made if there is none; beside it may stand a word: "boundary", "boundary.frictional". */
+static json_t *map_in(json_t *object, const char *name) {
+	json_t *properties = json_object_get(object, "properties"), *there = json_object_get(properties, name),
+		   *one;
+	json_t *either = json_object_get(there, "anyOf");
+	size_t i;
+	if (json_object_get(there, "properties")) return there;
+	json_array_foreach(either, i, one) if (json_object_get(one, "properties")) return one;
+	json_t *map = object_schema();
+	json_object_set_new(properties, name, there ? json_pack("{s:[O, o]}", "anyOf", there, map) : map);
+	return map;
+}
+
+/* Puts a value under a dotted name, whose maps are opened on the way. */
+static void put(json_t *object, const char *name, json_t *value, bool required) {
 	const size_t n = strcspn(name, ".");
 	char part[64];
 	snprintf(part, sizeof part, "%.*s", (int)n, name);
-	if (!name[n]) {
-		json_t *there = json_object_get(properties, part);
-		if (there) json_decref(value); /* a choice beside its own map: the map's schema allows both */
-		else json_object_set_new(properties, part, value);
+	if (required) require(object, part);
+	if (name[n]) {
+		put(map_in(object, part), name + n + 1, value, required);
 		return;
 	}
-	json_t *map = json_object_get(properties, part), *inner = map ? json_object_get(map, "properties") : NULL;
-	if (!inner) {
-		inner = json_object();
-		map = json_pack("{s:[s, s], s:o, s:b}", "type", "object", "string", "properties", inner,
-			"additionalProperties", false);
-		json_object_set_new(properties, part, map);
+	json_t *properties = json_object_get(object, "properties"), *there = json_object_get(properties, part);
+	if (there) value = json_pack("{s:[o, O]}", "anyOf", value, there);
+	json_object_set_new(properties, part, value);
+}
+
+/* ---- values ---- */
+
+static json_t *defined(const char *name) {
+	char *path = quern_format("#/definitions/%s", name);
+	json_t *reference = json_pack("{s:s}", "$ref", path);
+	free(path);
+	return reference;
+}
+
+/* A bare number within its range, or a number with a unit, of which the editor only sees the form. */
+static json_t *number_schema(const quern_param *row) {
+	const char *type = row->type == QUERN_T_INT ? "integer" : "number";
+	json_t *bare = json_pack("{s:s}", "type", type);
+	const char *low = row->flags & QUERN_MIN_OPEN ? "exclusiveMinimum" : "minimum";
+	const char *high = row->flags & QUERN_MAX_OPEN ? "exclusiveMaximum" : "maximum";
+	if (row->min != row->max && isfinite(row->min)) json_object_set_new(bare, low, json_real(row->min));
+	if (row->min != row->max && isfinite(row->max)) json_object_set_new(bare, high, json_real(row->max));
+	return json_pack("{s:[o, o]}", "anyOf", bare, defined("quantity"));
+}
+
+static json_t *text_schema(const quern_param *row) {
+	if (!row->unit || !strcmp(row->unit, "1")) return json_pack("{s:[s, s]}", "type", "string", "number");
+	json_t *either =
+		json_pack("[{s:s}, o]", "type", "number", defined("quantity")); /* or a word, such as auto */
+	if (row->text) json_array_append_new(either, json_pack("{s:s}", "const", row->text));
+	return json_pack("{s:o}", "anyOf", either);
+}
+
+static json_t *map_schema(const quern_param *rows);
+
+static json_t *list_schema(const quern_param *row) {
+	json_t *item = map_schema(row->rows);
+	json_t *list = json_pack("{s:s, s:O}", "type", "array", "items", item);
+	return json_pack("{s:[o, o]}", "anyOf", item, list);
+}
+
+static json_t *words_schema(const quern_param *row) {
+	json_t *words = json_array();
+	for (const char *const *c = row->choices; *c; c++) json_array_append_new(words, json_string(*c));
+	return json_pack("{s:o}", "enum", words);
+}
+
+static json_t *value_schema(const quern_param *row) {
+	switch (row->type) {
+	case QUERN_T_INT: return row->choices ? words_schema(row) : number_schema(row);
+	case QUERN_T_BOOL: return defined("switch");
+	case QUERN_T_TEXT: return text_schema(row);
+	case QUERN_T_VECTOR:
+		return json_pack("{s:s, s:o, s:i, s:i}", "type", "array", "items", number_schema(row), "minItems", 2,
+			"maxItems", 3);
+	case QUERN_T_LIST: return list_schema(row);
+	default: return number_schema(row);
 	}
-	put(inner, name + n + 1, value);
 }
 
-static json_t *map_schema(const quern_param *rows, uint32_t dim) {
-	json_t *properties = json_object();
-	for (; rows && rows->name; rows++) put(properties, rows->name, row_schema(rows, dim));
-	return properties;
+static json_t *default_of(const quern_param *row) {
+	const bool planar = row->flags & QUERN_PLANAR && row->planar != row->def;
+	if (row->flags & (QUERN_REQUIRED | QUERN_MAYBE) || row->from || planar) return NULL;
+	switch (row->type) {
+	case QUERN_T_INT:
+		return row->choices ? json_string(row->choices[(int)row->def]) : json_integer((json_int_t)row->def);
+	case QUERN_T_REAL: return isfinite(row->def) ? json_real(row->def) : NULL;
+	case QUERN_T_BOOL: return json_boolean(row->def != 0);
+	case QUERN_T_TEXT: return row->text ? json_string(row->text) : NULL;
+	default: return NULL;
+	}
 }
 
-static json_t *row_schema(const quern_param *row, uint32_t dim) {
-	json_t *s = json_object();
-	char *doc = quern_format("%s%s%s%s", row->doc ? row->doc : "",
-		row->unit && strcmp(row->unit, "1") != 0 ? " [" : "",
-		row->unit && strcmp(row->unit, "1") != 0 ? row->unit : "",
-		row->unit && strcmp(row->unit, "1") != 0 ? "]" : "");
+static json_t *row_schema(const quern_param *row) {
+	json_t *s = value_schema(row), *def = default_of(row);
+	const bool unit = row->unit && strcmp(row->unit, "1") != 0;
+	char *doc =
+		quern_format("%s%s%s%s%s%s%s", row->doc ? row->doc : "", unit ? " [" : "", unit ? row->unit : "",
+			unit ? "]" : "", row->from ? " Default: " : "", row->from ? row->from : "", row->from ? "." : "");
+	if (json_object_get(s, "$ref")) s = json_pack("{s:[o]}", "allOf", s); /* a reference has no neighbours */
 	json_object_set_new(s, "description", json_string(doc));
+	if (def) json_object_set_new(s, "default", def);
 	free(doc);
-	if (row->choices) {
-		json_t *choices = json_array();
-		for (const char *const *c = row->choices; *c; c++) json_array_append_new(choices, json_string(*c));
-		json_object_set_new(s, "enum", choices);
-	} else if (row->type == QUERN_T_REAL || row->type == QUERN_T_INT)
-		json_object_set_new(s, "type", json_pack("[s, s]", "number", "string"));
-	else if (row->type == QUERN_T_BOOL) json_object_set_new(s, "type", json_string("boolean"));
-	else if (row->type == QUERN_T_TEXT) json_object_set_new(s, "type", json_string("string"));
-	else if (row->type == QUERN_T_VECTOR) {
-		json_object_set_new(s, "type", json_string("array"));
-		json_object_set_new(s, "items", json_pack("{s:[s, s]}", "type", "number", "string"));
-	} else {
-		json_t *item = json_pack("{s:s, s:o}", "type", "object", "properties", map_schema(row->rows, dim));
-		json_t *list = json_pack("{s:s, s:O}", "type", "array", "items", item);
-		json_object_set_new(s, "anyOf", json_pack("[o, o]", item, list));
-	}
 	return s;
 }
 
-/* A plugin in a slot: its bare name, or one name with parameters. */
-static json_t *kind_schema(const context *c, uint32_t kind, const quern_slot *slot) {
-	json_t *names = json_array(), *properties = json_object();
+static void put_rows(json_t *object, const quern_param *rows) {
+	for (; rows && rows->name; rows++)
+		put(object, rows->name, row_schema(rows), rows->flags & QUERN_REQUIRED && !rows->from);
+}
+
+static json_t *map_schema(const quern_param *rows) {
+	json_t *object = object_schema();
+	put_rows(object, rows);
+	return object;
+}
+
+/* ---- plugins ---- */
+
+static json_t *plugin_schema(const quern_plugin_file *f, const quern_slot *slot) {
+	json_t *own = map_schema(f->params);
+	if (slot) put_rows(own, slot->rows);
+	if (slot && slot->override)
+		put(own, strchr(slot->override, '.') + 1, json_pack("{s:s}", "type", "object"), false);
+	json_object_set_new(own, "description", json_string(f->plugin.brief ? f->plugin.brief : ""));
+	return own;
+}
+
+/* A plugin in a slot: its bare name, if nothing of it must be given, or one name with parameters. */
+static json_t *kind_schema(const context *c, uint32_t kind, bool list, const quern_slot *slot) {
+	json_t *names = json_array(), *map = object_schema();
 	const char *prefix = quern_kind_name(kind);
 	const size_t skip = strlen(prefix) + 1;
 	for (size_t i = 0; c->ids[i]; i++) {
@@ -80,25 +171,34 @@ static json_t *kind_schema(const context *c, uint32_t kind, const quern_slot *sl
 		const quern_plugin_file *f =
 			quern_loader_find(c->loader, (quern_kind)kind, c->ids[i] + skip, c->report, (quern_mark) { 0 });
 		if (!f) continue;
-		json_t *own = map_schema(f->params, 2);
-		for (const quern_param *row = slot ? slot->rows : NULL; row && row->name; row++)
-			put(own, row->name, row_schema(row, 2));
-		if (slot && slot->override)
-			json_object_set_new(own, strchr(slot->override, '.') + 1, json_pack("{s:s}", "type", "object"));
-		json_array_append_new(names, json_string(c->ids[i] + skip));
-		json_object_set_new(properties, c->ids[i] + skip,
-			json_pack("{s:[s, s], s:s, s:o, s:b}", "type", "object", "null", "description",
-				f->plugin.brief ? f->plugin.brief : "", "properties", own, "additionalProperties", false));
+		json_t *own = plugin_schema(f, slot);
+		if (!json_object_get(own, "required")) {
+			json_array_append_new(names, json_string(c->ids[i] + skip));
+			own = json_pack("{s:[o, {s:s}]}", "anyOf", own, "type", "null");
+		}
+		put(map, c->ids[i] + skip, own, false);
 	}
-	json_t *map = json_pack(
-		"{s:s, s:o, s:b}", "type", "object", "properties", properties, "additionalProperties", false);
-	return json_pack("{s:[o, o]}", "anyOf", json_pack("{s:o}", "enum", names), map);
+	json_object_set_new(map, "minProperties", json_integer(1));
+	if (!list) json_object_set_new(map, "maxProperties", json_integer(1));
+	return json_pack("{s:[{s:o}, o]}", "anyOf", "enum", names, map);
 }
 
 static json_t *slot_schema(const context *c, uint32_t kind, bool list, const quern_slot *slot) {
-	json_t *one = kind_schema(c, kind, slot);
-	if (!list) return one;
-	return json_pack("{s:[o, o]}", "anyOf", one, json_pack("{s:s, s:O}", "type", "array", "items", one));
+	if (!list) return kind_schema(c, kind, false, slot);
+	return json_pack("{s:[o, {s:s, s:o}]}", "anyOf", kind_schema(c, kind, true, slot), "type", "array",
+		"items", kind_schema(c, kind, false, slot));
+}
+
+/* "fill.packer" stands in the items of the list "fill". */
+static json_t *home_of(json_t *section, const char *name, const char **key) {
+	const char *dot = strchr(name, '.');
+	*key = dot ? dot + 1 : name;
+	if (!dot) return section;
+	char *list = quern_copy(name);
+	list[dot - name] = 0;
+	json_t *either = json_object_get(json_object_get(json_object_get(section, "properties"), list), "anyOf");
+	free(list);
+	return json_array_get(either, 0);
 }
 
 static json_t *section_schema(const context *c, const char *solver) {
@@ -106,55 +206,66 @@ static json_t *section_schema(const context *c, const char *solver) {
 		quern_loader_find(c->loader, QUERN_SOLVER, solver, c->report, (quern_mark) { 0 });
 	if (!f) return json_object();
 	const quern_solver_ops *ops = f->plugin.ops;
-	json_t *properties = map_schema(f->params, 2);
-	json_object_set_new(properties, "solver", json_pack("{s:s}", "type", "string"));
+	json_t *section = map_schema(f->params);
+	put(section, "solver", json_pack("{s:s}", "const", solver), false);
+	json_object_set_new(section, "description", json_string(f->plugin.brief ? f->plugin.brief : ""));
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
+		const char *key;
 		if (s->same_as) continue;
 		if (!*s->name) {
-			json_decref(properties);
+			json_decref(section);
 			return slot_schema(c, s->kind, true, s);
 		}
-		const char *dot = strchr(s->name, '.');
-		if (!dot) json_object_set_new(properties, s->name, slot_schema(c, s->kind, s->list != 0, s));
-		else { /* into the item of the list it belongs to */ char *list = quern_copy(s->name);
-			list[dot - s->name] = 0;
-			json_t *item = json_array_get(json_object_get(json_object_get(properties, list), "anyOf"), 0);
-			if (item)
-				json_object_set_new(
-					json_object_get(item, "properties"), dot + 1, slot_schema(c, s->kind, false, s));
-			free(list);
-		}
+		json_t *home = home_of(section, s->name, &key);
+		if (home)
+			put(home, key, slot_schema(c, s->kind, s->list != 0, s), !s->def && (!s->list || s->required));
 	}
-	return json_pack("{s:s, s:s, s:o, s:b}", "type", "object", "description", f->plugin.brief, "properties",
-		properties, "additionalProperties", false);
+	/* of another solver's keys nothing is known here */
+	json_t *other = json_pack("{s:s, s:[s], s:{s:{s:{s:s}}}}", "type", "object", "required", "solver",
+		"properties", "solver", "not", "const", solver);
+	return json_pack("{s:o, s:{s:s}, s:o}", "if", other, "then", "type", "object", "else", section);
 }
 
+/* ---- the whole ---- */
+
 static json_t *scene_schema(const context *c) {
-	json_t *properties = map_schema(quern_general_rows, 2), *required = json_array();
-	put(properties, "domain.periodic",
-		json_pack("{s:s, s:{s:s}}", "type", "array", "items", "type", "boolean"));
-	put(properties, "output.fields", json_pack("{s:s, s:{s:s}}", "type", "array", "items", "type", "string"));
+	json_t *scene = map_schema(quern_general_rows);
+	put(scene, "domain.periodic",
+		json_pack("{s:s, s:s, s:o, s:i, s:i}", "description",
+			"Directions in which the domain repeats itself.", "type", "array", "items", defined("switch"),
+			"minItems", 2, "maxItems", 3),
+		false);
+	put(scene, "output.fields",
+		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out, such as grain.velocity.",
+			"type", "array", "items", "type", "string"),
+		false);
 	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		json_object_set_new(properties, n->section, section_schema(c, n->solver));
-	json_object_set_new(properties, "observe", slot_schema(c, QUERN_OBSERVER, true, NULL));
-	const char *const needed[] = { "quern", "dimension", "gravity", "domain", "time" };
-	for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
-		json_array_append_new(required, json_string(needed[i]));
-	return json_pack("{s:s, s:s, s:s, s:o, s:o, s:b}", "$schema", "http://json-schema.org/draft-07/schema#",
-		"title", "Quern scene", "type", "object", "properties", properties, "required", required,
-		"additionalProperties", false);
+		put(scene, n->section, section_schema(c, n->solver), false);
+	put(scene, "observe", slot_schema(c, QUERN_OBSERVER, true, &quern_observe_slot), false);
+	json_object_set_new(scene, "$schema", json_string("http://json-schema.org/draft-07/schema#"));
+	json_object_set_new(scene, "title", json_string("Quern scene"));
+	json_object_set_new(scene, "definitions",
+		json_pack("{s:{s:s, s:s, s:s}, s:{s:[b, b, s, s, s, s]}}", "quantity", "type", "string", "pattern",
+			"^[+-]?([0-9]+[.]?[0-9]*|[.][0-9]+)([eE][+-]?[0-9]+)?([ \\t]*([^0-9 \\t+.,-].*|1/.*))?$",
+			"description", "A number, with a unit if it is not in SI: 5 mm.", "switch", "enum", true, false,
+			"yes", "no", "on", "off"));
+	return scene;
 }
 
 int quern_command_schema(int argc, char **argv) {
 	const char *out = NULL;
-	if (argc == 3 && !strcmp(argv[1], "-o")) out = argv[2];
-	else if (argc > 1) return quern_usage("schema", "unknown argument '%s'", argv[1]);
+	quern_words words = { 0 };
+	const quern_option options[] = { QUERN_TEXT(&out, 'o', "output", "FILE", "where to write it"),
+		QUERN_END_OPTIONS };
+	int status = quern_options_read("schema", options, &words, argc, argv);
+	if (status != QUERN_OPTIONS_READ) return status;
 	context c = { quern_loader_create(), quern_report_create(), NULL };
+	quern_loader_beware(c.loader);
 	c.ids = quern_loader_ids(c.loader);
 	json_t *schema = scene_schema(&c);
 	char *text = json_dumps(schema, JSON_INDENT(1) | JSON_PRESERVE_ORDER);
 	char why[256];
-	int status = quern_report_errors(c.report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
+	status = quern_report_errors(c.report) ? QUERN_EXIT_SCENE : QUERN_EXIT_DONE;
 	quern_report_print(c.report, stderr);
 	if (!out) puts(text);
 	else if (!quern_save_bytes(out, text, strlen(text), why)) {

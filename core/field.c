@@ -74,33 +74,50 @@ static void *take_column(uint32_t cap, size_t bytes) {
 
 static bool owns(const quern_field *field, int set) { return field->set == set && !field->local; }
 
-/* Columns of a set always have its capacity, so that they can trade places with the spare ones. */
-static quern_status reserve(quern_store *store, int set, uint32_t n) {
-	quern_set_store *s = &store->sets[set];
-	if (n <= s->cap && s->spare[0]) return QUERN_OK;
-	const uint32_t cap = n + n / 4 + 64;
-	bool failed = false;
-	for (int k = 0; k < 2; k++) {
-		free(s->spare[k]);
-		s->spare[k] = take_column(cap, k ? 4 : 8);
-		failed = failed || !s->spare[k];
-	}
+typedef struct {
+	void **column, *fresh;
+	size_t bytes;
+	bool carried;
+} place;
+
+/* Every column of a set, the spare ones first; returns how many there are. */
+static size_t places_of(quern_store *store, int set, place *out) {
+	size_t n = 0;
+	for (int k = 0; k < 2; k++)
+		out[n++] = (place) { .column = &store->sets[set].spare[k], .bytes = k ? 4 : 8 };
 	for (size_t i = 0; i < store->n_fields; i++) {
 		quern_field *field = &store->fields[i];
 		if (!owns(field, set)) continue;
 		for (int copy = 0; copy <= field->twice; copy++)
-			for (uint8_t k = 0; k < field->n_components; k++) {
-				void *column = take_column(cap, quern_field_bytes(field));
-				failed = failed || !column;
-				if (column && field->data[copy][k])
-					memcpy(column, field->data[copy][k], (size_t)s->n * quern_field_bytes(field));
-				free(field->data[copy][k]);
-				field->data[copy][k] = column;
-			}
+			for (uint8_t k = 0; k < field->n_components; k++)
+				out[n++] = (place) { &field->data[copy][k], NULL, quern_field_bytes(field), true };
 	}
+	return n;
+}
+
+/* Columns of a set always have its capacity, so that they can trade places with the spare ones. All new columns are
+ * there before an old one goes. */
+static quern_status reserve(quern_store *store, int set, uint32_t n) {
+	quern_set_store *s = &store->sets[set];
+	if (n <= s->cap && s->spare[0]) return QUERN_OK;
+	if (n > UINT32_MAX / 2) return QUERN_E_MEMORY;
+	const uint32_t cap = n + n / 4 + 64;
+	place *places = calloc(store->n_fields * 18 + 2, sizeof *places);
+	const size_t n_places = places ? places_of(store, set, places) : 0;
+	bool good = places != NULL;
+	for (size_t i = 0; i < n_places && good; i++)
+		good = (places[i].fresh = take_column(cap, places[i].bytes));
+	for (size_t i = 0; i < n_places; i++) {
+		place *p = &places[i];
+		if (good && p->carried && *p->column) memcpy(p->fresh, *p->column, s->n * p->bytes);
+		free(good ? *p->column : p->fresh);
+		if (good) *p->column = p->fresh;
+	}
+	free(places);
+	if (!good) return QUERN_E_MEMORY;
 	store->version++;
-	s->cap = failed ? 0 : cap;
-	return failed ? QUERN_E_MEMORY : QUERN_OK;
+	s->cap = cap;
+	return QUERN_OK;
 }
 
 typedef struct {
@@ -147,27 +164,34 @@ static void number_new(quern_set_store *s, int64_t *id, uint32_t n) {
 		if (id[i] < 0) id[i] = s->next_id++;
 }
 
+static quern_status reserve_blocks(quern_set_store *s, uint32_t n_blocks) {
+	if (n_blocks < s->block_cap) return QUERN_OK;
+	const size_t cap = ((size_t)n_blocks + 64) * 2;
+	uint32_t *grown = cap > UINT32_MAX ? NULL : realloc(s->block, cap * sizeof(uint32_t));
+	if (!grown) return QUERN_E_MEMORY;
+	s->block = grown;
+	s->block_cap = (uint32_t)cap;
+	return QUERN_OK;
+}
+
+static void put_blocks(quern_set_store *s, uint32_t n_blocks, const uint32_t *block) {
+	if (block) memmove(s->block, block, ((size_t)n_blocks + 1) * sizeof(uint32_t));
+	s->n_blocks = block ? n_blocks : 0;
+}
+
 quern_status quern_store_partition(quern_store *store, int set, uint32_t n_blocks, const uint32_t *block) {
 	quern_set_store *s = &store->sets[set];
-	if (!block) {
-		s->n_blocks = 0;
-		return QUERN_OK;
-	}
-	if (n_blocks + 1 > s->block_cap) {
-		uint32_t *grown = realloc(s->block, ((size_t)n_blocks + 64) * 2 * sizeof(uint32_t));
-		if (!grown) return QUERN_E_MEMORY;
-		s->block = grown;
-		s->block_cap = (n_blocks + 64) * 2;
-	}
-	memmove(s->block, block, ((size_t)n_blocks + 1) * sizeof(uint32_t));
-	s->n_blocks = n_blocks;
-	return QUERN_OK;
+	const quern_status status = block ? reserve_blocks(s, n_blocks) : QUERN_OK;
+	if (status == QUERN_OK) put_blocks(s, n_blocks, block);
+	return status;
 }
 
 static quern_status drop(quern_store *store, int set, const bool *gone);
 
-/* Every index into `target` follows inverse[old] = new; entries that lost their target go. */
-static quern_status follow(quern_store *store, int target, const int32_t *inverse) {
+/* Every index into `target`, which had old_n entries, follows inverse[old] = new; entries that lost their target go. If
+ * there is no memory to let them go, they stay and point at nothing. */
+static quern_status follow(quern_store *store, int target, uint32_t old_n, const int32_t *inverse) {
+	quern_status status = QUERN_OK;
 	for (size_t s = 0; s < store->n_sets; s++) {
 		const uint32_t n = store->sets[s].n;
 		bool *gone = NULL;
@@ -176,23 +200,23 @@ static quern_status follow(quern_store *store, int target, const int32_t *invers
 			if (!owns(field, (int)s) || field->shape != QUERN_INDEX || field->target != target) continue;
 			int32_t *index = field->data[field->now][0];
 			for (uint32_t k = 0; k < n; k++) {
-				index[k] = inverse[index[k]];
+				if (index[k] == QUERN_NO_TARGET) continue;
+				index[k] = index[k] >= 0 && (uint32_t)index[k] < old_n ? inverse[index[k]] : QUERN_NO_TARGET;
 				if (index[k] >= 0) continue;
 				if (!gone) gone = calloc(n, sizeof(bool));
-				if (!gone) return QUERN_E_MEMORY;
-				gone[k] = true;
+				if (gone) gone[k] = true;
+				else status = QUERN_E_MEMORY;
 			}
 		}
-		const quern_status status = gone ? drop(store, (int)s, gone) : QUERN_OK;
+		if (gone && drop(store, (int)s, gone) != QUERN_OK) status = QUERN_E_MEMORY;
 		free(gone);
-		if (status != QUERN_OK) return status;
 	}
-	return QUERN_OK;
+	return status;
 }
 
 static quern_status drop(quern_store *store, int set, const bool *gone) {
 	quern_set_store *s = &store->sets[set];
-	int32_t *from = malloc((size_t)s->n * sizeof(int32_t) + 4);
+	int32_t *from = malloc((size_t)s->n * sizeof(int32_t)); /* something is gone, so n > 0 */
 	uint32_t *block = s->n_blocks ? malloc(((size_t)s->n_blocks + 1) * sizeof(uint32_t)) : NULL;
 	if (!from || (s->n_blocks && !block)) return free(from), free(block), QUERN_E_MEMORY;
 	uint32_t n = 0, b = 0;
@@ -213,13 +237,17 @@ static bool is_target(const quern_store *store, int set) {
 	return false;
 }
 
-quern_status quern_store_remap(
-	quern_store *store, int set, uint32_t n, const int32_t *from, uint32_t n_blocks, const uint32_t *block) {
-	const uint32_t old_n = store->sets[set].n;
-	quern_status status = reserve(store, set, n > old_n ? n : old_n);
-	if (status != QUERN_OK) return status;
+/* inverse[old] = new, or no target; NULL if memory is gone. */
+static int32_t *invert(uint32_t old_n, uint32_t n, const int32_t *from) {
+	int32_t *inverse = malloc(old_n ? (size_t)old_n * sizeof(int32_t) : 1);
+	for (uint32_t i = 0; i < old_n && inverse; i++) inverse[i] = QUERN_NO_TARGET;
+	for (uint32_t i = 0; i < n && inverse; i++)
+		if (from[i] >= 0) inverse[from[i]] = (int32_t)i;
+	return inverse;
+}
+
+static void permute_columns(quern_store *store, int set, uint32_t n, const int32_t *from) {
 	quern_set_store *s = &store->sets[set];
-	const uint32_t chunks = (n + CHUNK - 1) / CHUNK;
 	for (size_t i = 0; i < store->n_fields; i++) {
 		quern_field *field = &store->fields[i];
 		if (!owns(field, set)) continue;
@@ -227,7 +255,7 @@ quern_status quern_store_remap(
 		for (uint8_t k = 0; k < field->n_components; k++) {
 			void **column = &field->data[field->now][k];
 			permutation p = { field, from, *column, s->spare[spare], initial_of(field, k), s->next_id, n };
-			quern_pool_each(store->pool, chunks, permute, &p);
+			quern_pool_each(store->pool, (n + CHUNK - 1) / CHUNK, permute, &p);
 			s->spare[spare] = *column;
 			*column = p.new;
 			if (field->shape == QUERN_ID) number_new(s, *column, n);
@@ -235,20 +263,29 @@ quern_status quern_store_remap(
 	}
 	s->n = n;
 	store->version++;
-	status = quern_store_partition(store, set, n_blocks, block);
-	if (status != QUERN_OK || !is_target(store, set)) return status;
-	int32_t *inverse = malloc((size_t)old_n * sizeof(int32_t) + 4);
-	if (!inverse) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < old_n; i++) inverse[i] = -1;
-	for (uint32_t i = 0; i < n; i++)
-		if (from[i] >= 0) inverse[from[i]] = (int32_t)i;
-	status = follow(store, set, inverse);
+}
+
+/* What takes memory comes first, so that without any the store is as it was. */
+quern_status quern_store_remap(
+	quern_store *store, int set, uint32_t n, const int32_t *from, uint32_t n_blocks, const uint32_t *block) {
+	quern_set_store *s = &store->sets[set];
+	const uint32_t old_n = s->n;
+	const bool followed = is_target(store, set);
+	int32_t *inverse = followed ? invert(old_n, n, from) : NULL;
+	quern_status status = followed && !inverse ? QUERN_E_MEMORY : QUERN_OK;
+	if (status == QUERN_OK) status = reserve(store, set, n > old_n ? n : old_n);
+	if (status == QUERN_OK && block) status = reserve_blocks(s, n_blocks);
+	if (status == QUERN_OK) {
+		permute_columns(store, set, n, from);
+		put_blocks(s, n_blocks, block);
+		if (followed) status = follow(store, set, old_n, inverse);
+	}
 	free(inverse);
 	return status;
 }
 
 quern_status quern_store_fill(quern_store *store, int set, uint32_t n) {
-	int32_t *from = malloc((size_t)n * sizeof(int32_t) + 4);
+	int32_t *from = malloc(n ? (size_t)n * sizeof(int32_t) : 1);
 	if (!from) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < n; i++) from[i] = -1;
 	const quern_status status = quern_store_remap(store, set, n, from, 0, NULL);
@@ -259,10 +296,12 @@ quern_status quern_store_fill(quern_store *store, int set, uint32_t n) {
 quern_status quern_store_rows(quern_store *store, int set, uint32_t n) {
 	quern_set_store *s = &store->sets[set];
 	if (n > s->cap) {
+		const size_t cap = (size_t)n + n / 4 + 64;
+		double *row = cap > UINT32_MAX ? NULL : aligned_alloc(64, cap * 64);
+		if (!row) return QUERN_E_MEMORY;
 		free(s->row);
-		s->cap = n + n / 4 + 64;
-		s->row = aligned_alloc(64, (size_t)s->cap * 64);
-		if (!s->row) return s->cap = 0, QUERN_E_MEMORY;
+		s->row = row;
+		s->cap = (uint32_t)cap;
 	}
 	s->n = n;
 	if (s->row) memset(s->row, 0, (size_t)n * 64);

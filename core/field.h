@@ -10,7 +10,8 @@ typedef struct quern_field {
 	int set, target; /* indices of sets; target -1 unless INDEX into one */
 	uint8_t shape, n_components;
 	bool twice;    /* read from one copy, written to the other, then swapped */
-	bool state;    /* checkpointed */
+	bool state;    /* a step goes on from it */
+	bool kept;     /* checkpointed: state, and what is looked at between steps */
 	bool local;    /* born and used up within one stage: a worker's scratch, no memory here */
 	bool shown;    /* in every frame */
 	uint32_t lane; /* of a row set */
@@ -46,6 +47,9 @@ void quern_store_finish(quern_store *);
 int quern_store_set(const quern_store *, const char *name);   /* -1: none */
 int quern_store_field(const quern_store *, const char *name); /* -1: none */
 quern_column quern_field_column(const quern_store *, const quern_field *, uint8_t copy);
+
+/* All that follow return QUERN_E_MEMORY if memory is gone, and leave a store that can be looked at and saved: what it
+ * was, but that entries whose target is gone may still be there with QUERN_NO_TARGET. */
 
 /* A set of n entries at their initial values; ids are numbered on. Old contents are lost. */
 quern_status quern_store_fill(quern_store *, int set, uint32_t n);

@@ -1,8 +1,8 @@
 #include "frame.h"
 #include "config.h"
 #include "h5.h"
+#include "identity.h"
 #include "sidecar.h"
-#include "text.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -84,10 +84,10 @@ static void write_centres(quern_h5 *h, hid_t group, const quern_run *run, size_t
 	free(table);
 }
 
+/* A contact's grains go with its force. */
 static bool is_shown(const quern_store *store, const quern_field *field) {
 	bool any = field->shown;
-	for (size_t i = 0; i < store->n_fields && !any && field->target >= 0;
-		 i++) /* a contact's grains go with its force */
+	for (size_t i = 0; i < store->n_fields && !any && field->target >= 0; i++)
 		any = store->fields[i].set == field->set && store->fields[i].shown;
 	return any && !field->local && !store->sets[field->set].rows;
 }
@@ -111,10 +111,9 @@ static void write_set(quern_h5 *h, const quern_run *run, int s) {
 	if (group >= 0) H5Gclose(group);
 }
 
-static void provenance(quern_h5 *h, const quern_run *run, int64_t frame) {
-	char *resolved = quern_scene_resolved(run->scene);
+static void provenance(quern_h5 *h, quern_run *run) {
 	quern_h5_text(h, h->file, "format", "quern-frame 1");
-	quern_h5_number(h, h->file, "time", quern_run_frame_time(run, frame));
+	quern_h5_number(h, h->file, "time", quern_run_time(run));
 	quern_h5_integer(h, h->file, "step", run->clock.step);
 	quern_h5_integer(h, h->file, "dimension", run->scene->general.dimension);
 	quern_h5_text(h, h->file, "name", run->scene->general.name);
@@ -122,8 +121,7 @@ static void provenance(quern_h5 *h, const quern_run *run, int64_t frame) {
 	quern_h5_text(h, h->file, "compiler", QUERN_COMPILER);
 	quern_h5_text(h, h->file, "flags", QUERN_FLAGS);
 	quern_h5_integer(h, h->file, "seed", run->scene->general.seed);
-	quern_h5_integer(h, h->file, "scene_hash", (int64_t)quern_hash(resolved, strlen(resolved)));
-	free(resolved);
+	quern_h5_integer(h, h->file, "scene_hash", (int64_t)quern_run_scene_hash(run));
 }
 
 quern_status quern_frame_write(quern_run *run, int64_t frame) {
@@ -133,7 +131,7 @@ quern_status quern_frame_write(quern_run *run, int64_t frame) {
 	char *path = quern_format("%s/frames/%06lld.h5", run->folder, (long long)frame);
 	bool good = quern_h5_create(&h, run->scene->general.compress, 0);
 	if (good) {
-		provenance(&h, run, frame);
+		provenance(&h, run);
 		for (int s = 0; s < (int)run->plan->store.n_sets; s++) write_set(&h, run, s);
 	}
 	good = quern_h5_save(&h, path, why) && quern_sidecars_add(run->sidecars, frame, why);

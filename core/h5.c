@@ -1,22 +1,62 @@
 #include "h5.h"
-#include "scene.h"
-#include "text.h"
 #include <errno.h>
-#include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 /* Of a file with a checksum: what stands in its first 512 bytes. */
+enum { USER_BLOCK = 512 };
 static const char magic[16] = "quern checksum\n";
 
 void quern_h5_quiet(void) { H5Eset_auto2(H5E_DEFAULT, NULL, NULL); }
 
+/* ---- the memory that a file is built in ----
+ * HDF5 grows it through these functions and gives it back when the file is closed. Then it is kept, not freed, so that
+ * a file in memory never exists twice. */
+
+static void *image_malloc(size_t size, H5FD_file_image_op_t op, void *h) {
+	(void)op, (void)h;
+	return malloc(size);
+}
+
+static void *image_copy(void *to, const void *from, size_t size, H5FD_file_image_op_t op, void *h) {
+	(void)op, (void)h;
+	return memcpy(to, from, size);
+}
+
+static void *image_realloc(void *image, size_t size, H5FD_file_image_op_t op, void *h) {
+	(void)op;
+	void *grown = realloc(image, size);
+	if (grown) ((quern_h5 *)h)->capacity = size;
+	return grown;
+}
+
+static herr_t image_free(void *image, H5FD_file_image_op_t op, void *h) {
+	if (op == H5FD_FILE_IMAGE_OP_FILE_CLOSE) ((quern_h5 *)h)->image = image;
+	else free(image);
+	return 0;
+}
+
+static void *same_owner(void *h) { return h; }
+static herr_t keep_owner(void *h) {
+	(void)h;
+	return 0;
+}
+
+/* Two runs that do the same write the same bytes: HDF5 shall not note when an object was made. */
+static hid_t without_times(hid_t class) {
+	const hid_t create = H5Pcreate(class);
+	H5Pset_obj_track_times(create, false);
+	return create;
+}
+
 bool quern_h5_create(quern_h5 *h, bool compress, size_t user_block) {
 	*h = (quern_h5) { .compress = compress, .user_block = user_block };
-	const hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = H5Pcreate(H5P_FILE_CREATE);
+	H5FD_file_image_callbacks_t own = { image_malloc, image_copy, image_realloc, image_free, same_owner,
+		keep_owner, h };
+	const hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = without_times(H5P_FILE_CREATE);
 	H5Pset_fapl_core(access, 1 << 20, 0);
+	H5Pset_file_image_callbacks(access, &own);
 	if (user_block) H5Pset_userblock(create, user_block);
 	h->file = H5Fcreate("memory", H5F_ACC_TRUNC, create, access);
 	H5Pclose(access);
@@ -28,84 +68,43 @@ bool quern_h5_create(quern_h5 *h, bool compress, size_t user_block) {
 void quern_h5_discard(quern_h5 *h) {
 	if (h->file >= 0) H5Fclose(h->file);
 	h->file = -1;
+	free(h->image);
+	h->image = NULL;
 }
 
-/* ---- bytes to disk ---- */
-
-static bool write_all(int fd, const char *data, size_t size) {
-	while (size) {
-		const ssize_t n = write(fd, data, size);
-		if (n < 0 && errno == EINTR) continue;
-		if (n <= 0) return false;
-		data += n;
-		size -= (size_t)n;
-	}
-	return true;
+void quern_h5_seal(void *image, size_t size) {
+	memset(image, 0, USER_BLOCK);
+	const uint64_t sum = quern_hash((char *)image + USER_BLOCK, size - USER_BLOCK);
+	memcpy(image, magic, sizeof magic);
+	memcpy((char *)image + sizeof magic, &sum, sizeof sum);
 }
 
-/* The new name must survive a crash too, so its folder is flushed as well. */
-static void flush_folder(const char *path) {
-	char *folder = quern_copy(path), *slash = strrchr(folder, '/');
-	if (slash) *slash = 0;
-	const int fd = open(slash ? folder : ".", O_RDONLY | O_DIRECTORY);
-	if (fd >= 0) {
-		fsync(fd);
-		close(fd);
-	}
-	free(folder);
-}
-
-bool quern_save_bytes(const char *path, const void *data, size_t size, char why[256]) {
-	char *aside = quern_format("%s.part", path);
-	const int fd = open(aside, O_WRONLY | O_CREAT | O_TRUNC, 0666);
-	bool good = fd >= 0 && write_all(fd, data, size) && !fsync(fd);
-	int error = good ? 0 : errno;
-	if (fd >= 0 && close(fd) && good) good = false, error = errno;
-	if (good && rename(aside, path)) good = false, error = errno;
-	if (good) flush_folder(path);
-	else {
-		unlink(aside);
-		snprintf(why, 256, "%.180s cannot be written: %s", path, strerror(error));
-	}
-	free(aside);
-	return good;
-}
-
-/* HDF5 gives the image without the user block, which goes in front of it. */
-static char *take_image(quern_h5 *h, size_t *size) {
+/* How many bytes of the memory are the file: HDF5 counts without the user block, and takes more than it needs. */
+static size_t close_image(quern_h5 *h) {
 	ssize_t n = -1;
 	if (!h->failed && H5Fflush(h->file, H5F_SCOPE_GLOBAL) >= 0) n = H5Fget_file_image(h->file, NULL, 0);
-	char *image = n > 0 ? calloc(1, h->user_block + (size_t)n) : NULL;
-	if (image && H5Fget_file_image(h->file, image + h->user_block, (size_t)n) != n) {
-		free(image);
-		image = NULL;
-	}
-	*size = image ? h->user_block + (size_t)n : 0;
-	quern_h5_discard(h);
-	return image;
+	if (H5Fclose(h->file) < 0) n = -1;
+	h->file = -1;
+	const size_t size = n > 0 ? h->user_block + (size_t)n : 0;
+	return h->image && size <= h->capacity ? size : 0;
 }
 
 bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
-	size_t size;
-	char *image = take_image(h, &size);
-	if (!image) {
-		snprintf(why, 256, "%.180s cannot be made: out of memory, or HDF5 refuses", path);
-		return false;
-	}
-	if (h->user_block) {
-		const uint64_t sum = quern_hash(image + h->user_block, size - h->user_block);
-		memcpy(image, magic, sizeof magic);
-		memcpy(image + sizeof magic, &sum, sizeof sum);
-	}
-	const bool good = quern_save_bytes(path, image, size, why);
-	free(image);
+	const size_t size = h->file >= 0 ? close_image(h) : 0;
+	bool good = size > 0;
+	if (!good) snprintf(why, 256, "%.180s cannot be made: out of memory, or HDF5 refuses", path);
+	if (good && h->user_block) quern_h5_seal(h->image, size);
+	good = good && quern_save_bytes(path, h->image, size, why);
+	quern_h5_discard(h);
 	return good;
 }
 
 /* ---- writing ---- */
 
 hid_t quern_h5_group(quern_h5 *h, hid_t parent, const char *name) {
-	const hid_t group = H5Gcreate2(parent, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+	const hid_t create = without_times(H5P_GROUP_CREATE);
+	const hid_t group = H5Gcreate2(parent, name, H5P_DEFAULT, create, H5P_DEFAULT);
+	H5Pclose(create);
 	h->failed = h->failed || group < 0;
 	return group;
 }
@@ -114,7 +113,7 @@ hid_t quern_h5_write(
 	quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data) {
 	const int rank = columns > 1 ? 2 : 1;
 	const hsize_t size[2] = { rows, columns }, chunk[2] = { rows < 65536 ? rows : 65536, columns };
-	const hid_t space = H5Screate_simple(rank, size, NULL), create = H5Pcreate(H5P_DATASET_CREATE);
+	const hid_t space = H5Screate_simple(rank, size, NULL), create = without_times(H5P_DATASET_CREATE);
 	if (h->compress && rows > 64) {
 		H5Pset_chunk(create, rank, chunk);
 		H5Pset_shuffle(create);
@@ -153,50 +152,28 @@ void quern_h5_integer(quern_h5 *h, hid_t object, const char *name, int64_t value
 
 /* ---- reading ---- */
 
-static char *read_bytes(const char *path, size_t *size, char why[256]) {
-	struct stat s;
-	const int fd = open(path, O_RDONLY);
-	char *data = NULL;
-	if (fd < 0 || fstat(fd, &s) || !S_ISREG(s.st_mode)) {
-		snprintf(why, 256, "it cannot be opened: %s", strerror(errno));
-		if (fd >= 0) close(fd);
-		return NULL;
-	}
-	*size = (size_t)s.st_size;
-	data = malloc(*size + 1);
-	size_t n = 0;
-	while (data && n < *size) {
-		const ssize_t got = read(fd, data + n, *size - n);
-		if (got <= 0) break;
-		n += (size_t)got;
-	}
-	close(fd);
-	if (n == *size && data) return data;
-	snprintf(why, 256, "it cannot be read");
-	free(data);
-	return NULL;
-}
-
 /* The checksum is looked at before HDF5 sees a byte: a damaged file is refused here, whatever the damage. */
-bool quern_h5_open(quern_h5 *h, const char *path, char why[256]) {
-	size_t size = 0;
-	*h = (quern_h5) { .file = -1 };
-	char *image = read_bytes(path, &size, why);
-	if (!image) return false;
-	uint64_t sum = 0;
-	const bool sealed = size > 512 && !memcmp(image, magic, sizeof magic);
-	if (sealed) memcpy(&sum, image + sizeof magic, sizeof sum);
-	if (!sealed || quern_hash(image + 512, size - 512) != sum) {
-		snprintf(why, 256, "it is damaged or not of this program: its checksum does not hold");
-		free(image);
+static bool checksum_holds(const char *path, char why[256]) {
+	char head[sizeof magic + sizeof(uint64_t)] = "";
+	uint64_t is = 0, wanted = 0;
+	if (!quern_hash_file(path, USER_BLOCK, &is)) {
+		snprintf(why, 256, "it cannot be read: %s", strerror(errno));
 		return false;
 	}
-	const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-	H5Pset_fapl_core(access, 1 << 20, 0);
-	H5Pset_file_image(access, image, size);
-	h->file = H5Fopen("memory", H5F_ACC_RDONLY, access);
-	H5Pclose(access);
-	free(image);
+	FILE *file = fopen(path, "rb");
+	const bool sealed = file && fread(head, sizeof head, 1, file) == 1 && !memcmp(head, magic, sizeof magic);
+	if (file) fclose(file);
+	memcpy(&wanted, head + sizeof magic, sizeof wanted);
+	if (sealed && is == wanted) return true;
+	snprintf(why, 256, "it is damaged or not of this program: its checksum does not hold");
+	return false;
+}
+
+/* Read from the disk as it is asked for, never as a whole into memory. */
+bool quern_h5_open(quern_h5 *h, const char *path, char why[256]) {
+	*h = (quern_h5) { .file = -1 };
+	if (!checksum_holds(path, why)) return false;
+	h->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
 	if (h->file < 0) snprintf(why, 256, "it is no HDF5 file");
 	return h->file >= 0;
 }

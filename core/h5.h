@@ -1,25 +1,28 @@
 /* h5 - HDF5 files that are whole or absent: built in memory, written aside, flushed, renamed */
 #pragma once
+#include "file.h"
 #include <hdf5.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 
 typedef struct quern_h5 {
 	hid_t file;
 	bool compress, failed;
 	size_t user_block; /* bytes before the HDF5 data, 0 or 512 */
+	void *image;       /* the file in memory, once HDF5 has let go of it */
+	size_t capacity;
 } quern_h5;
 
 /* Nothing is printed by the library from here on; our own messages name file and cause. */
 void quern_h5_quiet(void);
 
-/* A file in memory. `user_block`: 0, or 512 bytes in front that hold a checksum of the rest. */
+/* A file in memory, which stays where it is until it is saved or discarded. `user_block`: 0, or 512 bytes in front that
+ * hold a checksum of the rest. */
 bool quern_h5_create(quern_h5 *, bool compress, size_t user_block);
 /* Puts it on the disk under `path`, or leaves there what was there before; on a fault `why` says what went wrong.
- * Ends the file in memory in any case. */
+ * Ends the file in memory in any case. Takes no more memory than the file itself. */
 bool quern_h5_save(quern_h5 *, const char *path, char why[256]);
 void quern_h5_discard(quern_h5 *);
+/* Writes the checksum into the first 512 bytes of a file's image. */
+void quern_h5_seal(void *image, size_t size);
 
 /* rows x columns numbers; columns 1 makes a list. The faults of all writes are collected in `failed`. */
 hid_t quern_h5_write(
@@ -39,6 +42,3 @@ bool quern_h5_read_integer(hid_t object, const char *name, int64_t *value);
 bool quern_h5_read_text(hid_t object, const char *name, char *text, size_t size);
 /* Opens a group, or returns a negative number. */
 hid_t quern_h5_find(hid_t parent, const char *name);
-
-/* The same for any bytes: written aside, flushed, renamed. */
-bool quern_save_bytes(const char *path, const void *data, size_t size, char why[256]);

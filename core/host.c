@@ -31,13 +31,14 @@ static void *host_scratch(quern_run *run, uint32_t worker, size_t bytes) {
 /* One block of memory is reused from stage to stage; what did not fit makes it larger the next time. */
 static void *host_memory(quern_run *run, size_t bytes) {
 	quern_arena *a = &run->arena;
-	const size_t size = (bytes + 63) & ~(size_t)63;
+	if (bytes > SIZE_MAX / 2) return NULL;
+	const size_t size = bytes ? (bytes + 63) & ~(size_t)63 : 64; /* of nothing too there is an address */
 	void *memory;
-	if (a->used + size <= a->capacity) {
+	if (size <= a->capacity - a->used) {
 		memory = a->data + a->used;
 		a->used += size;
 	} else {
-		memory = aligned_alloc(64, size ? size : 64);
+		memory = aligned_alloc(64, size);
 		if (!memory) return NULL;
 		a->extra = quern_grow(a->extra, a->n_extra, &a->extra_capacity, sizeof(void *));
 		a->extra[a->n_extra++] = memory;

@@ -1,10 +1,14 @@
 #include "loader.h"
+#include "child.h"
 #include "config.h"
-#include "text.h"
+#include "environment.h"
+#include "level.h"
+#include "watch.h"
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <limits.h>
+#include <link.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -17,18 +21,35 @@ const char *quern_kind_name(uint32_t kind) {
 	return kind > 0 && kind < QUERN_KINDS ? quern_kind_names[kind - 1] : NULL;
 }
 
+const char *quern_shape_name(uint32_t shape) {
+	static const char *const names[] = { NULL, "a scalar", "a vector", "an axial vector",
+		"a symmetric tensor", "a tensor", "an index", "an id" };
+	return shape < sizeof names / sizeof *names ? names[shape] : NULL;
+}
+
 uint32_t quern_kind_of(const char *name) {
 	for (uint32_t k = 1; k < QUERN_KINDS; k++)
 		if (!strcmp(quern_kind_names[k - 1], name)) return k;
 	return 0;
 }
 
+const char *quern_id_name(const char *id) {
+	for (uint32_t k = 1; k < QUERN_KINDS; k++) {
+		const char *kind = quern_kind_name(k);
+		const size_t n = strlen(kind);
+		if (!strncmp(id, kind, n) && id[n] == '.' && quern_is_name(id + n + 1)) return id + n + 1;
+	}
+	return NULL;
+}
+
 struct quern_loader {
-	char **folders;
+	char **folders; /* of QUERN_PLUGIN_PATH */
 	size_t n_folders, folders_capacity;
+	char *own; /* the program's; NULL: there is none */
 	quern_plugin_file **files;
 	size_t n_files, files_capacity;
 	int level;
+	bool wary;
 };
 
 static bool is_folder(const char *path) {
@@ -47,51 +68,37 @@ static void add_folder(quern_loader *loader, const char *path) {
 }
 
 /* Built in place, the plugins lie beside the program; installed, where the build was told. */
-static void add_own_folder(quern_loader *loader) {
-	char exe[PATH_MAX];
+static char *own_folder(void) {
+	char exe[PATH_MAX], real[PATH_MAX];
 	const ssize_t n = readlink("/proc/self/exe", exe, sizeof exe - 1);
-	if (n <= 0) return;
+	if (n <= 0) return NULL;
 	exe[n] = 0;
 	char *slash = strrchr(exe, '/');
 	if (slash) *slash = 0;
 	char *beside = quern_format("%s/plugins", exe);
 	char *installed = quern_format("%s/%s", exe, QUERN_PLUGINS_FROM_BIN);
-	char *above = quern_format("%s/../plugins", exe); /* test programs live one folder deeper */
-	if (is_folder(beside)) add_folder(loader, beside);
-	else if (is_folder(installed)) add_folder(loader, installed);
-	else add_folder(loader, above);
+	const char *found = realpath(is_folder(beside) ? beside : installed, real);
 	free(beside);
 	free(installed);
-	free(above);
-}
-
-int quern_loader_best_level(void) {
-	__builtin_cpu_init();
-	const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-					__builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
-	const bool v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-					__builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-					__builtin_cpu_supports("avx512vl");
-	return v4 ? 4 : v3 ? 3 : 1;
+	return found ? quern_copy(found) : NULL;
 }
 
 quern_loader *quern_loader_create(void) {
 	quern_loader *loader = quern_take(1, sizeof *loader);
-	loader->level = quern_loader_best_level();
+	quern_loader_limit(loader, 4);
 	const char *path = getenv("QUERN_PLUGIN_PATH");
 	char *copy = quern_copy(path ? path : ""), *rest = copy, *folder;
 	while ((folder = strsep(&rest, ":")))
 		if (*folder) add_folder(loader, folder);
 	free(copy);
-	add_own_folder(loader);
+	loader->own = own_folder();
 	return loader;
 }
 
 static void file_destroy(quern_plugin_file *file) {
 	if (!file) return;
 	free(file->path);
-	free(file->params);
-	free(file->uses);
+	quern_table_finish(&file->table);
 	free(file);
 }
 
@@ -101,14 +108,17 @@ void quern_loader_destroy(quern_loader *loader) {
 	for (size_t i = 0; i < loader->n_files; i++) file_destroy(loader->files[i]);
 	for (size_t i = 0; i < loader->n_folders; i++) free(loader->folders[i]);
 	free(loader->files);
+	free(loader->own);
 	free(loader->folders);
 	free(loader);
 }
 
 void quern_loader_limit(quern_loader *loader, int level) {
-	const int best = quern_loader_best_level();
+	const int best = quern_level_here();
 	loader->level = level < best ? level : best;
 }
+
+void quern_loader_beware(quern_loader *loader) { loader->wary = true; }
 
 size_t quern_loader_count(const quern_loader *loader) { return loader->n_files; }
 const quern_plugin_file *quern_loader_at(const quern_loader *loader, size_t i) { return loader->files[i]; }
@@ -127,20 +137,6 @@ static uint64_t hash_file(const char *path) {
 	return hash;
 }
 
-/* Rows of `stride` bytes in the plugin become rows of `size` bytes here; what the plugin does not know is 0. */
-static void *copy_rows(const void *rows, size_t stride, size_t size, size_t *n) {
-	size_t capacity = 0;
-	char *out = NULL;
-	*n = 0;
-	for (const char *row = rows; rows; row += stride, (*n)++) {
-		out = quern_grow(out, *n, &capacity, size);
-		memset(out + *n * size, 0, size);
-		memcpy(out + *n * size, row, stride < size ? stride : size);
-		if (!*(const char *const *)(const void *)row) break;
-	}
-	return out;
-}
-
 static const char *no_library(void *handle, char why[160]) {
 	for (unsigned v = 2; v < 10; v++) {
 		char symbol[32];
@@ -154,77 +150,126 @@ static const char *no_library(void *handle, char why[160]) {
 	return "exports no quern_library_1, so it is no Quern plugin: end its source with QUERN_LIBRARY(...)";
 }
 
-static const char *bad_library(const quern_library *lib, char why[160]) {
-	if (lib->size < sizeof(quern_library) || lib->abi >> 16 != QUERN_ABI_MAJOR ||
-		(lib->abi & 0xffffu) > QUERN_ABI_MINOR) {
-		snprintf(why, 160,
-			"is built for interface %u.%u, this program speaks %u.%u: rebuild it with this header",
-			lib->abi >> 16, lib->abi & 0xffffu, QUERN_ABI_MAJOR, QUERN_ABI_MINOR);
-		return why;
-	}
-	if (lib->real_size != sizeof(quern_real) || lib->lanes != QUERN_LANES)
-		return "is built for another number format: rebuild it with this program's header";
-	const quern_plugin *p = lib->plugin;
-	if (!p || p->size < sizeof(quern_plugin) || !p->id || !p->ops || !p->params || !p->uses)
-		return "describes no plugin: its table lacks id, params, uses or ops";
-	const char *kind = quern_kind_name(p->kind);
-	const char *dot = strchr(p->id, '.');
-	if (!kind || !dot || strncmp(p->id, kind, strlen(kind)) != 0 || p->id[strlen(kind)] != '.')
-		return "has an id that does not begin with its kind: name it KIND.NAME";
-	return NULL;
-}
-
-static unsigned control_word(void) { return __builtin_ia32_stmxcsr(); }
-
 static const quern_plugin_file *refuse(
 	quern_report *report, quern_mark mark, const char *path, const char *why) {
 	quern_report_add(report, mark, "plugin %s %s", path, why);
 	return NULL;
 }
 
-static quern_plugin_file *file_create(const char *path, int level, const quern_library *lib) {
+static int note_end(struct dl_phdr_info *info, size_t size, void *to) {
+	quern_plugin_file *file = to;
+	(void)size;
+	if (info->dlpi_addr != file->begin) return 0;
+	for (int i = 0; i < info->dlpi_phnum; i++) {
+		const uintptr_t end = file->begin + info->dlpi_phdr[i].p_vaddr + info->dlpi_phdr[i].p_memsz;
+		if (info->dlpi_phdr[i].p_type == PT_LOAD && end > file->end) file->end = end;
+	}
+	return 1;
+}
+
+static void note_place(quern_plugin_file *file, void *handle) {
+	struct link_map *map;
+	if (dlinfo(handle, RTLD_DI_LINKMAP, &map)) return;
+	file->begin = map->l_addr;
+	dl_iterate_phdr(note_end, file);
+}
+
+/* Adds the plugin behind the library's table, or refuses it. */
+static const quern_plugin_file *add_file(quern_loader *loader, const char *path, int level, void *handle,
+	const quern_library *lib, quern_report *report, quern_mark mark) {
 	quern_plugin_file *file = quern_take(1, sizeof *file);
+	quern_table *t = &file->table;
+	quern_text why = { 0 };
 	file->path = quern_copy(path);
+	if (!quern_table_read(t, lib, &why)) {
+		refuse(report, mark, path, quern_text_string(&why));
+		quern_text_finish(&why);
+		file_destroy(file);
+		return NULL;
+	}
+	note_place(file, handle);
 	file->hash = hash_file(path);
 	file->level = level;
-	file->library = lib;
-	memcpy(&file->plugin, lib->plugin,
-		lib->plugin->size < sizeof(quern_plugin) ? lib->plugin->size : sizeof(quern_plugin));
-	file->params = copy_rows(lib->plugin->params, lib->param_size, sizeof(quern_param), &file->n_params);
-	file->uses = copy_rows(lib->plugin->uses, lib->use_size, sizeof(quern_use), &file->n_uses);
-	file->plugin.params = file->params;
-	file->plugin.uses = file->uses;
-	return file;
+	file->library = &t->library;
+	file->plugin = t->plugin;
+	file->params = t->params;
+	file->uses = t->uses;
+	file->n_params = t->n_params;
+	file->n_uses = t->n_uses;
+	loader->files = quern_grow(loader->files, loader->n_files, &loader->files_capacity, sizeof(file));
+	return loader->files[loader->n_files++] = file;
+}
+
+/* Loading runs nothing of ours, but it runs what the plugin's compiler and its libraries have put there. */
+static void *open_object(const char *path, const char **changed) {
+	quern_environment e = quern_environment_take();
+	quern_watch_enter(path, "its start-up code");
+	void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+	quern_watch_leave();
+	*changed = quern_environment_restore(&e);
+	quern_environment_drop(&e);
+	return handle;
+}
+
+/* ---- asking a child first ---- */
+
+typedef struct {
+	const char *path;
+	volatile bool *mapped;
+} question;
+
+static void ask(void *arg) {
+	const question *q = arg;
+	const char *changed;
+	void *handle = open_object(q->path, &changed);
+	*q->mapped = true;
+	const quern_library *lib = handle ? dlsym(handle, "quern_library_1") : NULL;
+	quern_text why = { 0 };
+	quern_table table;
+	if (lib)
+		quern_table_read(&table, lib, &why), quern_table_finish(&table); /* what it says, it says again */
+	quern_text_finish(&why);
+}
+
+static bool survives(const char *path, quern_report *report, quern_mark mark) {
+	enum { SECONDS = 20 };
+	char what[80];
+	question q = { path, quern_shared_take(sizeof(bool)) };
+	if (!q.mapped) return false;
+	const quern_child how = quern_child_run(ask, &q, SECONDS);
+	quern_child_say(&how, SECONDS, what);
+	if (how.end != QUERN_CHILD_DONE)
+		quern_report_add(report, mark, "plugin %s %s while %s", path, what,
+			*q.mapped ? "its tables were read" : "it was loaded");
+	quern_shared_drop((void *)(uintptr_t)q.mapped, sizeof(bool));
+	return how.end == QUERN_CHILD_DONE;
 }
 
 static const quern_plugin_file *open_level(
 	quern_loader *loader, const char *path, int level, quern_report *report, quern_mark mark) {
 	char why[160];
+	const char *changed;
 	for (size_t i = 0; i < loader->n_files; i++)
 		if (!strcmp(loader->files[i]->path, path)) return loader->files[i];
-	const unsigned before = control_word();
-	void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
-	const unsigned after = control_word();
-	if (after != before) __builtin_ia32_ldmxcsr(before);
+	if (loader->wary && !survives(path, report, mark)) return NULL;
+	void *handle = open_object(path, &changed);
 	if (!handle) {
 		char *text = quern_format("cannot be loaded: %s; rebuild it, or install what it needs", dlerror());
 		refuse(report, mark, path, text);
 		free(text);
 		return NULL;
 	}
-	/* the low six bits are flags raised by arithmetic, the others change its results */
-	if ((after ^ before) & ~63u)
-		return refuse(report, mark, path,
-			"changes the processor's floating-point state when loaded: link it without -ffast-math");
+	if (changed) {
+		char *text = quern_format(
+			"changes %s when it is loaded, where a plugin runs nothing; -ffast-math at its link would",
+			changed);
+		refuse(report, mark, path, text);
+		free(text);
+		return NULL;
+	}
 	void *symbol = dlsym(handle, "quern_library_1");
 	if (!symbol) return refuse(report, mark, path, no_library(handle, why));
-	const quern_library *lib = symbol;
-	const char *bad = bad_library(lib, why);
-	if (bad) return refuse(report, mark, path, bad);
-	quern_plugin_file *file = file_create(path, level, lib);
-	loader->files = quern_grow(loader->files, loader->n_files, &loader->files_capacity, sizeof(file));
-	loader->files[loader->n_files++] = file;
-	return file;
+	return add_file(loader, path, level, handle, symbol, report, mark);
 }
 
 static int level_of(const char *path) {
@@ -276,10 +321,8 @@ static void unknown(
 	names = quern_grow(names, n, &capacity, sizeof(char *));
 	names[n] = NULL;
 	const char *near = quern_nearest(name, names), *elsewhere = NULL;
-	for (size_t i = 0; ids[i] && !elsewhere; i++) {
-		const char *dot = strchr(ids[i], '.');
-		if (dot && !strcmp(dot + 1, name)) elsewhere = ids[i];
-	}
+	for (size_t i = 0; ids[i] && !elsewhere; i++)
+		if (!strcmp(quern_id_name(ids[i]), name)) elsewhere = ids[i];
 	if (elsewhere)
 		quern_report_add(report, mark, "'%s' is %s; here a plugin of kind %s is wanted: %s", name, elsewhere,
 			kind, n ? quern_text_string(&list) : "none is installed");
@@ -295,28 +338,32 @@ static void unknown(
 	quern_loader_free_ids(ids);
 }
 
-const quern_plugin_file *quern_loader_find(
-	quern_loader *loader, quern_kind kind, const char *name, quern_report *report, quern_mark mark) {
-	char *id = quern_format("%s.%s", quern_kind_name(kind), name);
+/* The object of that id in the folders of the path, where it may stand once, or else in the program's own. */
+static char *find_object(
+	const quern_loader *loader, const char *id, int *level, quern_report *report, quern_mark mark) {
 	char *found = NULL;
-	int level = 1;
-	bool twice = false;
-	for (size_t i = 0; i < loader->n_folders && quern_is_name(name); i++) {
-		int other = 1;
-		char *path = best_file(loader, loader->folders[i], id, &other);
+	for (size_t i = 0; i < loader->n_folders; i++) {
+		char *path = best_file(loader, loader->folders[i], id, level);
 		if (path && found) {
 			quern_report_add(
 				report, mark, "%s is offered twice, by %s and by %s: remove one", id, found, path);
-			twice = true;
+			*level = 0;
 			free(path);
-		} else if (path) {
-			found = path;
-			level = other;
+			return found;
 		}
+		if (path) found = path;
 	}
+	return found || !loader->own ? found : best_file(loader, loader->own, id, level);
+}
+
+const quern_plugin_file *quern_loader_find(
+	quern_loader *loader, quern_kind kind, const char *name, quern_report *report, quern_mark mark) {
+	char *id = quern_format("%s.%s", quern_kind_name(kind), name);
+	int level = 1;
+	char *found = quern_is_name(name) ? find_object(loader, id, &level, report, mark) : NULL;
 	const quern_plugin_file *file = NULL;
 	if (!found) unknown(loader, quern_kind_name(kind), name, report, mark);
-	else if (!twice) file = open_level(loader, found, level, report, mark);
+	else if (level) file = open_level(loader, found, level, report, mark);
 	if (file && strcmp(file->plugin.id, id) != 0) {
 		quern_report_add(report, mark, "plugin %s calls itself %s: name the file %s.so", found,
 			file->plugin.id, file->plugin.id);
@@ -327,43 +374,83 @@ const quern_plugin_file *quern_loader_find(
 	return file;
 }
 
+/* ---- what there is ---- */
+
 static int by_name(const void *a, const void *b) {
 	return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-char **quern_loader_ids(const quern_loader *loader) {
-	char **ids = NULL;
-	size_t n = 0, capacity = 0, kept = 0;
-	for (size_t i = 0; i < loader->n_folders; i++) {
-		DIR *folder = opendir(loader->folders[i]);
+/* "contact.linear" of "contact.linear.v3.so", or NULL if that is no object whose name begins with a kind. */
+static char *id_of_object(const char *name) {
+	const size_t length = strlen(name), n = strcspn(name, ".");
+	if (length < 4 || strcmp(name + length - 3, ".so") != 0) return NULL;
+	char *id = quern_copy(name);
+	id[n] = 0;
+	const bool ours = quern_kind_of(id) != 0;
+	memcpy(id, name, n + 1);
+	id[length - (level_of(name) == 1 ? 3 : 6)] = 0;
+	if (ours) return id;
+	free(id);
+	return NULL;
+}
+
+typedef void visitor(void *to, const char *folder, const char *object, char *id);
+
+/* Visits every object of every folder; the visitor takes the id over. */
+static void visit(const quern_loader *loader, visitor *see, void *to) {
+	for (size_t i = 0; i <= loader->n_folders; i++) {
+		const char *path = i < loader->n_folders ? loader->folders[i] : loader->own;
+		DIR *folder = path ? opendir(path) : NULL;
 		struct dirent *entry;
 		while (folder && (entry = readdir(folder))) {
-			const size_t length = strlen(entry->d_name);
-			const char *dot = strchr(entry->d_name, '.');
-			if (!dot || length < 4 || strcmp(entry->d_name + length - 3, ".so") != 0) continue;
-			char *id = quern_copy(entry->d_name);
-			id[length - (level_of(id) == 1 ? 3 : 6)] = 0;
-			char *kind = quern_copy(id);
-			kind[dot - entry->d_name] = 0;
-			const bool ours = quern_kind_of(kind) != 0;
-			free(kind);
-			if (!ours) {
-				free(id);
-				continue;
-			}
-			ids = quern_grow(ids, n + 1, &capacity, sizeof(char *));
-			ids[n++] = id;
+			char *id = id_of_object(entry->d_name);
+			if (id) see(to, path, entry->d_name, id);
 		}
 		if (folder) closedir(folder);
 	}
-	ids = quern_grow(ids, n, &capacity, sizeof(char *));
-	qsort(ids, n, sizeof(char *), by_name);
-	for (size_t i = 0; i < n; i++) { /* one line for the objects of all instruction sets */
-		if (kept && !strcmp(ids[kept - 1], ids[i])) free(ids[i]);
-		else ids[kept++] = ids[i];
+}
+
+typedef struct {
+	char **at;
+	size_t n, capacity;
+} id_list;
+
+static void collect(void *to, const char *folder, const char *object, char *id) {
+	id_list *list = to;
+	(void)folder, (void)object;
+	if (!quern_id_name(id)) {
+		free(id);
+		return;
 	}
-	ids[kept] = NULL;
-	return ids;
+	list->at = quern_grow(list->at, list->n + 1, &list->capacity, sizeof(char *));
+	list->at[list->n++] = id;
+}
+
+char **quern_loader_ids(const quern_loader *loader) {
+	id_list list = { 0 };
+	size_t kept = 0;
+	visit(loader, collect, &list);
+	list.at = quern_grow(list.at, list.n, &list.capacity, sizeof(char *));
+	qsort(list.at, list.n, sizeof(char *), by_name);
+	for (size_t i = 0; i < list.n; i++) { /* one line for the objects of all instruction sets */
+		if (kept && !strcmp(list.at[kept - 1], list.at[i])) free(list.at[i]);
+		else list.at[kept++] = list.at[i];
+	}
+	list.at[kept] = NULL;
+	return list.at;
+}
+
+static void report_stray(void *to, const char *folder, const char *object, char *id) {
+	if (!quern_id_name(id))
+		quern_report_add(to, (quern_mark) { 0 },
+			"plugin %s/%s cannot be asked for by its name: call it KIND.NAME.so, NAME in letters, digits and "
+			"underscores",
+			folder, object);
+	free(id);
+}
+
+void quern_loader_report_strays(const quern_loader *loader, quern_report *report) {
+	visit(loader, report_stray, report);
 }
 
 void quern_loader_free_ids(char **ids) {

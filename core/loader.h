@@ -1,29 +1,34 @@
 /* loader - finds plugins by kind and name, maps exactly the object that is asked for, and never unmaps it */
 #pragma once
 #include "report.h"
-#include <quern/abi.h>
+#include "table.h"
 
-/* A plugin as the host sees it: tables copied with the plugin's own strides, so that rows may grow. */
+/* A plugin as the host sees it: its tables are copies in the host's own layout, see table.h. */
 typedef struct quern_plugin_file {
 	char *path;
-	uint64_t hash; /* FNV-1a of the file */
-	int level;     /* 1: any x86-64, 3: x86-64-v3, 4: x86-64-v4 */
-	const quern_library *library;
-	quern_plugin plugin; /* params and uses point to the copies */
-	quern_param *params;
-	quern_use *uses;
+	uint64_t hash;                /* FNV-1a of the file */
+	uintptr_t begin, end;         /* where it is mapped */
+	int level;                    /* 1: any x86-64, 3: x86-64-v3, 4: x86-64-v4 */
+	const quern_library *library; /* of the table, like what follows */
+	quern_plugin plugin;          /* `revision` is the author's count of changes */
+	const quern_param *params;
+	const quern_use *uses;
 	size_t n_params, n_uses;
+	quern_table table;
 } quern_plugin_file;
 
 typedef struct quern_loader quern_loader;
 
-/* Searches the folders of QUERN_PLUGIN_PATH, then "plugins" beside the program, then the installed folder. */
+/* Searches the folders of QUERN_PLUGIN_PATH, and then, for what none of them has, the program's own: "plugins" beside the
+ * program, or else where it is installed. */
 quern_loader *quern_loader_create(void);
 void quern_loader_destroy(quern_loader *);
 
-/* The best instruction set of this processor (1, 3 or 4), and the highest that shall be taken. */
-int quern_loader_best_level(void);
+/* The highest instruction set (1, 3 or 4) that shall be taken, if the processor has it. */
 void quern_loader_limit(quern_loader *, int level);
+/* From now on a child loads every plugin and reads its tables first, so that one which crashes, hangs or ends the program
+ * at that is one sentence. */
+void quern_loader_beware(quern_loader *);
 
 /* The plugin of that kind and bare name, or NULL after one sentence in the report. */
 const quern_plugin_file *quern_loader_find(
@@ -37,9 +42,15 @@ const quern_plugin_file *quern_loader_at(const quern_loader *, size_t);
 
 /* Every id in the search path, sorted, NULL-terminated; free with quern_loader_free_ids. Loads nothing. */
 char **quern_loader_ids(const quern_loader *);
+/* One sentence for every object there whose name begins with a kind and is no id, so that nobody can ask for it. */
+void quern_loader_report_strays(const quern_loader *, quern_report *);
 void quern_loader_free_ids(char **);
 
 /* "contact"; NULL if there is no such kind */
 const char *quern_kind_name(uint32_t kind);
+/* "linear" of "contact.linear"; NULL if it is no id */
+const char *quern_id_name(const char *id);
+/* "an axial vector"; NULL if there is no such shape */
+const char *quern_shape_name(uint32_t shape);
 uint32_t quern_kind_of(const char *name);    /* 0: none */
 extern const char *const quern_kind_names[]; /* NULL-terminated, without the zeroth */

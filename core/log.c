@@ -1,5 +1,6 @@
 #include "log.h"
 #include "text.h"
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +9,8 @@
 
 struct quern_log {
 	FILE *file;
+	quern_text kept; /* lines from before there was a file */
+	int fault;
 	bool quiet, terminal, dirty;
 	double shown;
 };
@@ -18,12 +21,29 @@ double quern_wall(void) {
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-quern_log *quern_log_create(const char *path, bool quiet, bool append) {
+quern_log *quern_log_create(bool quiet) {
 	quern_log *log = quern_take(1, sizeof *log);
-	log->file = path ? fopen(path, append ? "a" : "w") : NULL;
 	log->quiet = quiet;
 	log->terminal = !quiet && isatty(STDERR_FILENO);
 	return log;
+}
+
+static void note_fault(quern_log *log, bool failed) {
+	if (failed && !log->fault) log->fault = errno ? errno : EIO;
+}
+
+int quern_log_fault(const quern_log *log) { return log->fault; }
+
+static void put(quern_log *log, const char *line) {
+	if (!log->file) quern_text_add(&log->kept, "%s", line);
+	else note_fault(log, fputs(line, log->file) < 0 || fflush(log->file));
+}
+
+void quern_log_open(quern_log *log, const char *path, bool append) {
+	log->file = fopen(path, append ? "a" : "w");
+	note_fault(log, !log->file);
+	if (log->file) put(log, quern_text_string(&log->kept));
+	quern_text_finish(&log->kept);
 }
 
 static void wipe(quern_log *log) {
@@ -35,20 +55,20 @@ void quern_log_destroy(quern_log *log) {
 	if (!log) return;
 	wipe(log);
 	if (log->file) fclose(log->file);
+	quern_text_finish(&log->kept);
 	free(log);
 }
 
 void quern_log_addv(quern_log *log, int level, const char *fmt, va_list list) {
 	quern_text text = { 0 };
 	const char *mark = level > 1 ? "warning: " : "";
+	quern_text_add(&text, "%s", mark);
 	quern_text_addv(&text, fmt, list);
-	if (log->file) {
-		fprintf(log->file, "%s%s\n", mark, quern_text_string(&text));
-		fflush(log->file);
-	}
+	quern_text_add(&text, "\n");
+	put(log, text.data);
 	if (level > 1 || (level == 1 && !log->quiet)) {
 		wipe(log);
-		fprintf(stderr, "%s%s\n", mark, quern_text_string(&text));
+		fputs(text.data, stderr);
 	}
 	quern_text_finish(&text);
 }

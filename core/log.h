@@ -5,9 +5,13 @@
 
 typedef struct quern_log quern_log;
 
-/* `path` NULL: no file. `quiet`: warnings alone reach the terminal. `append`: go on with an old file. */
-quern_log *quern_log_create(const char *path, bool quiet, bool append);
+/* `quiet`: warnings alone reach the terminal. Lines are kept until there is a file. */
+quern_log *quern_log_create(bool quiet);
 void quern_log_destroy(quern_log *);
+/* The file, with the lines so far; `append`: behind what an old one holds. */
+void quern_log_open(quern_log *, const char *path, bool append);
+/* 0, or the errno of the first line that could not be written. */
+int quern_log_fault(const quern_log *);
 /* level 0: file alone, 1: terminal too, 2: a warning */
 void quern_log_add(quern_log *, int level, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 void quern_log_addv(quern_log *, int level, const char *fmt, va_list) __attribute__((format(printf, 3, 0)));

@@ -1,12 +1,14 @@
 #include "observe.h"
 #include "text.h"
+#include "watch.h"
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-enum { LEAF = 256, MOST_OUTPUTS = 32, FIXED_COLUMNS = 4 };
+enum { LEAF = 256 };
 
 static const quern_observer_ops *ops_of(const quern_run *run, size_t e) {
 	return run->plan->observers[e]->bound->ops;
@@ -14,17 +16,20 @@ static const quern_observer_ops *ops_of(const quern_run *run, size_t e) {
 
 static uint32_t outputs_of(const quern_observer_ops *ops) {
 	uint32_t n = 0;
-	while (ops->outputs[n].name && n < MOST_OUTPUTS) n++;
+	while (ops->outputs[n].name) n++;
 	return n;
 }
 
-static void add_column(quern_series *s, const char *prefix, const char *name, const char *unit) {
+const char *quern_observer_label(const quern_run *run, size_t e) {
+	return ((const quern_observe_item *)run->scene->observe.filling[e].item)->label;
+}
+
+static quern_observed *add_column(quern_series *s, char *name, const char *unit) {
 	s->column = quern_grow(s->column, s->n, &s->capacity, sizeof(quern_observed));
-	s->column[s->n++] =
-		(quern_observed) { .name = prefix ? quern_format("%s.%s", prefix, name) : quern_copy(name),
-			.unit = quern_copy(unit && *unit ? unit : "1"),
-			.least = INFINITY,
-			.most = -INFINITY };
+	s->column[s->n] = (quern_observed) {
+		.name = name, .unit = quern_copy(unit && *unit ? unit : "1"), .least = INFINITY, .most = -INFINITY
+	};
+	return &s->column[s->n++];
 }
 
 static void note(quern_observed *c, double value) {
@@ -38,52 +43,88 @@ static void note(quern_observed *c, double value) {
 
 /* ---- the file ---- */
 
-/* Rows beyond the checkpoint belong to a part of the run that is computed again. */
-static bool cut(quern_series *s, int64_t rows) {
-	FILE *file = fopen(s->path, "r+");
-	char *line = NULL;
-	size_t size = 0;
-	long end = 0;
-	bool good = file != NULL;
-	for (int64_t k = -1; good && k < rows; k++) {
-		good = getline(&line, &size, file) > 0;
-		end = ftell(file);
-		char *rest = line, *word;
-		for (size_t c = 0; good && k >= 0 && c < s->n && (word = strsep(&rest, ",")); c++)
-			note(&s->column[c], strtod(word, NULL));
-	}
-	free(line);
-	if (file) good = good && !fflush(file) && !ftruncate(fileno(file), end);
-	if (file && fclose(file)) good = false;
-	s->rows = rows;
-	return good;
+static char *header_of(const quern_series *s) {
+	quern_text text = { 0 };
+	for (size_t c = 0; c < s->n; c++)
+		quern_text_add(&text, "%s%s [%s]", c ? "," : "", s->column[c].name, s->column[c].unit);
+	quern_text_add(&text, "\n");
+	return text.data;
 }
 
-static bool write_header(const quern_series *s) {
-	FILE *file = fopen(s->path, "w");
-	if (!file) return false;
-	for (size_t c = 0; c < s->n; c++)
-		fprintf(file, "%s%s [%s]", c ? "," : "", s->column[c].name, s->column[c].unit);
-	fputc('\n', file);
-	const bool good = !ferror(file);
-	return !fclose(file) && good;
+/* Header and rows as far as they are wanted, read back into the statistics; returns where they end, -1 if they do not
+ * stand there. */
+static long read_back(quern_series *s, FILE *file, int64_t rows) {
+	char *line = NULL, *header = header_of(s);
+	size_t size = 0;
+	bool good = getline(&line, &size, file) > 0 && !strcmp(line, header);
+	for (int64_t k = 0; good && k < rows; k++) {
+		good = getline(&line, &size, file) > 0 && strchr(line, '\n');
+		char *rest = line, *word;
+		for (size_t c = 0; good && c < s->n; c++) {
+			word = strsep(&rest, ",");
+			good = word != NULL;
+			if (good) note(&s->column[c], strtod(word, NULL));
+		}
+	}
+	free(line);
+	free(header);
+	return good ? ftell(file) : -1;
+}
+
+static quern_status unwritable(const quern_series *s, quern_run *run) {
+	return quern_run_stop(run, QUERN_E_IO, "%s cannot be written: %s", s->path, strerror(errno));
+}
+
+/* Rows beyond the checkpoint belong to a part of the run that is computed again. */
+static quern_status cut(quern_series *s, quern_run *run, int64_t rows) {
+	FILE *file = fopen(s->path, "r+");
+	if (!file && errno != ENOENT) return unwritable(s, run);
+	const long end = file ? read_back(s, file, rows) : -1;
+	const bool good = end >= 0 && !fflush(file) && !ftruncate(fileno(file), end);
+	const bool closed = file && !fclose(file);
+	s->rows = rows;
+	if (end < 0)
+		return quern_run_stop(run, QUERN_E_PARAM,
+			"%s does not hold the %lld rows that the checkpoint counts: put it back, or start anew with "
+			"--force",
+			s->path, (long long)rows);
+	return good && closed ? QUERN_OK : unwritable(s, run);
+}
+
+static quern_status write_header(const quern_series *s, quern_run *run) {
+	char *header = header_of(s), why[256];
+	const bool good = quern_save_bytes(s->path, header, strlen(header), why);
+	free(header);
+	return good ? QUERN_OK : quern_run_stop(run, QUERN_E_IO, "%s", why);
+}
+
+static void add_columns(quern_series *s, const quern_run *run) {
+	add_column(s, quern_copy("time"), "s");
+	add_column(s, quern_copy("step"), "1");
+	add_column(s, quern_copy("grains"), "1");
+	add_column(s, quern_copy("points"), "1");
+	for (size_t e = 0; e < run->scene->observe.n; e++)
+		for (const quern_output *out = ops_of(run, e)->outputs; out->name; out++) {
+			quern_observed *c =
+				add_column(s, quern_format("%s.%s", quern_observer_label(run, e), out->name), out->unit);
+			c->output = out->name;
+			c->observer = e;
+		}
 }
 
 quern_status quern_series_init(quern_series *s, quern_run *run, int64_t rows) {
 	*s = (quern_series) { .path = run->folder ? quern_format("%s/series.csv", run->folder) : NULL };
-	add_column(s, NULL, "time", "s");
-	add_column(s, NULL, "step", "1");
-	add_column(s, NULL, "grains", "1");
-	add_column(s, NULL, "points", "1");
-	for (size_t e = 0; e < run->scene->observe.n; e++) {
-		const char *name = strchr(run->plan->observers[e]->bound->id, '.') + 1;
-		const quern_output *out = ops_of(run, e)->outputs;
-		for (uint32_t k = 0; k < outputs_of(ops_of(run, e)); k++)
-			add_column(s, name, out[k].name, out[k].unit);
-	}
+	add_columns(s, run);
 	if (!s->path) return QUERN_OK;
-	if (rows > 0 ? cut(s, rows) : write_header(s)) return QUERN_OK;
-	return quern_run_stop(run, QUERN_E_IO, "%s cannot be written: %s", s->path, strerror(errno));
+	return rows > 0 ? cut(s, run, rows) : write_header(s, run);
+}
+
+quern_status quern_series_flush(const quern_series *s, quern_run *run) {
+	if (!s->path) return QUERN_OK;
+	const int fd = open(s->path, O_RDONLY | O_CLOEXEC);
+	const bool good = fd >= 0 && !fsync(fd);
+	if (fd >= 0) close(fd);
+	return good ? QUERN_OK : unwritable(s, run);
 }
 
 void quern_series_finish(quern_series *s) {
@@ -104,29 +145,32 @@ typedef struct {
 	const quern_observer_ops *ops;
 	quern_observer_batch batch;
 	uint32_t n, n_outputs;
-	double *partial;
+	bool *along;         /* by use: its column runs along the set that `map` runs over */
+	uint32_t *count;     /* by use: entries of its set */
+	quern_column *shift; /* by worker, by use: the columns from the leaf's first entry on */
+	double *partial;     /* by leaf, by output */
 } asking;
+
+static quern_column from(quern_column column, uint8_t shape, uint32_t begin) {
+	if (shape == QUERN_INDEX) {
+		if (column.index) column.index += begin;
+	} else if (shape == QUERN_ID) {
+		if (column.id) column.id += begin;
+	} else
+		for (int k = 0; k < 9; k++)
+			if (column.real[k]) column.real[k] += begin;
+	return column;
+}
 
 static void ask_leaf(void *arg, uint32_t leaf, uint32_t worker) {
 	const asking *a = arg;
-	quern_column own[MOST_OUTPUTS];
+	const uint32_t begin = leaf * LEAF, n_uses = a->bound->n_uses;
+	quern_column *own = a->shift + (size_t)worker * n_uses;
 	quern_observer_batch b = a->batch;
-	(void)worker;
-	const uint32_t begin = leaf * LEAF;
 	b.n = a->n - begin < LEAF ? a->n - begin : LEAF;
-	for (uint32_t r = 0; r < a->bound->n_uses && r < MOST_OUTPUTS; r++) {
-		const quern_use *row = &a->bound->uses[r];
-		const bool total = !strncmp(row->field, "total.", 6);
-		own[r] = a->bound->column[r];
-		if (total) continue;
-		if (row->shape == QUERN_INDEX) {
-			if (own[r].index) own[r].index += begin;
-		} else if (row->shape == QUERN_ID) {
-			if (own[r].id) own[r].id += begin;
-		} else
-			for (int k = 0; k < 9; k++)
-				if (own[r].real[k]) own[r].real[k] += begin;
-	}
+	for (uint32_t r = 0; r < n_uses; r++)
+		own[r] =
+			a->along[r] ? from(a->bound->column[r], a->bound->uses[r].shape, begin) : a->bound->column[r];
 	b.use = own;
 	a->ops->map(a->bound->self, &b, a->partial + (size_t)leaf * a->n_outputs);
 }
@@ -149,9 +193,34 @@ static void fold(const asking *a, uint32_t leaves, double *out) {
 	}
 }
 
+/* Which set each use is of, for every observer the same way. */
+static void look_at_uses(asking *a, quern_run *run, size_t e) {
+	for (uint32_t r = 0; r < a->bound->n_uses; r++) {
+		char set[24];
+		const char *field = run->plan->uses[run->plan->observers[e]->first_use + r].field;
+		snprintf(set, sizeof set, "%.*s", (int)strcspn(field, "."), field);
+		a->count[r] = quern_host_table.set(run, set).n;
+		a->along[r] = a->ops->set && !strcmp(set, a->ops->set);
+	}
+}
+
+static quern_status ask_all(asking *a, quern_run *run, double *out) {
+	a->batch.count = a->ops->set ? NULL : a->count;
+	if (!a->ops->set) return a->ops->whole(a->bound->self, &a->batch, out, &quern_host_table, run);
+	a->n = quern_host_table.set(run, a->ops->set).n;
+	const uint32_t leaves = a->n / LEAF + (a->n % LEAF > 0);
+	a->partial = malloc(((size_t)leaves * a->n_outputs + 1) * sizeof(double));
+	if (!a->partial) return QUERN_E_MEMORY;
+	quern_pool_each(run->pool, leaves, ask_leaf, a);
+	fold(a, leaves, out);
+	free(a->partial);
+	return QUERN_OK;
+}
+
 static quern_status ask(quern_run *run, size_t e, double *out) {
 	const quern_bound *bound = run->plan->observers[e]->bound;
 	const quern_general *g = &run->scene->general;
+	const size_t n_uses = (size_t)bound->n_uses + 1;
 	asking a = { .bound = bound, .ops = bound->ops, .n_outputs = outputs_of(bound->ops) };
 	a.batch = (quern_observer_batch) {
 		.dim = (uint32_t)g->dimension, .time = quern_run_time(run), .use = bound->column
@@ -159,24 +228,30 @@ static quern_status ask(quern_run *run, size_t e, double *out) {
 	memcpy(a.batch.gravity, g->gravity, sizeof a.batch.gravity);
 	memcpy(a.batch.lower, g->lower, sizeof a.batch.lower);
 	memcpy(a.batch.upper, g->upper, sizeof a.batch.upper);
-	if (!a.ops->set) {
-		uint32_t count[MOST_OUTPUTS] = { 0 };
-		for (uint32_t r = 0; r < bound->n_uses && r < MOST_OUTPUTS; r++) {
-			char set[24];
-			const char *field = run->plan->uses[run->plan->observers[e]->first_use + r].field;
-			snprintf(set, sizeof set, "%.*s", (int)strcspn(field, "."), field);
-			count[r] = quern_host_table.set(run, set).n;
-		}
-		a.batch.count = count;
-		return a.ops->whole(bound->self, &a.batch, out, &quern_host_table, run);
+	a.along = calloc(n_uses, sizeof *a.along);
+	a.count = calloc(n_uses, sizeof *a.count);
+	a.shift = calloc(n_uses * quern_pool_workers(run->pool), sizeof *a.shift);
+	quern_status status = QUERN_E_MEMORY;
+	if (a.along && a.count && a.shift) {
+		look_at_uses(&a, run, e);
+		status = ask_all(&a, run, out);
 	}
-	a.n = quern_host_table.set(run, a.ops->set).n;
-	const uint32_t leaves = (a.n + LEAF - 1) / LEAF;
-	a.partial = malloc(((size_t)leaves + 1) * a.n_outputs * sizeof(double));
-	if (!a.partial) return QUERN_E_MEMORY;
-	quern_pool_each(run->pool, leaves, ask_leaf, &a);
-	fold(&a, leaves, out);
-	free(a.partial);
+	free(a.along);
+	free(a.count);
+	free(a.shift);
+	return status;
+}
+
+/* Numbers that are not finite come out nowhere: they end the run, which says whose they are. */
+static quern_status take_answers(quern_series *s, quern_run *run, size_t e, size_t first, const double *out) {
+	for (uint32_t k = 0; k < outputs_of(ops_of(run, e)); k++) {
+		if (!isfinite(out[k]))
+			return quern_run_stop(run, QUERN_E_NUMERIC,
+				"observer %s: column %s is %s at t = %.6g s (step %lld)", quern_observer_label(run, e),
+				s->column[first + k].name, isnan(out[k]) ? "not a number" : "infinite", quern_run_time(run),
+				(long long)run->clock.step);
+		note(&s->column[first + k], out[k]);
+	}
 	return QUERN_OK;
 }
 
@@ -201,14 +276,18 @@ quern_status quern_series_add(quern_series *s, quern_run *run) {
 	note(&s->column[c++], quern_host_table.set(run, "grain").n);
 	note(&s->column[c++], quern_host_table.set(run, "point").n);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
-		double out[MOST_OUTPUTS] = { 0 };
-		const quern_status status = ask(run, e, out);
+		const uint32_t n = outputs_of(ops_of(run, e));
+		double *out = calloc(n + 1u, sizeof *out);
+		quern_watch_enter(run->plan->observers[e]->bound->id, ops_of(run, e)->map ? "map" : "whole");
+		quern_status status = out ? ask(run, e, out) : QUERN_E_MEMORY;
+		quern_watch_leave();
+		if (status == QUERN_OK) status = take_answers(s, run, e, c, out);
+		free(out);
+		c += n;
 		if (status != QUERN_OK)
-			return quern_run_stop(run, status, "%s failed", run->plan->observers[e]->bound->id);
-		for (uint32_t k = 0; k < outputs_of(ops_of(run, e)); k++) note(&s->column[c++], out[k]);
+			return quern_run_stop(run, status, "observer %s: %s", quern_observer_label(run, e),
+				status == QUERN_E_MEMORY ? "out of memory" : "failed");
 	}
 	s->rows++;
-	if (s->path && !write_row(s))
-		return quern_run_stop(run, QUERN_E_IO, "%s cannot be written: %s", s->path, strerror(errno));
-	return QUERN_OK;
+	return !s->path || write_row(s) ? QUERN_OK : unwritable(s, run);
 }

@@ -22,10 +22,7 @@ static bool is_prefix(const char *prefix, const char *name) {
 
 /* One part of a path: a key of a map, or the number of a list's item. */
 static const quern_entry *step_into(const quern_node *node, const char *part) {
-	if (node->kind != QUERN_NODE_LIST) return quern_node_entry(node, part);
-	char *end;
-	const unsigned long k = strtoul(part, &end, 10);
-	return *part && !*end && k < node->n ? &node->entries[k] : NULL;
+	return node->kind == QUERN_NODE_LIST ? quern_node_item(node, part) : quern_node_entry(node, part);
 }
 
 /* The entry of a dotted name, or NULL; `mark` (NULL: not wanted) becomes that of the last part that is there. */
@@ -177,6 +174,14 @@ void quern_params_check(const quern_reading *r, const char *owner, const quern_p
 	check_keys(r, owner, rows, map, "", also);
 }
 
+/* What stands in quotes is text; only a quantity with its unit is text all the same. */
+static bool is_quoted_number(const quern_node *node) {
+	char *end;
+	if (!node->quoted || !*node->text) return false;
+	strtod(node->text, &end);
+	return end != node->text && !end[strspn(end, " \t")];
+}
+
 static bool read_number(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, double *value) {
 	char why[160], range[96], say[64];
@@ -187,6 +192,11 @@ static bool read_number(const quern_reading *r, const char *owner, const quern_p
 	}
 	if (!quern_quantity_read(r->units, node->text, row->unit ? row->unit : "1", value, why)) {
 		quern_report_add(r->report, node->mark, "%s: %s: %s", owner, row->name, why);
+		return false;
+	}
+	if (is_quoted_number(node)) {
+		quern_report_add(r->report, node->mark, "%s: %s: \"%s\" in quotes is a text, not a number", owner,
+			row->name, node->text);
 		return false;
 	}
 	if (in_range(row, *value)) return true;
@@ -229,10 +239,7 @@ static void read_int(const quern_reading *r, const char *owner, const quern_para
 static void read_bool(
 	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node, bool *member) {
 	char say[64];
-	const char *t = node->kind == QUERN_NODE_SCALAR && !node->quoted ? node->text : "";
-	if (!strcmp(t, "true") || !strcmp(t, "yes") || !strcmp(t, "on")) *member = true;
-	else if (!strcmp(t, "false") || !strcmp(t, "no") || !strcmp(t, "off")) *member = false;
-	else
+	if (!quern_node_bool(node, member))
 		quern_report_add(r->report, node->mark, "%s: %s is %s, must be true or false", owner, row->name,
 			quern_node_say(node, say));
 }
@@ -251,20 +258,24 @@ static void read_vector(const quern_reading *r, const char *owner, const quern_p
 }
 
 /* A file is named from the scene's folder, so that a scene works from wherever it is run. */
+char *quern_param_path(const quern_node *node) {
+	const char *scene = node->mark.file, *slash = scene ? strrchr(scene, '/') : NULL;
+	const bool relative = node->text[0] != '/' && slash && node->mark.line;
+	return relative ? quern_format("%.*s/%s", (int)(slash - scene), scene, node->text)
+					: quern_copy(node->text);
+}
+
 static const char *read_text(
 	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node) {
 	if (!(row->flags & QUERN_FILE) || !r->tree) return node->text;
-	const char *scene = node->mark.file, *slash = scene ? strrchr(scene, '/') : NULL;
-	const bool relative = node->text[0] != '/' && slash && node->mark.line;
-	char *path =
-		relative ? quern_format("%.*s/%s", (int)(slash - scene), scene, node->text) : quern_copy(node->text);
+	char *path = quern_param_path(node);
 	struct stat is;
 	if (access(path, R_OK) || stat(path, &is))
 		quern_report_add(
 			r->report, node->mark, "%s: %s: cannot read '%s': %s", owner, row->name, path, strerror(errno));
-	else if (S_ISDIR(is.st_mode))
-		quern_report_add(
-			r->report, node->mark, "%s: %s: '%s' is a folder; a file is wanted", owner, row->name, path);
+	else if (!S_ISREG(is.st_mode))
+		quern_report_add(r->report, node->mark, "%s: %s: '%s' is %s; a file is wanted", owner, row->name,
+			path, S_ISDIR(is.st_mode) ? "a folder" : "no regular file");
 	const char *kept = quern_tree_keep(r->tree, path);
 	free(path);
 	return kept;
@@ -344,12 +355,13 @@ static void missing(const quern_reading *r, const char *owner, const quern_param
 	const char *doc = row->doc ? row->doc : "";
 	const size_t n = strlen(doc);
 	const bool stop = n && doc[n - 1] == '.', unit = row->unit && strcmp(row->unit, "1") != 0;
-	quern_report_add(r->report, mark, "%s: '%s' is missing: %.*s%s%s%s%s%s", owner, row->name,
-		(int)(n - stop), doc, unit ? " [" : "", unit ? row->unit : "", unit ? "]" : "",
-		row->from ? "; nothing in this scene gives " : "", row->from ? row->from : "");
+	/* whoever would give it may have stopped at a fault of its own */
+	(row->from ? quern_report_follow : quern_report_add)(r->report, mark,
+		"%s: '%s' is missing: %.*s%s%s%s%s%s", owner, row->name, (int)(n - stop), doc, unit ? " [" : "",
+		unit ? row->unit : "", unit ? "]" : "", row->from ? "; nothing in this scene gives " : "",
+		row->from ? row->from : "");
 }
 
-/* The value of a row that the scene leaves out; false if it must not. */
 /* The value of a row that the scene leaves out; false if it must not be. */
 static bool left_out(const quern_reading *r, const quern_param *row, void *member) {
 	set_default(r, row, member);
@@ -360,15 +372,14 @@ static bool left_out(const quern_reading *r, const quern_param *row, void *membe
 				return true;
 			}
 	}
-	return !(row->flags & QUERN_REQUIRED);
+	const bool nowhere = row->from && !(row->flags & QUERN_MAYBE) && quern_param_default(row, r->dim) == 0;
+	return !(row->flags & QUERN_REQUIRED) && !nowhere;
 }
 
-bool quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,
+void quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,
 	const quern_node *map, quern_mark mark, const char *const *also, void *instance) {
 	char say[64];
 	const quern_node *given = map;
-	const bool faults = quern_report_errors(r->report) > 0;
-	bool whole = true;
 	if (map && !quern_node_is_null(map)) {
 		if (map->kind == QUERN_NODE_MAP) check_keys(r, owner, rows, map, "", also);
 		else {
@@ -385,11 +396,8 @@ bool quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 		for (const quern_param *other = rows; other->name; other++)
 			opens = opens || is_prefix(row->name, other->name);
 		if (node && opens && node->kind == QUERN_NODE_MAP) node = NULL;
-		if (!node && !left_out(r, row, member)) {
-			const bool late = row->from && faults;
-			if (!late && !is_known_fault(rows, given, row->name, also)) missing(r, owner, row, mark);
-			whole = whole && !late;
-		}
+		if (!node && !left_out(r, row, member) && !is_known_fault(rows, given, row->name, also))
+			missing(r, owner, row, mark);
 		if (row->type == QUERN_T_LIST) {
 			read_list(r, owner, row, node, also, member);
 			continue;
@@ -410,7 +418,6 @@ bool quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 		default: break;
 		}
 	}
-	return whole;
 }
 
 void quern_params_finish(const quern_param *rows, void *instance) {
@@ -426,13 +433,33 @@ void quern_params_finish(const quern_param *rows, void *instance) {
 
 /* ---- writing ---- */
 
-void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim, quern_node *map) {
+static void write_text(
+	const quern_param *row, const char *text, const quern_naming *naming, quern_node *map) {
+	if (!text) return;
+	char *named = naming && row->flags & QUERN_FILE ? naming->name(naming->context, text) : NULL;
+	quern_node_put_quoted(map, row->name, named ? named : text);
+	free(named);
+}
+
+static void write_vector(const quern_param *row, const quern_real *v, uint32_t dim, quern_node *map) {
+	char number[32];
+	for (uint32_t k = 0; k < dim; k++)
+		if (!isfinite(v[k])) return;
+	quern_node *list = quern_node_put_list(map, row->name);
+	for (uint32_t k = 0; k < dim; k++) {
+		quern_number(v[k], number);
+		quern_node_append(list, number);
+	}
+}
+
+void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim,
+	const quern_naming *naming, quern_node *map) {
 	for (; rows && rows->name; rows++) {
 		const void *member = (const char *)instance + rows->offset;
 		char number[32];
 		switch (rows->type) {
 		case QUERN_T_REAL:
-			if (isnan(*(const quern_real *)member)) break;
+			if (!isfinite(*(const quern_real *)member)) break;
 			quern_number(*(const quern_real *)member, number);
 			quern_node_put(map, rows->name, number);
 			break;
@@ -444,26 +471,14 @@ void quern_params_write(const quern_param *rows, const void *instance, uint32_t 
 			break;
 		}
 		case QUERN_T_BOOL: quern_node_put(map, rows->name, *(const bool *)member ? "true" : "false"); break;
-		case QUERN_T_TEXT:
-			if (*(const char *const *)member)
-				quern_node_put_quoted(map, rows->name, *(const char *const *)member);
-			break;
-		case QUERN_T_VECTOR: {
-			const quern_real *v = member;
-			if (isnan(v[0])) break;
-			quern_node *list = quern_node_put_list(map, rows->name);
-			for (uint32_t k = 0; k < dim; k++) {
-				quern_number(v[k], number);
-				quern_node_append(list, number);
-			}
-			break;
-		}
+		case QUERN_T_TEXT: write_text(rows, *(const char *const *)member, naming, map); break;
+		case QUERN_T_VECTOR: write_vector(rows, member, dim, map); break;
 		case QUERN_T_LIST: {
 			const quern_list *values = member;
 			quern_node *list = quern_node_put_list(map, rows->name);
 			for (uint32_t i = 0; i < values->n; i++)
 				quern_params_write(rows->rows, (const char *)values->items + (size_t)i * values->item_size,
-					dim, quern_node_append_map(list));
+					dim, naming, quern_node_append_map(list));
 			break;
 		}
 		default: break;

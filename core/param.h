@@ -22,18 +22,26 @@ typedef struct quern_reading {
 
 /* Fills `instance` from `map` (NULL or null: defaults alone). `owner` names the plugin in messages, `mark` is
  * where it stands. Keys that `rows` do not know are faults unless they are in `also` (full dotted names,
- * NULL-terminated, may be NULL). Lists are allocated; quern_params_finish frees them. False if a number is lacking that
- * another part of the scene gives, which may be at fault itself: that is no fault of its own where there is one already. */
-bool quern_params_read(const quern_reading *, const char *owner, const quern_param *rows,
+ * NULL-terminated, may be NULL). Lists are allocated; quern_params_finish frees them. */
+void quern_params_read(const quern_reading *, const char *owner, const quern_param *rows,
 	const quern_node *map, quern_mark mark, const char *const *also, void *instance);
 /* The check for unknown keys alone. */
 void quern_params_check(const quern_reading *, const char *owner, const quern_param *rows,
 	const quern_node *map, const char *const *also);
 void quern_params_finish(const quern_param *rows, void *instance);
 
-/* Writes every value of the instance into a map, in SI. */
-void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim, quern_node *map);
+/* What a file that a parameter names is called in what is written: malloc'ed. */
+typedef struct quern_naming {
+	char *(*name)(void *context, const char *path);
+	void *context;
+} quern_naming;
+/* Writes every value of the instance into a map, in SI. A number that is not finite is left out: no scene can give one,
+ * so that it stands for what the plugin makes of a missing value. `naming` NULL: files are called what they are. */
+void quern_params_write(
+	const quern_param *rows, const void *instance, uint32_t dim, const quern_naming *, quern_node *map);
 
+/* The path of the file that a scene's value names; malloc'ed. */
+char *quern_param_path(const quern_node *);
 const quern_param *quern_param_find(const quern_param *rows, const char *name);
 /* the value of a number, bool or choice; NaN for other types */
 double quern_param_number(const quern_param *, const void *instance);

@@ -123,15 +123,17 @@ static void gather_stages(quern_plan *p) {
 	}
 }
 
+/* `caller`: the solver in whose slot it sits; NULL: the host. */
 static quern_plan_bound *add_bound(quern_plan *p, quern_bound *place, const quern_slot *slot,
-	const quern_filling *f, const char *path, int stage) {
+	const quern_filling *f, const char *path, int stage, const quern_plugin_file *caller) {
 	quern_plan_bound *b = quern_take(1, sizeof *b);
 	const quern_instance *it = f->instance;
 	b->bound = place;
+	b->uses = caller ? quern_table_uses_for(&it->file->table, caller->library) : NULL;
 	*place = (quern_bound) { .self = it->self,
 		.ops = it->file->plugin.ops,
 		.item = f->item,
-		.uses = it->file->uses,
+		.uses = b->uses ? b->uses : it->file->uses,
 		.n_uses = (uint32_t)it->file->n_uses,
 		.n_variant = (uint32_t)f->n_variant,
 		.id = it->file->plugin.id,
@@ -179,7 +181,8 @@ static void gather_slots(quern_plan *p) {
 			p->slots[i][k] = quern_take(use->n, sizeof(quern_bound));
 			p->n_slot[i][k] = (uint32_t)use->n;
 			for (size_t e = 0; e < use->n; e++)
-				add_bound(p, &p->slots[i][k][e], use->slot, &use->filling[e], use->path, -1);
+				add_bound(
+					p, &p->slots[i][k][e], use->slot, &use->filling[e], use->path, -1, section->solver->file);
 		}
 	}
 	const quern_slot_use *observe = &p->scene->observe;
@@ -190,7 +193,7 @@ static void gather_slots(quern_plan *p) {
 						 .phase = QUERN_OBSERVE,
 						 .solver = 100 + (int)e });
 		p->observers[e] = add_bound(p, quern_take(1, sizeof(quern_bound)), NULL, &observe->filling[e],
-			"observe", (int)p->n_stages - 1);
+			"observe", (int)p->n_stages - 1, NULL);
 	}
 }
 
@@ -273,6 +276,13 @@ static void make_fields(quern_plan *p) {
 	}
 }
 
+/* Who else takes a field, and how: "solver.dem: an index". The first one has made it. */
+static const quern_plan_use *first_use_of(const quern_plan *p, const char *field) {
+	for (size_t i = 0; i < p->n_uses; i++)
+		if (mandatory(&p->uses[i]) && !strcmp(p->uses[i].field, field)) return &p->uses[i];
+	return NULL;
+}
+
 /* Every use finds its field; doc, target and initial value come from whoever states them. */
 static void bind_uses(quern_plan *p) {
 	const quern_scene *s = p->scene;
@@ -285,9 +295,11 @@ static void bind_uses(quern_plan *p) {
 		if (!quern_units_equal(s->units, field->unit ? field->unit : "1", u->row->unit ? u->row->unit : "1"))
 			quern_report_add(s->report, u->mark, "%s: %s takes it in %s, others in %s", u->field, u->owner,
 				u->row->unit, field->unit);
+		const quern_plan_use *first = field->shape != u->row->shape ? first_use_of(p, u->field) : NULL;
 		if (field->shape != u->row->shape)
-			quern_report_add(
-				s->report, u->mark, "%s: %s takes it in another shape than others do", u->field, u->owner);
+			quern_report_add(s->report, u->mark, "%s: %s takes it for %s, %s for %s", u->field, u->owner,
+				quern_shape_name(u->row->shape), first ? first->owner : "others",
+				quern_shape_name(field->shape));
 		if (!field->doc) field->doc = u->row->doc;
 		if (!(u->row->initial == 0)) field->initial = u->row->initial;
 		field->shown = field->shown || u->row->flags & QUERN_SHOWN;
@@ -449,6 +461,32 @@ static void follow_field(quern_plan *p, int k) {
 	field->state = field->state && !field->local;
 }
 
+/* The first stage whose uses a solver's limit and account go by. */
+static bool is_first_of_section(const quern_plan *p, int stage) {
+	for (int s = 0; s < stage; s++)
+		if (p->stages[s].section == p->stages[stage].section) return false;
+	return p->stages[stage].section != NULL;
+}
+
+/* Frames, observers, limits and accounts look at fields before anything is computed anew. What they see must come back
+ * with a checkpoint, state or not. */
+static void mark_kept(quern_plan *p) {
+	quern_store *store = &p->store;
+	for (size_t i = 0; i < p->n_uses; i++) {
+		const quern_plan_use *u = &p->uses[i];
+		if (u->target < 0 || u->stage < 0) continue;
+		if (p->stages[u->stage].observer || is_first_of_section(p, u->stage))
+			store->fields[u->target].kept = true;
+	}
+	for (size_t k = 0; k < store->n_fields; k++) {
+		quern_field *field = &store->fields[k];
+		bool shown = field->shown; /* a contact's grains go with its force */
+		for (size_t i = 0; i < store->n_fields && field->target >= 0; i++)
+			shown = shown || (store->fields[i].set == field->set && store->fields[i].shown);
+		field->kept = !field->local && (field->kept || shown || field->state || field->shape == QUERN_ID);
+	}
+}
+
 static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(const quern_use *)) {
 	for (size_t i = 0; i < p->n_uses; i++)
 		if (p->uses[i].stage == stage && p->uses[i].target == field && test(p->uses[i].row)) return true;
@@ -525,6 +563,7 @@ quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
 	lay_rows(p);
 	order_stages(p);
 	for (size_t k = 0; k < p->store.n_fields; k++) follow_field(p, (int)k);
+	mark_kept(p);
 	mark_swaps_and_zeros(p);
 	for (size_t i = 0; i < p->n_stages; i++)
 		p->stages[i].column = quern_take(p->stages[i].n_uses, sizeof(quern_column));
@@ -538,6 +577,7 @@ void quern_plan_destroy(quern_plan *p) {
 		free(p->bounds[i]->column);
 		free(p->bounds[i]->again);
 		free(p->bounds[i]->variant);
+		free(p->bounds[i]->uses);
 		free(p->bounds[i]);
 	}
 	for (size_t i = 0; i < p->scene->n_sections; i++) {

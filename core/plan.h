@@ -32,6 +32,7 @@ typedef struct quern_plan_bound {
 	quern_bound *bound;            /* in its slot's array; an observer's own */
 	size_t first_use, first_again; /* into plan->uses; first_again == SIZE_MAX: no repeat */
 	quern_column *column, *again;
+	quern_use *uses; /* with the stride of whoever calls it */
 	const void **variant;
 } quern_plan_bound;
 

@@ -101,12 +101,27 @@ bool quern_quantity_read(
 		snprintf(why, 160, "'%.40s' is too large", text);
 		return false;
 	}
+	if (number == 0 && errno == ERANGE) {
+		snprintf(why, 160, "'%.40s' is too small", text);
+		return false;
+	}
 	*value = number;
 	while (isspace((unsigned char)*end)) end++;
 	if (*end && !convert(units, end, unit, value, why)) return false;
 	if (isfinite(*value)) return true;
 	snprintf(why, 160, "'%.40s' is too large", text);
 	return false;
+}
+
+int quern_units_mass(quern_units *units, const char *unit) {
+	ut_system *system = load(units);
+	ut_unit *u = system ? parse(system, unit) : NULL;
+	char text[128] = ""; /* in base units: "0.001 m-3.kg" */
+	if (u && ut_format(u, text, sizeof text, UT_ASCII | UT_DEFINITION) < 0) *text = 0;
+	ut_free(u);
+	const char *kg = strstr(text, "kg");
+	if (!kg) return 0;
+	return kg[2] == '-' || isdigit((unsigned char)kg[2]) ? (int)strtol(kg + 2, NULL, 10) : 1;
 }
 
 bool quern_units_equal(quern_units *units, const char *a, const char *b) {

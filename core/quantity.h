@@ -9,7 +9,9 @@ void quern_units_destroy(quern_units *);
 
 /* Reads `text` as a value in `unit` (UDUNITS-2 syntax, "1" for a pure number). On failure returns false and
  * leaves in `why` what was found and what is allowed. NaN, infinities and units with an offset (degC) are
- * refused, and so is a number too large for a double. */
+ * refused, and so is a number too large for a double, or so small that it would be 0. */
 bool quern_quantity_read(quern_units *, const char *text, const char *unit, double *value, char why[160]);
+/* To which power a unit contains the mass: 1 for N/m, 0 for m/s, -1 for 1/kg; 0 where it is no unit. */
+int quern_units_mass(quern_units *, const char *unit);
 /* true if both name the same dimension and scale: "m/s" and "m s-1" */
 bool quern_units_equal(quern_units *, const char *a, const char *b);

@@ -15,6 +15,7 @@ typedef struct render_cloud {
 	double *size;          /* m, radius of a grain, edge of a point or cell */
 	double *value;         /* what colours it; NULL: nothing does */
 	uint8_t *sort;         /* RENDER_*, or a cell's zone; NULL: all zero */
+	bool unreadable;       /* there are positions, and they cannot be used */
 } render_cloud;
 
 typedef struct render_frame {

@@ -31,12 +31,15 @@ static bool frames_of(const char *folder, int64_t *first, int64_t *last) {
 
 /* ---- columns ---- */
 
-/* Any numbers become doubles; NULL if the dataset is missing, of another length, or not of numbers. */
+/* Any numbers become doubles; NULL if the dataset is missing, of another length, not of numbers, or larger than what
+ * memory there is: a damaged file may say that it holds anything. */
 static double *read_table(hid_t group, const char *name, size_t rows, size_t *columns) {
 	size_t n;
-	if (!quern_h5_read_size(group, name, &n, columns) || n != rows) return NULL;
+	if (!quern_h5_read_size(group, name, &n, columns) || n != rows || !*columns) return NULL;
+	double *table =
+		n < SIZE_MAX / sizeof(double) / *columns ? calloc(n * *columns + 1, sizeof(double)) : NULL;
+	if (!table) return NULL;
 	const hid_t set = H5Dopen2(group, name, H5P_DEFAULT);
-	double *table = quern_take(n * *columns + 1, sizeof(double));
 	if (n && H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, table) < 0) {
 		free(table);
 		table = NULL;
@@ -45,12 +48,17 @@ static double *read_table(hid_t group, const char *name, size_t rows, size_t *co
 	return table;
 }
 
-/* Positions, and nothing else yet; an empty cloud if the group is missing or cannot be read. */
+/* Positions, and nothing else yet; an empty cloud if the group is missing. */
 static void read_positions(hid_t group, render_cloud *cloud) {
 	size_t rows, columns;
 	if (group < 0 || !quern_h5_read_size(group, "position", &rows, &columns) || columns != 3) return;
 	double *table = read_table(group, "position", rows, &columns);
-	if (!table) return;
+	cloud->unreadable = !table;
+	for (size_t i = 0; table && i < 3 * rows; i++) cloud->unreadable |= !isfinite(table[i]);
+	if (cloud->unreadable) {
+		free(table);
+		return;
+	}
 	cloud->n = rows;
 	cloud->position = (double(*)[3])(void *)table;
 	cloud->size = quern_take(rows + 1, sizeof(double));
@@ -224,7 +232,10 @@ static int read_clouds(render_frame *f, hid_t file, const char *path, const char
 	read_grains(group[0], &f->grains);
 	read_points(group[1], &f->points, f->dimension);
 	f->cell = read_cells(group[2], &f->cells);
-	if (!f->grains.n && !f->points.n) {
+	if (f->grains.unreadable || f->points.unreadable || f->cells.unreadable) {
+		quern_text_add(why, "%s is damaged: its positions cannot be read, or are no numbers", path);
+		status = QUERN_EXIT_SCENE;
+	} else if (!f->grains.n && !f->points.n) {
 		quern_text_add(why, "%s holds neither grains nor points", path);
 		status = QUERN_EXIT_SCENE;
 	} else if (!colour_by(f, group, field ? field : "velocity") && field)
@@ -238,11 +249,11 @@ static int read_clouds(render_frame *f, hid_t file, const char *path, const char
 static quern_scene *scene_of(const char *folder) {
 	char *path = quern_format("%s/scene.yaml", folder);
 	quern_scene *scene = quern_scene_read(path, (const char *const[]) { NULL }, &quern_host_table);
-	free(path);
-	if (!quern_report_errors(scene->report)) return scene;
+	if (!quern_report_errors(scene->report)) return free(path), scene;
+	quern_report_print(scene->report, stderr);
+	fprintf(stderr, "quern render: domain and bodies are left out, since %s cannot be read\n", path);
 	quern_scene_destroy(scene);
-	fprintf(
-		stderr, "quern render: domain and bodies are left out, since %s/scene.yaml cannot be read\n", folder);
+	free(path);
 	return NULL;
 }
 

@@ -4,16 +4,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+typedef enum { FAULT, FOLLOWS, WARNING } severity;
+
 typedef struct {
 	quern_mark mark;
 	char *text;
-	bool warning;
+	severity severity;
 	size_t order;
 } entry;
 
 struct quern_report {
 	entry *entries;
-	size_t n, capacity, errors;
+	size_t n, capacity, errors, follow;
 };
 
 quern_report *quern_report_create(void) { return quern_take(1, sizeof(quern_report)); }
@@ -25,30 +27,38 @@ void quern_report_destroy(quern_report *report) {
 	free(report);
 }
 
-static void add(quern_report *report, quern_mark mark, bool warning, const char *fmt, va_list list) {
+static void add(quern_report *report, quern_mark mark, severity kind, const char *fmt, va_list list) {
 	quern_text text = { 0 };
 	quern_text_addv(&text, fmt, list);
 	report->entries = quern_grow(report->entries, report->n, &report->capacity, sizeof(entry));
-	report->entries[report->n] = (entry) { mark, text.data ? text.data : quern_copy(""), warning, report->n };
+	report->entries[report->n] = (entry) { mark, text.data ? text.data : quern_copy(""), kind, report->n };
 	report->n++;
-	report->errors += !warning;
+	report->errors += kind != WARNING;
+	report->follow += kind == FOLLOWS;
 }
 
 void quern_report_addv(quern_report *report, quern_mark mark, const char *fmt, va_list list) {
-	add(report, mark, false, fmt, list);
+	add(report, mark, FAULT, fmt, list);
 }
 
 void quern_report_add(quern_report *report, quern_mark mark, const char *fmt, ...) {
 	va_list list;
 	va_start(list, fmt);
-	add(report, mark, false, fmt, list);
+	add(report, mark, FAULT, fmt, list);
+	va_end(list);
+}
+
+void quern_report_follow(quern_report *report, quern_mark mark, const char *fmt, ...) {
+	va_list list;
+	va_start(list, fmt);
+	add(report, mark, FOLLOWS, fmt, list);
 	va_end(list);
 }
 
 void quern_report_warn(quern_report *report, quern_mark mark, const char *fmt, ...) {
 	va_list list;
 	va_start(list, fmt);
-	add(report, mark, true, fmt, list);
+	add(report, mark, WARNING, fmt, list);
 	va_end(list);
 }
 
@@ -63,41 +73,59 @@ static int by_place(const void *pa, const void *pb) {
 	return a->order < b->order ? -1 : 1;
 }
 
-/* Tabs are kept above the caret, so that it stands under the right letter. */
-static void show_line(quern_mark mark, FILE *out) {
-	FILE *file = mark.line ? fopen(mark.file, "r") : NULL;
-	char line[400];
-	size_t number = 1;
-	if (!file) return;
-	while (fgets(line, sizeof line, file)) {
-		const size_t n = strcspn(line, "\n");
-		const bool whole = line[n] == '\n' || feof(file);
-		if (number == mark.line) {
-			if (strlen(line) != n + (line[n] == '\n')) break;
-			line[n] = 0;
-			fprintf(out, "  %s\n  ", line);
-			for (size_t i = 0; i + 1 < mark.column && i < n; i++) fputc(line[i] == '\t' ? '\t' : ' ', out);
-			fputs("^\n", out);
-			break;
-		}
-		number += whole;
+/* The file whose lines are shown, read from top to bottom once, since faults are sorted. */
+typedef struct {
+	FILE *file;
+	const char *name;
+	char *line;
+	size_t size, number;
+} source;
+
+static bool go_to(source *s, quern_mark mark) {
+	if (!s->name || strcmp(s->name, mark.file) != 0) {
+		if (s->file) fclose(s->file);
+		s->file = fopen(mark.file, "r");
+		s->name = mark.file;
+		s->number = 0;
 	}
-	fclose(file);
+	while (s->file && s->number < mark.line) {
+		if (getline(&s->line, &s->size, s->file) < 0) return false;
+		s->number++;
+	}
+	return s->file != NULL;
 }
 
-void quern_report_print(const quern_report *report, FILE *out) {
+/* Tabs are kept above the caret, so that it stands under the right letter. */
+static void show_line(source *s, quern_mark mark, FILE *out) {
+	if (!mark.line || !go_to(s, mark)) return;
+	const size_t n = strcspn(s->line, "\n");
+	if (n >= 400) return;
+	fprintf(out, "  %.*s\n  ", (int)n, s->line);
+	for (size_t i = 0; i + 1 < mark.column && i < n; i++) fputc(s->line[i] == '\t' ? '\t' : ' ', out);
+	fputs("^\n", out);
+}
+
+size_t quern_report_print(const quern_report *report, FILE *out) {
 	entry *sorted = quern_take(report->n, sizeof(entry));
+	source file = { 0 };
+	size_t faults = 0;
 	if (report->n) memcpy(sorted, report->entries, report->n * sizeof(entry));
 	qsort(sorted, report->n, sizeof(entry), by_place);
 	for (size_t i = 0; i < report->n; i++) {
 		const entry *e = &sorted[i];
+		if (e->severity == FOLLOWS && report->errors > report->follow) continue;
 		if (i && e->mark.line == e[-1].mark.line && e->mark.column == e[-1].mark.column &&
 			!strcmp(e->text, e[-1].text))
 			continue; /* an alias repeats its anchor's faults */
 		if (e->mark.file) fprintf(out, "%s:", e->mark.file);
 		if (e->mark.line) fprintf(out, "%zu:%zu:", e->mark.line, e->mark.column);
-		fprintf(out, "%s%s: %s\n", e->mark.file ? " " : "", e->warning ? "warning" : "error", e->text);
-		show_line(e->mark, out);
+		fprintf(out, "%s%s: %s\n", e->mark.file ? " " : "", e->severity == WARNING ? "warning" : "error",
+			e->text);
+		show_line(&file, e->mark, out);
+		faults += e->severity != WARNING;
 	}
+	if (file.file) fclose(file.file);
+	free(file.line);
 	free(sorted);
+	return faults;
 }

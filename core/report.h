@@ -19,10 +19,14 @@ void quern_report_destroy(quern_report *);
 void quern_report_add(quern_report *, quern_mark, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 void quern_report_addv(quern_report *, quern_mark, const char *fmt, va_list)
 	__attribute__((format(printf, 3, 0)));
+/* A fault that may follow from others: it counts as they do, and is printed only where there is no other. */
+void quern_report_follow(quern_report *, quern_mark, const char *fmt, ...)
+	__attribute__((format(printf, 3, 4)));
 /* A hint that does not stop the run. */
 void quern_report_warn(quern_report *, quern_mark, const char *fmt, ...)
 	__attribute__((format(printf, 3, 4)));
 
 size_t quern_report_errors(const quern_report *);
-/* file:line:column: error: message, with the line and a caret below where the file can be read */
-void quern_report_print(const quern_report *, FILE *);
+/* file:line:column: error: message, with the line and a caret below where the file can be read; returns how many faults
+ * were shown */
+size_t quern_report_print(const quern_report *, FILE *);

@@ -6,19 +6,55 @@
 
 static const char *bare(const char *id) { return strchr(id, '.') + 1; }
 
-static void put_filling(
-	const quern_scene *s, const quern_slot *slot, const quern_filling *f, quern_node *parent) {
-	const quern_instance *it = f->instance;
-	quern_node *map = quern_node_put_map(parent, bare(it->file->plugin.id));
-	quern_params_write(it->file->params, it->self, (uint32_t)s->general.dimension, map);
-	if (slot->rows) quern_params_write(slot->rows, f->item, (uint32_t)s->general.dimension, map);
-	if (!slot->override) return;
-	const char *key = strchr(slot->override, '.') + 1;
-	const quern_node *over = quern_node_find(it->map, key);
-	if (over) quern_node_merge(quern_node_put_map(map, key), over);
+typedef struct {
+	const quern_scene *scene;
+	const quern_naming *naming;
+} writing;
+
+static void put_params(const writing *w, const quern_param *rows, const void *instance, quern_node *map) {
+	quern_params_write(rows, instance, (uint32_t)w->scene->general.dimension, w->naming, map);
 }
 
-static void put_slot(const quern_scene *s, const quern_slot_use *use, quern_node *section) {
+/* True if a plugin in that slot takes a file under that key. */
+static bool takes_file(const quern_scene *s, const char *path, const char *key) {
+	for (size_t k = 0; k < s->n_instances; k++) {
+		const quern_instance *it = s->instances[k];
+		const quern_param *row = strcmp(it->path, path) ? NULL : quern_param_find(it->file->params, key);
+		if (row && row->flags & QUERN_FILE) return true;
+	}
+	return false;
+}
+
+/* What a body's `contact` overrides is written as the scene gives it, but for files, which are called otherwise. */
+static void put_override(const writing *w, const quern_slot *slot, const quern_filling *f, quern_node *map) {
+	const char *key = strchr(slot->override, '.') + 1;
+	const quern_node *over = quern_node_find(f->instance->map, key);
+	if (!over) return;
+	quern_node *copy = quern_node_put_map(map, key);
+	quern_node_merge(copy, over);
+	for (size_t i = 0; i < copy->n; i++) {
+		quern_node *value = copy->entries[i].value;
+		if (!w->naming || value->kind != QUERN_NODE_SCALAR ||
+			!takes_file(w->scene, slot->override, copy->entries[i].key))
+			continue;
+		char *path = quern_param_path(value);
+		free(value->text);
+		value->text = w->naming->name(w->naming->context, path);
+		value->quoted = true;
+		free(path);
+	}
+}
+
+static void put_filling(
+	const writing *w, const quern_slot *slot, const quern_filling *f, quern_node *parent) {
+	const quern_instance *it = f->instance;
+	quern_node *map = quern_node_put_map(parent, bare(it->file->plugin.id));
+	put_params(w, it->file->params, it->self, map);
+	if (slot->rows) put_params(w, slot->rows, f->item, map);
+	if (slot->override) put_override(w, slot, f, map);
+}
+
+static void put_slot(const writing *w, const quern_slot_use *use, quern_node *section) {
 	const quern_slot *slot = use->slot;
 	if (use->borrowed || !use->n) return;
 	const char *dot = strchr(slot->name, '.');
@@ -27,39 +63,45 @@ static void put_slot(const quern_scene *s, const quern_slot_use *use, quern_node
 		list[dot - slot->name] = 0;
 		quern_node *items = quern_node_find(section, list);
 		for (size_t i = 0; items && i < use->n && i < items->n; i++)
-			put_filling(s, slot, &use->filling[i], quern_node_put_map(items->entries[i].value, dot + 1));
+			put_filling(w, slot, &use->filling[i], quern_node_put_map(items->entries[i].value, dot + 1));
 		free(list);
 	} else if (slot->list) {
 		quern_node *list =
 			section->kind == QUERN_NODE_LIST ? section : quern_node_put_list(section, slot->name);
 		for (size_t i = 0; i < use->n; i++)
-			put_filling(s, slot, &use->filling[i], quern_node_append_map(list));
-	} else put_filling(s, slot, &use->filling[0], quern_node_put_map(section, slot->name));
+			put_filling(w, slot, &use->filling[i], quern_node_append_map(list));
+	} else put_filling(w, slot, &use->filling[0], quern_node_put_map(section, slot->name));
 }
 
-static void put_section(const quern_scene *s, const quern_section *section, quern_node *root) {
+static void put_section(const writing *w, const quern_section *section, quern_node *root) {
 	const bool list = section->node->kind == QUERN_NODE_LIST;
 	quern_node *node =
 		list ? quern_node_put_list(root, section->name) : quern_node_put_map(root, section->name);
 	if (!list) {
 		const quern_instance *solver = section->solver;
 		quern_node_put(node, "solver", bare(solver->file->plugin.id));
-		quern_params_write(solver->file->params, solver->self, (uint32_t)s->general.dimension, node);
+		put_params(w, solver->file->params, solver->self, node);
 	}
-	for (size_t k = 0; k < section->n_slots; k++) put_slot(s, &section->slots[k], node);
+	for (size_t k = 0; k < section->n_slots; k++) put_slot(w, &section->slots[k], node);
 }
 
-char *quern_scene_resolved(const quern_scene *s) {
+quern_node *quern_scene_tree(const quern_scene *s, const quern_naming *naming) {
+	const writing w = { s, naming };
 	quern_node *root = quern_node_create(QUERN_NODE_MAP);
-	quern_text text = { 0 };
-	quern_params_write(quern_general_rows, &s->general, (uint32_t)s->general.dimension, root);
+	put_params(&w, quern_general_rows, &s->general, root);
 	quern_node *periodic = quern_node_put_list(root, "domain.periodic");
 	for (int k = 0; k < s->general.dimension; k++)
 		quern_node_append(periodic, s->general.periodic[k] ? "true" : "false");
 	quern_node *fields = quern_node_put_list(root, "output.fields");
 	for (size_t k = 0; k < s->n_fields; k++) quern_node_append(fields, s->fields[k]);
-	for (size_t i = 0; i < s->n_sections; i++) put_section(s, &s->sections[i], root);
-	put_slot(s, &s->observe, root);
+	for (size_t i = 0; i < s->n_sections; i++) put_section(&w, &s->sections[i], root);
+	put_slot(&w, &s->observe, root);
+	return root;
+}
+
+char *quern_scene_resolved(const quern_scene *s, const quern_naming *naming) {
+	quern_node *root = quern_scene_tree(s, naming);
+	quern_text text = { 0 };
 	quern_node_print(root, 0, &text);
 	quern_text_add(&text, "\n");
 	quern_node_destroy(root);

@@ -1,5 +1,7 @@
 #include "run.h"
+#include "identity.h"
 #include "text.h"
+#include "watch.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,6 +80,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	run->scene = scene;
 	run->clock.frame = -1;
 	run->mass_initial = NAN;
+	run->plugins = quern_plugin_hashes(scene->loader);
 	run->pool = quern_pool_create(workers);
 	run->plan = quern_plan_create(scene, run->pool);
 	run->has_grid = needs_grid(&run->plan->store);
@@ -119,33 +122,65 @@ void quern_run_destroy(quern_run *run) {
 	free(run->arena.extra);
 	free(run->folder);
 	free(run->message);
+	free(run->identity);
+	free(run->plugins);
+	free(run->replaced);
 	free(run);
 }
 
 /* ---- time ---- */
 
-int64_t quern_run_frames(const quern_run *run) {
+/* How far from a whole number of intervals still counts as one, in intervals: both times may be written as decimals. */
+static double slack(double intervals) { return fmin(1e-9 * fmax(intervals, 1), 0.01); }
+
+double quern_run_due(const quern_run *run, double time) {
 	const quern_general *g = &run->scene->general;
-	const double frames = g->end / g->every;
-	return (int64_t)ceil(frames - 1e-9 * (frames > 1 ? frames : 1));
+	const double last = g->end / g->every, now = time / g->every;
+	const double next = floor(now + slack(now)) + 1;
+	return next >= ceil(last - slack(last)) ? g->end : next * g->every;
 }
 
-double quern_run_frame_time(const quern_run *run, int64_t frame) {
+bool quern_run_over(const quern_run *run) {
+	const quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
-	return frame >= quern_run_frames(run) ? g->end : (double)frame * g->every;
+	const double now = c->end / g->every, last = g->end / g->every;
+	return c->frame >= 0 && !c->steps_in && now >= last - slack(last);
 }
 
 double quern_run_time(const quern_run *run) {
 	const quern_clock *c = &run->clock;
-	if (!c->settled || c->frame < 0) return 0;
-	return quern_run_frame_time(run, c->frame) + (double)c->at * c->dt;
+	return c->at == c->steps_in ? c->end : c->begin + (double)c->at * c->dt;
+}
+
+void quern_run_cut(quern_run *run) {
+	quern_clock *c = &run->clock;
+	c->begin = c->end = quern_run_time(run);
+	c->at = c->steps_in = 0;
+}
+
+bool quern_run_rejoin(quern_run *run) {
+	quern_clock *c = &run->clock;
+	const quern_general *g = &run->scene->general;
+	const double now = quern_run_time(run), intervals = now / g->every;
+	if (c->frame >= 0 && g->end / g->every < intervals - slack(intervals)) return false;
+	const bool same = quern_run_due(run, c->begin) == c->end || quern_run_due(run, now) == c->end;
+	if (c->steps_in && !same) quern_run_cut(run);
+	return true;
+}
+
+void quern_run_frame(quern_run *run) {
+	quern_run_cut(run);
+	run->clock.frame++;
 }
 
 uint32_t quern_run_substeps(const quern_run *run) {
 	uint32_t n = 1;
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
-		if (s->ops->substeps) n = s->ops->substeps(s->solver->self);
+		if (!s->ops->substeps) continue;
+		quern_watch_enter(s->solver->file->plugin.id, "substeps");
+		n = s->ops->substeps(s->solver->self);
+		quern_watch_leave();
 	}
 	return n;
 }
@@ -189,6 +224,13 @@ static bool steps_grains(const quern_run *run, const quern_section *section) {
 	return false;
 }
 
+static double limit_of(const quern_section *s, const quern_step *step, double *hard, char why[160]) {
+	quern_watch_enter(s->solver->file->plugin.id, "limit");
+	const double limit = s->ops->limit(s->solver->self, step, hard, why);
+	quern_watch_leave();
+	return limit;
+}
+
 double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard_reason[200]) {
 	double least = INFINITY, least_hard = INFINITY;
 	const uint32_t n = quern_run_substeps(run);
@@ -201,7 +243,7 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 		const uint32_t times = steps_grains(run, s) ? n : 1;
 		char why[160] = "";
 		double beyond = INFINITY;
-		const double limit = times * s->ops->limit(s->solver->self, &step, &beyond, why);
+		const double limit = times * limit_of(s, &step, &beyond, why);
 		char factor[32] = "";
 		if (times > 1) snprintf(factor, sizeof factor, "%u times ", times);
 		if (limit < least) least = limit, snprintf(reason, 200, "%s%s", factor, why);
@@ -224,7 +266,7 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 quern_status quern_run_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
-	const double length = quern_run_frame_time(run, c->frame + 1) - quern_run_frame_time(run, c->frame);
+	const double end = quern_run_due(run, c->end), length = end - c->end;
 	double hard;
 	char hard_reason[200];
 	double limit = quern_run_limit(run, &hard, run->limit_reason, hard_reason);
@@ -246,6 +288,8 @@ quern_status quern_run_interval(quern_run *run) {
 	c->steps_in = steps < 1 ? 1 : (int64_t)steps;
 	c->dt = length / (double)c->steps_in;
 	c->at = 0;
+	c->begin = c->end;
+	c->end = end;
 	return QUERN_OK;
 }
 
@@ -271,7 +315,9 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 	step.dt = dt;
 	step.use = stage->column;
 	run->stage = stage;
+	quern_watch_enter(stage->section->solver->file->plugin.id, stage->name);
 	quern_status status = stage->stage->run(stage->section->solver->self, &step);
+	quern_watch_leave();
 	arena_reset(&run->arena);
 	if (status == QUERN_OK) status = run->status;
 	else quern_run_stop(run, status, status == QUERN_E_MEMORY ? "out of memory" : "failed");
@@ -308,8 +354,7 @@ bool quern_run_settle(quern_run *run) {
 			const quern_section *s = &run->scene->sections[i];
 			const quern_step step = quern_run_record(run, s);
 			char why[160];
-			if (steps_grains(run, s) && s->ops->limit)
-				c->settle_dt = s->ops->limit(s->solver->self, &step, &hard, why);
+			if (steps_grains(run, s) && s->ops->limit) c->settle_dt = limit_of(s, &step, &hard, why);
 		}
 		if (!isfinite(c->settle_dt)) c->settle_dt = 0;
 	}
@@ -317,7 +362,9 @@ bool quern_run_settle(quern_run *run) {
 		const quern_section *s = &run->scene->sections[i];
 		if (!s->ops->settled) continue;
 		const quern_step step = quern_run_record(run, s);
+		quern_watch_enter(s->solver->file->plugin.id, "settled");
 		rest = s->ops->settled(s->solver->self, &step) && rest;
+		quern_watch_leave();
 	}
 	if (rest || run->status != QUERN_OK) {
 		c->settled = 1;
@@ -356,7 +403,27 @@ quern_account quern_run_account(quern_run *run) {
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
 		const quern_step step = quern_run_record(run, s);
-		if (s->ops->account) s->ops->account(s->solver->self, &step, &account);
+		if (!s->ops->account) continue;
+		quern_watch_enter(s->solver->file->plugin.id, "account");
+		s->ops->account(s->solver->self, &step, &account);
+		quern_watch_leave();
 	}
 	return account;
+}
+
+quern_status quern_run_check_account(quern_run *run) {
+	const quern_account a = quern_run_account(run);
+	const struct {
+		const char *name;
+		double value;
+	} sums[] = { { "mass", a.mass + a.discrete + a.owed },
+		{ "momentum", a.momentum[0] + a.momentum[1] + a.momentum[2] }, { "kinetic energy", a.kinetic },
+		{ "potential energy", a.potential }, { "elastic energy", a.elastic },
+		{ "defect of the invariants", a.defect } };
+	for (size_t k = 0; k < sizeof sums / sizeof *sums; k++)
+		if (!isfinite(sums[k].value))
+			return quern_run_stop(run, QUERN_E_NUMERIC,
+				"the %s of the run is no finite number at t = %.6g s (step %lld)", sums[k].name,
+				quern_run_time(run), (long long)run->clock.step);
+	return QUERN_OK;
 }

@@ -3,13 +3,14 @@
 #include "grid.h"
 #include "log.h"
 #include "plan.h"
-#include <signal.h>
 
-/* Time is counted in whole numbers: interval i runs from frame i to frame i + 1 in `steps_in` equal steps. */
+/* Steps are counted in whole numbers: an interval runs from `begin` to `end`, when a frame is due, in `steps_in` equal
+ * steps. Both ends are kept, so that a scene whose output changes on resume changes nothing that was. */
 typedef struct quern_clock {
 	int64_t step, substep, settle_step; /* since the start; substep counts grain steps after release */
 	int64_t frame;                      /* last frame written; -1: none */
-	int64_t at, steps_in;               /* steps done and to do in this interval */
+	int64_t at, steps_in;               /* steps done and to do in this interval; steps_in 0: between two */
+	double begin, end;                  /* s, of this interval; between two, both are now */
 	double dt, settle_dt;
 	int64_t settled; /* 1: the grains' own phase is over */
 	int64_t grain_steps, point_steps;
@@ -39,8 +40,10 @@ struct quern_run {
 	quern_mark fault;                /* where in the scene the reason stands; no file: nowhere */
 	double wall_before, settle_wall; /* s on the clock spent before a resume; in settling */
 	double mass_initial;
-	volatile sig_atomic_t *interrupted;
 	char limit_reason[200]; /* what sets the step */
+	char *identity;         /* see identity.h */
+	uint64_t scene_hash, *plugins;
+	char *replaced; /* plugins that took the place of others on the way, a line each; NULL: none */
 };
 
 /* Everything short of running: allocates, but no stage has run. Faults go to the scene's report; NULL if memory is
@@ -54,17 +57,28 @@ quern_status quern_run_setup(quern_run *);
 bool quern_run_settle(quern_run *);
 /* Refuses the scene's own step if it is beyond the hard limit of the state as it is. */
 quern_status quern_run_check_step(quern_run *, double hard, const char *hard_reason, double recommended);
-/* Chooses the steps of the interval that begins now, from the state as it is. */
+/* Begins the interval to the next frame that is due, and chooses its steps from the state as it is. */
 quern_status quern_run_interval(quern_run *);
 /* One long step. */
 quern_status quern_run_step(quern_run *);
+/* Ends the interval, or the time before the first one, with a frame. */
+void quern_run_frame(quern_run *);
+/* Once a checkpoint's clock is there: leads the running interval to where the scene now wants a frame. False, and nothing
+ * is changed, if time.end is over already. */
+bool quern_run_rejoin(quern_run *);
+/* Breaks the interval off, so that the next one begins at the present time. */
+void quern_run_cut(quern_run *);
 
-double quern_run_time(const quern_run *); /* s */
-double quern_run_frame_time(const quern_run *, int64_t frame);
-int64_t quern_run_frames(const quern_run *); /* index of the last frame */
+double quern_run_time(const quern_run *); /* s since the release */
+/* s, when the first frame after `time` is due: at whole multiples of output.every, and at time.end. */
+double quern_run_due(const quern_run *, double time);
+/* True once the frame of time.end is written; a time that is later only by round-off counts as that. */
+bool quern_run_over(const quern_run *);
 /* The step record for code that is called between stages. */
 quern_step quern_run_record(quern_run *, const quern_section *);
 quern_account quern_run_account(quern_run *);
+/* QUERN_E_NUMERIC with run->message if a sum over all that is carried is not finite. */
+quern_status quern_run_check_account(quern_run *);
 /* The smallest recommended long step, the smallest hard limit and what sets the first. */
 double quern_run_limit(quern_run *, double *hard, char reason[200], char hard_reason[200]);
 uint32_t quern_run_substeps(const quern_run *);

@@ -1,6 +1,7 @@
 #include "scene.h"
 #include "section.h"
 #include "text.h"
+#include "watch.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,12 +29,19 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 	ROW(upper, "domain.upper", "m", "Upper corner of the domain.", .flags = QUERN_REQUIRED, .min = -1e9,
 		.max = 1e9),
 	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED, .max = 1e12),
-	ROW(step_text, "time.step", "s", "The long step, or auto; grains alone: their step.", .text = "auto"),
+	ROW(step_text, "time.step", "s",
+		"The long step, or auto; grains alone: their step. Taken a little shorter, so that a whole number of "
+		"equal steps leads to the next frame.",
+		.text = "auto"),
 	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit."),
-	ROW(every, "output.every", "s", "Time between frames and between rows of series.csv; default: end/50.",
+	ROW(every, "output.every", "s",
+		"Time between frames and between rows of series.csv; default: end/50. It is divided into equal "
+		"steps, "
+		"so another value changes the step a little, and with it the numbers.",
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
 	ROW(compress, "output.compress", NULL, "Deflate the frames.", .def = 1),
-	ROW(checkpoint, "checkpoint.every", "s", "Time on the clock between checkpoints.", .def = 300,
+	ROW(checkpoint, "checkpoint.every", "s",
+		"Time on the clock between checkpoints; 0: only at the release and at the end.", .def = 300,
 		.max = 1e9),
 	ROW(batch, "run.batch", "1", "Most contacts in a batch; results do not depend on it.", .def = 256,
 		.min = 8, .max = 512, .flags = QUERN_ADVANCED),
@@ -44,12 +52,6 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 
 static const char *const general_also[] = { "domain.periodic", "output.fields", "observe", "bodies", "grains",
 	"continuum", "hybrid", NULL };
-
-uint64_t quern_hash(const void *data, size_t length) {
-	uint64_t hash = 1469598103934665603u;
-	for (size_t i = 0; i < length; i++) hash = (hash ^ ((const unsigned char *)data)[i]) * 1099511628211u;
-	return hash;
-}
 
 quern_reading quern_scene_reading(const quern_scene *s) {
 	return (quern_reading) { s->report, s->units, (uint32_t)s->general.dimension, s->published,
@@ -128,9 +130,7 @@ static void read_periodic(quern_scene *s, const quern_node *domain) {
 	}
 	for (size_t k = 0; k < node->n; k++) {
 		const quern_node *value = node->entries[k].value;
-		const char *t = value->kind == QUERN_NODE_SCALAR ? value->text : "";
-		s->general.periodic[k] = !strcmp(t, "true");
-		if (strcmp(t, "true") != 0 && strcmp(t, "false") != 0)
+		if (!quern_node_bool(value, &s->general.periodic[k]))
 			quern_report_add(s->report, value->mark, "scene: domain.periodic is %s, must be true or false",
 				quern_node_say(value, say));
 	}
@@ -210,7 +210,8 @@ static void read_general(quern_scene *s, quern_node *root) {
 	if (s->general.version > 1)
 		quern_report_add(s->report, quern_param_mark(root, "quern", root->mark),
 			"scene: quern is %d, must be 1: a newer program is needed", s->general.version);
-	if (isnan(s->general.every)) s->general.every = s->general.end > 0 ? s->general.end / 50 : 1;
+	s->general.every_given = !isnan(s->general.every);
+	if (!s->general.every_given) s->general.every = s->general.end > 0 ? s->general.end / 50 : 1;
 	read_periodic(s, quern_node_find(root, "domain"));
 	read_fields(s, quern_node_find(root, "output"));
 	read_step(s, root);
@@ -254,6 +255,59 @@ static bool lacks_a_side(quern_scene *s, const quern_section_name *name, const q
 	return missing != NULL;
 }
 
+/* ---- observers ---- */
+
+static const quern_param observe_rows[] = {
+	QUERN_PARAM(quern_observe_item, label, NULL,
+		"What its columns in series.csv and its numbers in summary.json are called; default: the plugin's "
+		"name, from the second one on with a number.",
+		.flags = QUERN_MAYBE),
+	QUERN_END_PARAMS
+};
+const quern_slot quern_observe_slot = { .name = "observe",
+	.kind = QUERN_OBSERVER,
+	.list = 1,
+	.rows = observe_rows,
+	.item_size = sizeof(quern_observe_item) };
+
+static quern_observe_item *observe_item(const quern_scene *s, size_t e) { return s->observe.filling[e].item; }
+
+/* Which of the first n observers has that label; n if none has. */
+static size_t labelled(const quern_scene *s, size_t n, const char *label) {
+	for (size_t e = 0; e < n; e++)
+		if (observe_item(s, e)->label && !strcmp(observe_item(s, e)->label, label)) return e;
+	return n;
+}
+
+static void check_label(quern_scene *s, size_t e) {
+	const quern_instance *it = s->observe.filling[e].instance;
+	const char *label = observe_item(s, e)->label;
+	const quern_mark mark = quern_param_mark(it->map, "label", it->mark);
+	if (!quern_is_name(label))
+		quern_report_add(s->report, mark,
+			"observe: the label '%s' is no name: it must be letters, digits and '_', beginning with a letter",
+			label);
+	else if (labelled(s, e, label) < e)
+		quern_report_add(
+			s->report, mark, "observe: two observers are labelled '%s': give each its own", label);
+}
+
+static void label_observers(quern_scene *s) {
+	const size_t n = s->observe.n;
+	for (size_t e = 0; e < n; e++)
+		if (observe_item(s, e)->label) check_label(s, e);
+	for (size_t e = 0; e < n; e++) {
+		const char *name = strchr(s->observe.filling[e].instance->file->plugin.id, '.') + 1;
+		char *label = quern_copy(name);
+		for (int k = 2; !observe_item(s, e)->label && labelled(s, n, label) < n; k++) {
+			free(label);
+			label = quern_format("%s_%d", name, k);
+		}
+		if (!observe_item(s, e)->label) observe_item(s, e)->label = quern_tree_keep(s->tree, label);
+		free(label);
+	}
+}
+
 static void resolve(quern_scene *s) {
 	quern_node *root = s->tree->root;
 	if (!root) return;
@@ -273,10 +327,10 @@ static void resolve(quern_scene *s) {
 		failed = failed || s->n_sections == before;
 	}
 	if (!failed) check_sections(s, root->mark);
-	static const quern_slot observe = { .name = "observe", .kind = QUERN_OBSERVER, .list = 1 };
-	s->observe.slot = &observe;
+	s->observe.slot = &quern_observe_slot;
 	s->observe.path = quern_copy("observe");
 	quern_slot_fill(s, &s->observe, quern_node_find(root, "observe"), root->mark);
+	label_observers(s);
 }
 
 static quern_scene *create(const quern_host *host) {
@@ -285,6 +339,7 @@ static quern_scene *create(const quern_host *host) {
 	s->report = quern_report_create();
 	s->units = quern_units_create();
 	s->loader = quern_loader_create();
+	quern_watch_know(s->loader);
 	return s;
 }
 
@@ -325,6 +380,7 @@ void quern_scene_destroy(quern_scene *s) {
 	free(s->field_marks);
 	free(s->published);
 	quern_tree_destroy(s->tree);
+	quern_watch_know(NULL);
 	quern_loader_destroy(s->loader);
 	quern_units_destroy(s->units);
 	quern_report_destroy(s->report);

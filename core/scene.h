@@ -1,5 +1,6 @@
 /* scene - a scene file read, checked and resolved: every section's solver, every slot's plugins, every default */
 #pragma once
+#include "file.h"
 #include "loader.h"
 #include "param.h"
 
@@ -10,8 +11,7 @@ typedef struct quern_instance {
 	quern_mark mark;
 	char *path; /* "grains.contact" */
 	void *self;
-	bool lacking; /* a number that a part at fault would have given: init is not called */
-	bool ready;   /* init has succeeded: finish is owed */
+	bool ready; /* init has succeeded: finish is owed */
 } quern_instance;
 
 /* One entry of a slot: a plugin, the slot's own rows, and instances with another entry's overrides. */
@@ -26,7 +26,7 @@ typedef struct quern_slot_use {
 	const quern_slot *slot;
 	char *path;             /* "grains.contact" */
 	quern_filling *filling; /* same_as: those of that slot */
-	size_t n;
+	size_t n, capacity;
 	bool borrowed;
 } quern_slot_use;
 
@@ -40,6 +40,12 @@ typedef struct quern_section {
 	size_t n_slots;
 } quern_section;
 
+/* What every observer takes besides its own keys. */
+typedef struct quern_observe_item {
+	const char *label; /* never NULL once the scene is read, and no other observer's */
+} quern_observe_item;
+extern const quern_slot quern_observe_slot;
+
 /* What the core itself takes from a scene. */
 typedef struct quern_general {
 	int32_t version, dimension, seed, model, batch, instructions;
@@ -49,6 +55,7 @@ typedef struct quern_general {
 	quern_real end, every, checkpoint, step; /* s; step 0: auto */
 	bool force;
 	bool compress;
+	bool every_given; /* output.every stands in the scene */
 } quern_general;
 
 typedef struct quern_scene {
@@ -78,8 +85,9 @@ quern_scene *quern_scene_read(const char *path, const char *const *sets, const q
 quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *);
 void quern_scene_destroy(quern_scene *);
 
-/* The scene with every default written out, in SI, as YAML; free() it. */
-char *quern_scene_resolved(const quern_scene *);
+/* The scene with every default written out, in SI: a tree to destroy, or YAML to free(). */
+quern_node *quern_scene_tree(const quern_scene *, const quern_naming *);
+char *quern_scene_resolved(const quern_scene *, const quern_naming *);
 /* The rows of the core's own keys, for schema and describe. */
 extern const quern_param quern_general_rows[];
 /* Sections and the solver that reads each by default, NULL-name terminated. */
@@ -89,8 +97,6 @@ typedef struct quern_section_name {
 extern const quern_section_name quern_section_names[];
 
 const quern_section *quern_scene_section(const quern_scene *, const char *name);
-/* FNV-1a over the resolved text, without what does not change the result (name, output folder, end) */
-uint64_t quern_hash(const void *data, size_t length);
 /* What rows of this scene are read with. */
 quern_reading quern_scene_reading(const quern_scene *);
 /* The set-up record that every init gets. */

@@ -1,21 +1,28 @@
 #include "section.h"
+#include "environment.h"
 #include "text.h"
+#include "watch.h"
 #include <stdlib.h>
 #include <string.h>
 
 /* ---- instances ---- */
 
+/* NULL after one sentence if there is no memory for what the plugin keeps: how much that is, is its own to say. */
 static quern_instance *instance_create(
 	quern_scene *s, const quern_plugin_file *file, const quern_node *map, quern_mark mark, const char *path) {
+	const size_t size = ((size_t)file->plugin.instance_size + 127u) & ~(size_t)63;
+	void *self = aligned_alloc(64, size);
+	if (!self) {
+		quern_report_add(s->report, mark, "%s: out of memory: it wants %u bytes for itself", file->plugin.id,
+			file->plugin.instance_size);
+		return NULL;
+	}
 	quern_instance *it = quern_take(1, sizeof *it);
-	const size_t size = (file->plugin.instance_size + 127u) & ~(size_t)63;
 	it->file = file;
 	it->map = map;
 	it->mark = mark;
 	it->path = quern_copy(path);
-	it->self = aligned_alloc(64, size);
-	if (!it->self) abort();
-	memset(it->self, 0, size);
+	it->self = memset(self, 0, size);
 	s->instances = quern_grow(s->instances, s->n_instances, &s->instances_capacity, sizeof(it));
 	s->instances[s->n_instances++] = it;
 	return it;
@@ -26,17 +33,29 @@ static void instance_read(quern_scene *s, quern_instance *it, const char *const 
 	if (!(it->file->plugin.dims & (s->general.dimension == 2 ? QUERN_2D : QUERN_3D)))
 		quern_report_add(s->report, it->mark, "%s does not work in %d dimensions", it->file->plugin.id,
 			s->general.dimension);
-	it->lacking =
-		!quern_params_read(&r, it->file->plugin.id, it->file->params, it->map, it->mark, also, it->self);
+	quern_params_read(&r, it->file->plugin.id, it->file->params, it->map, it->mark, also, it->self);
+}
+
+static quern_status call_init(quern_scene *s, quern_instance *it) {
+	quern_err err = { s->report, it->map, it->mark, it->file->plugin.id };
+	const quern_setup setup = quern_scene_setup(s, it->path);
+	quern_environment before = quern_environment_take();
+	quern_watch_enter(it->file->plugin.id, "init");
+	const quern_status status = it->file->plugin.init(it->self, &setup, &err);
+	quern_watch_leave();
+	const char *changed = quern_environment_restore(&before);
+	quern_environment_drop(&before);
+	if (!changed) return status;
+	it->ready = status == QUERN_OK;
+	return quern_scene_fail(
+		&err, QUERN_E_PARAM, NULL, "init changes %s for the whole program: let it put that back", changed);
 }
 
 /* A faulty parameter must not reach init, which may rely on the ranges of its rows; nor must a faulty domain. */
 static void instance_init(quern_scene *s, quern_instance *it, size_t errors_before) {
-	if (quern_report_errors(s->report) != errors_before || it->lacking || !s->sound) return;
+	if (quern_report_errors(s->report) != errors_before || !s->sound) return;
 	if (it->file->plugin.init) {
-		quern_err err = { s->report, it->map, it->mark, it->file->plugin.id };
-		const quern_setup setup = quern_scene_setup(s, it->path);
-		if (it->file->plugin.init(it->self, &setup, &err) != QUERN_OK) {
+		if (call_init(s, it) != QUERN_OK) {
 			if (quern_report_errors(s->report) == errors_before)
 				quern_report_add(s->report, it->mark, "%s: cannot be set up", it->file->plugin.id);
 			return;
@@ -147,11 +166,11 @@ static void read_entry(quern_scene *s, const quern_slot *slot, quern_filling *f)
 static void add_filling(quern_scene *s, quern_slot_use *use, const choice *c, quern_kind kind) {
 	if (!c->name) return;
 	const quern_plugin_file *file = quern_loader_find(s->loader, kind, c->name, s->report, c->mark);
-	if (!file) return;
-	use->filling = realloc(use->filling, (use->n + 1) * sizeof(quern_filling));
-	if (!use->filling) abort();
+	quern_instance *it = file ? instance_create(s, file, c->map, c->mark, use->path) : NULL;
+	if (!it) return;
+	use->filling = quern_grow(use->filling, use->n, &use->capacity, sizeof(quern_filling));
 	quern_filling *f = &use->filling[use->n++];
-	*f = (quern_filling) { .instance = instance_create(s, file, c->map, c->mark, use->path) };
+	*f = (quern_filling) { .instance = it };
 	const size_t before = quern_report_errors(s->report);
 	read_entry(s, use->slot, f);
 	instance_init(s, f->instance, before);
@@ -251,6 +270,7 @@ static void fill_variants(quern_scene *s, quern_slot_use *use) {
 				}
 			if (!any) continue;
 			quern_instance *it = instance_create(s, base->file, keep->root, given->mark, use->path);
+			if (!it) continue;
 			const size_t before = quern_report_errors(s->report);
 			instance_read(s, it, NULL);
 			instance_init(s, it, before);
@@ -290,7 +310,7 @@ static void section_ready(quern_scene *s, quern_section *section) {
 			bound[i] = (quern_bound) { .self = f->instance->self,
 				.ops = f->instance->file->plugin.ops,
 				.item = f->item,
-				.uses = f->instance->file->uses,
+				.uses = quern_table_uses_for(&f->instance->file->table, section->solver->file->library),
 				.n_uses = (uint32_t)f->instance->file->n_uses,
 				.id = f->instance->file->plugin.id,
 				.path = use->path,
@@ -303,11 +323,16 @@ static void section_ready(quern_scene *s, quern_section *section) {
 		slots[k] = bound;
 		counts[k] = (uint32_t)use->n;
 	}
-	if (section->ops->ready(section->solver->self, &setup, slots, counts, &err) != QUERN_OK &&
-		!quern_report_errors(s->report))
+	quern_watch_enter(section->solver->file->plugin.id, "ready");
+	const quern_status status = section->ops->ready(section->solver->self, &setup, slots, counts, &err);
+	quern_watch_leave();
+	if (status != QUERN_OK && !quern_report_errors(s->report))
 		quern_report_add(s->report, section->mark, "%s: cannot be set up", section->name);
 	for (size_t k = 0; k < section->n_slots; k++) {
-		for (size_t i = 0; i < counts[k]; i++) free((void *)(uintptr_t)slots[k][i].variant);
+		for (size_t i = 0; i < counts[k]; i++) {
+			free((void *)(uintptr_t)slots[k][i].variant);
+			free((void *)(uintptr_t)slots[k][i].uses);
+		}
 		free((void *)(uintptr_t)slots[k]);
 	}
 	free(slots);
@@ -321,12 +346,13 @@ void quern_section_read(quern_scene *s, const quern_section_name *names, const q
 	const char *name = swap && swap->kind == QUERN_NODE_SCALAR ? swap->text : names->solver;
 	const quern_plugin_file *file =
 		quern_loader_find(s->loader, QUERN_SOLVER, name, s->report, swap ? swap->mark : entry->mark);
-	if (!file) return;
+	quern_instance *solver =
+		file ? instance_create(s, file, map ? node : NULL, entry->mark, names->section) : NULL;
+	if (!solver) return;
 	quern_section *section = &s->sections[s->n_sections++];
 	*section = (quern_section) {
-		.name = names->section, .node = node, .mark = entry->mark, .ops = file->plugin.ops
+		.name = names->section, .node = node, .mark = entry->mark, .ops = file->plugin.ops, .solver = solver
 	};
-	section->solver = instance_create(s, file, map ? node : NULL, entry->mark, names->section);
 	for (const quern_slot *slot = section->ops->slots; slot && slot->name; slot++) section->n_slots++;
 	section->slots = quern_take(section->n_slots, sizeof(quern_slot_use));
 	bool is_list = false; /* the section is itself the list of its one slot */
@@ -382,7 +408,11 @@ void quern_slot_finish(quern_slot_use *use) {
 
 void quern_instance_destroy(quern_instance *it) {
 	if (!it) return;
-	if (it->ready && it->file->plugin.finish) it->file->plugin.finish(it->self);
+	if (it->ready && it->file->plugin.finish) {
+		quern_watch_enter(it->file->plugin.id, "finish");
+		it->file->plugin.finish(it->self);
+		quern_watch_leave();
+	}
 	quern_params_finish(it->file->params, it->self);
 	free(it->self);
 	free(it->path);

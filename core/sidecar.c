@@ -1,52 +1,68 @@
 #include "sidecar.h"
 #include "h5.h"
 #include "text.h"
-#include <jansson.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-
-enum { MOST_SETS = 8, MOST_FIELDS = 48 };
+#include <unistd.h>
 
 typedef struct {
-	char name[56];
-	int columns;
+	char *name;
+	size_t columns;
 	bool real, wide; /* 8-byte real, or integer of 8 or 4 bytes */
 } field;
 
 typedef struct {
-	char name[24];
-	size_t n;
-	field field[MOST_FIELDS];
-	int n_fields;
+	char *name;
+	size_t n, n_fields, capacity;
+	field *field;
 } set;
 
+/* What a frame holds. */
 typedef struct {
 	int64_t number;
 	double time;
-	set set[MOST_SETS];
-	int n_sets;
+	set *set;
+	size_t n_sets, capacity;
 } entry;
+
+/* A file that names frames one after the other; `closing` stands behind the last one, and what comes next in its place. */
+typedef struct {
+	char *path, *set; /* set NULL: of all sets, in XDMF; else of one, in JSON */
+	const char *opening, *closing;
+	size_t tail; /* where `closing` begins; 0: there is no file yet */
+	int64_t n;
+	quern_text gathered; /* entries that wait for the file to be made */
+} listing;
 
 struct quern_sidecars {
 	char *folder;
-	entry *entries;
+	listing *listing; /* run.xdmf first */
 	size_t n, capacity;
 };
 
 /* ---- what a frame holds ---- */
 
+static void entry_finish(entry *e) {
+	for (size_t s = 0; s < e->n_sets; s++) {
+		for (size_t k = 0; k < e->set[s].n_fields; k++) free(e->set[s].field[k].name);
+		free(e->set[s].field);
+		free(e->set[s].name);
+	}
+	free(e->set);
+}
+
 static herr_t note_field(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
 	set *s = arg;
 	size_t rows, columns;
 	(void)info;
-	if (s->n_fields == MOST_FIELDS || !quern_h5_read_size(group, name, &rows, &columns)) return 0;
+	if (!quern_h5_read_size(group, name, &rows, &columns)) return 0;
 	const hid_t data = H5Dopen2(group, name, H5P_DEFAULT), type = H5Dget_type(data);
-	field *f = &s->field[s->n_fields++];
-	snprintf(f->name, sizeof f->name, "%s", name);
-	f->columns = (int)columns;
-	f->real = H5Tget_class(type) == H5T_FLOAT;
-	f->wide = H5Tget_size(type) == 8;
+	s->field = quern_grow(s->field, s->n_fields, &s->capacity, sizeof(field));
+	s->field[s->n_fields++] =
+		(field) { quern_copy(name), columns, H5Tget_class(type) == H5T_FLOAT, H5Tget_size(type) == 8 };
 	s->n = rows;
 	H5Tclose(type);
 	H5Dclose(data);
@@ -58,13 +74,10 @@ static herr_t note_set(hid_t file, const char *name, const H5L_info_t *info, voi
 	(void)info;
 	const hid_t group = quern_h5_find(file, name);
 	if (group < 0) return 0;
-	if (e->n_sets < MOST_SETS) {
-		set *s = &e->set[e->n_sets];
-		*s = (set) { .n = 0 };
-		snprintf(s->name, sizeof s->name, "%s", name);
-		H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, NULL, note_field, s);
-		e->n_sets += s->n_fields > 0;
-	}
+	e->set = quern_grow(e->set, e->n_sets, &e->capacity, sizeof(set));
+	set *s = &e->set[e->n_sets++];
+	*s = (set) { .name = quern_copy(name) };
+	H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, NULL, note_field, s);
 	H5Gclose(group);
 	return 0;
 }
@@ -82,29 +95,35 @@ static bool describe(const char *folder, int64_t number, entry *e) {
 }
 
 static const field *position_of(const set *s) {
-	for (int k = 0; k < s->n_fields; k++)
+	for (size_t k = 0; k < s->n_fields; k++)
 		if (!strcmp(s->field[k].name, "position")) return &s->field[k];
 	return NULL;
 }
 
-/* ---- XDMF ---- */
+static bool is_drawn(const set *s) { return s->n && position_of(s); }
+
+/* ---- an entry of run.xdmf ---- */
+
+static const char xdmf_opening[] =
+	"<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\"><Domain>\n<Grid Name=\"run\" "
+	"GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+static const char xdmf_closing[] = "</Grid></Domain></Xdmf>\n";
 
 static void data_item(quern_text *out, const entry *e, const set *s, const field *f) {
 	quern_text_add(out, "<DataItem Dimensions=\"%zu", s->n);
-	if (f->columns > 1) quern_text_add(out, " %d", f->columns);
+	if (f->columns > 1) quern_text_add(out, " %zu", f->columns);
 	quern_text_add(out,
 		"\" NumberType=\"%s\" Precision=\"%d\" Format=\"HDF\">frames/%06lld.h5:/%s/%s</DataItem>",
 		f->real ? "Float" : "Int", f->wide ? 8 : 4, (long long)e->number, s->name, f->name);
 }
 
 /* Six columns stay a matrix: as "Tensor6" readers would reorder them. */
-static const char *attribute_type(int columns) {
+static const char *attribute_type(size_t columns) {
 	return columns == 1 ? "Scalar" : columns == 3 ? "Vector" : columns == 9 ? "Tensor" : "Matrix";
 }
 
 static void xdmf_set(quern_text *out, const entry *e, const set *s) {
 	const field *position = position_of(s);
-	if (!position || !s->n) return;
 	quern_text_add(out,
 		"<Grid Name=\"%s\"><Topology TopologyType=\"Polyvertex\" NumberOfElements=\"%zu\" "
 		"NodesPerElement=\"1\"><DataItem Dimensions=\"%zu\" NumberType=\"Int\" Precision=\"8\" "
@@ -113,7 +132,7 @@ static void xdmf_set(quern_text *out, const entry *e, const set *s) {
 		s->name, s->n, s->n, s->name, (long long)e->number);
 	data_item(out, e, s, position);
 	quern_text_add(out, "</Geometry>\n");
-	for (int k = 0; k < s->n_fields; k++) {
+	for (size_t k = 0; k < s->n_fields; k++) {
 		if (&s->field[k] == position) continue;
 		quern_text_add(out, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"Node\">", s->field[k].name,
 			attribute_type(s->field[k].columns));
@@ -123,25 +142,14 @@ static void xdmf_set(quern_text *out, const entry *e, const set *s) {
 	quern_text_add(out, "</Grid>\n");
 }
 
-static bool write_xdmf(const quern_sidecars *q, char why[256]) {
-	quern_text out = { 0 };
-	quern_text_add(&out, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\"><Domain>\n<Grid Name=\"run\" "
-						 "GridType=\"Collection\" CollectionType=\"Temporal\">\n");
-	for (size_t i = 0; i < q->n; i++) {
-		const entry *e = &q->entries[i];
-		quern_text_add(&out,
-			"<Grid Name=\"frame\" GridType=\"Collection\" CollectionType=\"Spatial\"><Time "
-			"Value=\"%.17g\"/>\n",
-			e->time);
-		for (int s = 0; s < e->n_sets; s++) xdmf_set(&out, e, &e->set[s]);
-		quern_text_add(&out, "</Grid>\n");
-	}
-	quern_text_add(&out, "</Grid></Domain></Xdmf>\n");
-	char *path = quern_format("%s/run.xdmf", q->folder);
-	const bool good = quern_save_bytes(path, out.data, out.length, why);
-	free(path);
-	quern_text_finish(&out);
-	return good;
+static void xdmf_entry(quern_text *out, const entry *e) {
+	quern_text_add(out,
+		"<Grid Name=\"frame\" GridType=\"Collection\" CollectionType=\"Spatial\"><Time "
+		"Value=\"%.17g\"/>\n",
+		e->time);
+	for (size_t s = 0; s < e->n_sets; s++)
+		if (is_drawn(&e->set[s])) xdmf_set(out, e, &e->set[s]);
+	quern_text_add(out, "</Grid>\n");
 }
 
 /* ---- VTKHDF stubs, whose data are links into the frame ---- */
@@ -192,7 +200,7 @@ static bool write_stub(const quern_sidecars *q, const entry *e, const set *s, ch
 	const hid_t group = quern_h5_group(&h, h.file, "VTKHDF"), data = quern_h5_group(&h, group, "PointData");
 	stub_attributes(&h, group);
 	stub_topology(&h, group, s->n);
-	for (int k = 0; k < s->n_fields; k++) {
+	for (size_t k = 0; k < s->n_fields; k++) {
 		const bool position = !strcmp(s->field[k].name, "position");
 		char *target = quern_format("/%s/%s", s->name, s->field[k].name);
 		if (H5Lcreate_external(native, target, position ? group : data,
@@ -209,68 +217,125 @@ static bool write_stub(const quern_sidecars *q, const entry *e, const set *s, ch
 	return good;
 }
 
-static const set *find_set(const entry *e, const char *name) {
-	for (int k = 0; k < e->n_sets; k++)
-		if (!strcmp(e->set[k].name, name)) return &e->set[k];
-	return NULL;
+/* ---- lists of frames ---- */
+
+static listing *add_listing(quern_sidecars *q, char *path, const char *set_name) {
+	q->listing = quern_grow(q->listing, q->n, &q->capacity, sizeof(listing));
+	q->listing[q->n] = (listing) { .path = path, .opening = xdmf_opening, .closing = xdmf_closing };
+	listing *l = &q->listing[q->n++];
+	if (!set_name) return l;
+	l->set = quern_copy(set_name);
+	l->opening = "{\n \"file-series-version\": \"1.0\",\n \"files\": [";
+	l->closing = "\n ]\n}\n";
+	return l;
 }
 
-static bool write_series(const quern_sidecars *q, const char *name, char why[256]) {
-	json_t *files = json_array();
-	for (size_t i = 0; i < q->n; i++) {
-		const entry *e = &q->entries[i];
-		const set *s = find_set(e, name);
-		if (!s || !s->n || !position_of(s)) continue;
-		char file[64];
-		snprintf(file, sizeof file, "%s_%06lld.hdf", name, (long long)e->number);
-		json_array_append_new(files, json_pack("{s:s, s:f}", "name", file, "time", e->time));
+static listing *listing_of(quern_sidecars *q, const char *set_name) {
+	for (size_t i = 1; i < q->n; i++)
+		if (!strcmp(q->listing[i].set, set_name)) return &q->listing[i];
+	return add_listing(q, quern_format("%s/views/%s.hdf.series", q->folder, set_name), set_name);
+}
+
+static bool write_at(int fd, const char *text, size_t place) {
+	for (size_t left = strlen(text); left;) {
+		const ssize_t n = pwrite(fd, text, left, (off_t)place);
+		if (n < 0 && errno == EINTR) continue;
+		if (n <= 0) return false;
+		text += n, place += (size_t)n, left -= (size_t)n;
 	}
-	json_t *root = json_pack("{s:s, s:o}", "file-series-version", "1.0", "files", files);
-	char *text = json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-	char *path = quern_format("%s/views/%s.hdf.series", q->folder, name);
-	const bool good = text && quern_save_bytes(path, text, strlen(text), why);
-	free(path);
-	free(text);
-	json_decref(root);
+	return true;
+}
+
+/* Puts text where `closing` stands, and `closing` behind it; on a fault the list is as it was. */
+static bool extend(listing *l, const quern_text *text, char why[256]) {
+	char *grown = quern_format("%s%s", text->data, l->closing);
+	const int fd = open(l->path, O_WRONLY | O_CLOEXEC);
+	const bool good = fd >= 0 && write_at(fd, grown, l->tail);
+	if (!good) snprintf(why, 256, "%.180s cannot be written: %s", l->path, strerror(errno));
+	if (!good && fd >= 0 &&
+		(!write_at(fd, l->closing, l->tail) || ftruncate(fd, (off_t)(l->tail + strlen(l->closing)))))
+		snprintf(why, 256, "%.180s is left without its end: %s", l->path, strerror(errno));
+	if (fd >= 0) close(fd);
+	if (good) l->tail += text->length;
+	free(grown);
 	return good;
+}
+
+static bool make(listing *l, const quern_text *text, char why[256]) {
+	char *whole = quern_format("%s%s%s", l->opening, quern_text_string(text), l->closing);
+	const bool good = quern_save_bytes(l->path, whole, strlen(whole), why);
+	if (good) l->tail = strlen(l->opening) + text->length;
+	free(whole);
+	return good;
+}
+
+/* The entries that have gathered go into the file. */
+static bool flush_listing(listing *l, char why[256]) {
+	if (!l->gathered.length) return true;
+	const bool good = l->tail ? extend(l, &l->gathered, why) : make(l, &l->gathered, why);
+	quern_text_finish(&l->gathered);
+	return good;
+}
+
+static void gather(quern_sidecars *q, const entry *e) {
+	xdmf_entry(&q->listing[0].gathered, e);
+	for (size_t s = 0; s < e->n_sets; s++) {
+		if (!is_drawn(&e->set[s])) continue;
+		listing *l = listing_of(q, e->set[s].name);
+		quern_text_add(&l->gathered, "%s\n  {\"name\": \"%s_%06lld.hdf\", \"time\": %.17g}", l->n ? "," : "",
+			l->set, (long long)e->number, e->time);
+		l->n++;
+	}
+}
+
+static bool flush(quern_sidecars *q, char why[256]) {
+	for (size_t i = q->n; i-- > 0;) /* run.xdmf names what is in views/, so it comes last */
+		if (!flush_listing(&q->listing[i], why)) return false;
+	return true;
 }
 
 /* ---- the whole ---- */
 
-static void append(quern_sidecars *q, const entry *e) {
-	q->entries = quern_grow(q->entries, q->n, &q->capacity, sizeof(entry));
-	q->entries[q->n++] = *e;
-}
-
-quern_sidecars *quern_sidecars_create(const char *folder, int64_t frames) {
+quern_sidecars *quern_sidecars_create(const char *folder, int64_t frames, char why[256]) {
 	quern_sidecars *q = quern_take(1, sizeof *q);
 	q->folder = quern_copy(folder);
 	char *views = quern_format("%s/views", folder);
-	mkdir(views, 0777);
+	const bool made = !mkdir(views, 0777) || errno == EEXIST;
+	if (!made) snprintf(why, 256, "the folder %.180s cannot be made: %s", views, strerror(errno));
 	free(views);
-	entry *e = quern_take(1, sizeof *e);
-	for (int64_t i = 0; i < frames; i++)
-		if (describe(folder, i, e)) append(q, e);
-	free(e);
-	return q;
+	add_listing(q, quern_format("%s/run.xdmf", folder), NULL);
+	for (int64_t i = 0; i < frames && made; i++) {
+		entry e;
+		if (describe(folder, i, &e)) gather(q, &e);
+		entry_finish(&e);
+	}
+	if (made && flush(q, why)) return q;
+	quern_sidecars_destroy(q);
+	return NULL;
 }
 
 void quern_sidecars_destroy(quern_sidecars *q) {
 	if (!q) return;
+	for (size_t i = 0; i < q->n; i++) {
+		free(q->listing[i].path);
+		free(q->listing[i].set);
+		quern_text_finish(&q->listing[i].gathered);
+	}
+	free(q->listing);
 	free(q->folder);
-	free(q->entries);
 	free(q);
 }
 
 bool quern_sidecars_add(quern_sidecars *q, int64_t frame, char why[256]) {
-	entry *e = quern_take(1, sizeof *e);
-	bool good = describe(q->folder, frame, e);
+	entry e;
+	bool good = describe(q->folder, frame, &e);
 	if (!good) snprintf(why, 256, "frame %lld cannot be read back", (long long)frame);
-	else append(q, e);
-	for (int s = 0; s < e->n_sets && good; s++) {
-		if (!e->set[s].n || !position_of(&e->set[s])) continue;
-		good = write_stub(q, e, &e->set[s], why) && write_series(q, e->set[s].name, why);
+	for (size_t s = 0; s < e.n_sets && good; s++)
+		if (is_drawn(&e.set[s])) good = write_stub(q, &e, &e.set[s], why);
+	if (good) {
+		gather(q, &e);
+		good = flush(q, why);
 	}
-	free(e);
-	return good && write_xdmf(q, why);
+	entry_finish(&e);
+	return good;
 }

@@ -5,8 +5,10 @@
 
 typedef struct quern_sidecars quern_sidecars;
 
-/* `frames`: how many frames are there already, from 0 on; they are looked at. */
-quern_sidecars *quern_sidecars_create(const char *folder, int64_t frames);
+/* `frames`: how many frames are there already, from 0 on; they are looked at, and the lists of them are written anew.
+ * NULL with one sentence in `why` if that cannot be. */
+quern_sidecars *quern_sidecars_create(const char *folder, int64_t frames, char why[256]);
 void quern_sidecars_destroy(quern_sidecars *);
-/* Takes note of a frame that was just written, and rewrites the files; they never name a frame that is not there. */
+/* Adds a frame that was just written: the lists grow by one entry, whatever there is already, and never name a frame that
+ * is not there. */
 bool quern_sidecars_add(quern_sidecars *, int64_t frame, char why[256]);

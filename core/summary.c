@@ -1,7 +1,6 @@
 #include "summary.h"
 #include "config.h"
-#include "h5.h"
-#include "text.h"
+#include "identity.h"
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
@@ -46,44 +45,61 @@ static json_t *plugins(const quern_run *run) {
 	return list;
 }
 
-static void observers(json_t *root, const quern_series *s) {
+static json_t *observed(const quern_observed *o) {
+	json_t *one = json_object();
+	json_object_set_new(one, "unit", json_string(o->unit));
+	json_object_set_new(one, "first", number(o->first));
+	json_object_set_new(one, "last", number(o->last));
+	json_object_set_new(one, "mean", number(o->n ? o->sum / (double)o->n : NAN));
+	json_object_set_new(one, "min", number(o->least));
+	json_object_set_new(one, "max", number(o->most));
+	return one;
+}
+
+/* One object per observer, by label. */
+static json_t *observers(const quern_run *run, const quern_series *s) {
+	json_t *all = json_object();
+	for (size_t e = 0; e < run->scene->observe.n; e++) {
+		json_t *own = json_object();
+		for (size_t c = 0; c < s->n; c++)
+			if (s->column[c].output && s->column[c].observer == e)
+				json_object_set_new(own, s->column[c].output, observed(&s->column[c]));
+		json_object_set_new(all, quern_observer_label(run, e), own);
+	}
+	return all;
+}
+
+/* The grains' share of the mass: the mean of what an observer of it saw, or as it is now. */
+static double discrete_share(const quern_run *run, const quern_series *s, const quern_account *a) {
 	for (size_t c = 0; c < s->n; c++) {
 		const quern_observed *o = &s->column[c];
-		const char *dot = strchr(o->name, '.');
-		if (!dot) continue;
-		char *owner = quern_copy(o->name);
-		owner[dot - o->name] = 0;
-		json_t *map = json_object_get(root, owner);
-		if (!map) json_object_set_new(root, owner, map = json_object());
-		json_t *one = json_object();
-		json_object_set_new(one, "unit", json_string(o->unit));
-		json_object_set_new(one, "first", number(o->first));
-		json_object_set_new(one, "last", number(o->last));
-		json_object_set_new(one, "mean", number(o->n ? o->sum / (double)o->n : NAN));
-		json_object_set_new(one, "min", number(o->least));
-		json_object_set_new(one, "max", number(o->most));
-		json_object_set_new(map, dot + 1, one);
-		free(owner);
+		if (o->output && o->n && !strcmp(o->output, "share") &&
+			!strcmp(run->plan->observers[o->observer]->bound->id, "observer.discrete_share"))
+			return o->sum / (double)o->n;
 	}
+	return a->mass > 0 ? a->discrete / a->mass : 0;
 }
 
-static double mean_of(const quern_series *s, const char *name, double otherwise) {
-	for (size_t c = 0; c < s->n; c++)
-		if (!strcmp(s->column[c].name, name) && s->column[c].n)
-			return s->column[c].sum / (double)s->column[c].n;
-	return otherwise;
+/* Plugins that took the place of others on the way, a line each. */
+static json_t *replaced(const quern_run *run) {
+	json_t *list = json_array();
+	for (const char *line = run->replaced; line && *line;) {
+		const size_t n = strcspn(line, "\n");
+		json_array_append_new(list, json_stringn(line, n));
+		line += n + (line[n] != 0);
+	}
+	return list;
 }
 
-static json_t *provenance(const quern_run *run) {
-	char *resolved = quern_scene_resolved(run->scene);
+static json_t *provenance(quern_run *run) {
 	json_t *p = json_object();
 	json_object_set_new(p, "program", json_string("quern " QUERN_VERSION));
 	json_object_set_new(p, "compiler", json_string(QUERN_COMPILER));
 	json_object_set_new(p, "flags", json_string(QUERN_FLAGS));
-	json_object_set_new(p, "scene_hash", hash(quern_hash(resolved, strlen(resolved))));
+	json_object_set_new(p, "scene_hash", hash(quern_run_scene_hash(run)));
 	json_object_set_new(p, "seed", json_integer(run->scene->general.seed));
 	json_object_set_new(p, "plugins", plugins(run));
-	free(resolved);
+	if (run->replaced && *run->replaced) json_object_set_new(p, "plugins_replaced", replaced(run));
 	return p;
 }
 
@@ -114,14 +130,14 @@ bool quern_summary_write(
 	json_object_set_new(root, "mass_initial", number(run->mass_initial));
 	json_object_set_new(root, "mass_final", number(a.mass));
 	json_object_set_new(root, "mass_ledger", number(a.owed));
-	json_object_set_new(root, "mass_defect", number((a.mass + a.owed) / run->mass_initial - 1));
+	json_object_set_new(
+		root, "mass_defect", number(run->mass_initial > 0 ? (a.mass + a.owed) / run->mass_initial - 1 : 0));
 	json_object_set_new(root, "invariant_defect", number(a.defect));
 	json_object_set_new(root, "momentum", vector(a.momentum, dim));
 	json_object_set_new(root, "energy", number(a.kinetic + a.potential + a.elastic));
-	json_object_set_new(root, "discrete_share",
-		number(mean_of(series, "discrete_share.share", a.mass > 0 ? a.discrete / a.mass : NAN)));
+	json_object_set_new(root, "discrete_share", number(discrete_share(run, series, &a)));
 	json_object_set_new(root, "peak_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024));
-	observers(root, series);
+	json_object_set_new(root, "observers", observers(run, series));
 	json_object_set_new(root, "provenance", provenance(run));
 	char *text = json_dumps(root, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(17));
 	char *path = quern_format("%s/summary.json", run->folder);

@@ -1,4 +1,5 @@
 #include "text.h"
+#include "watch.h"
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
@@ -7,6 +8,7 @@
 
 static void out_of_memory(void) {
 	fputs("quern: out of memory\n", stderr);
+	quern_watch_enter(NULL, NULL); /* whoever is being called has not ended the program */
 	exit(3);
 }
 

@@ -16,11 +16,14 @@ void quern_text_addv(quern_text *, const char *fmt, va_list) __attribute__((form
 /* "" if nothing was added */
 const char *quern_text_string(const quern_text *);
 
-/* malloc'ed printf; never NULL: the program ends with a message when memory is gone */
+/* Texts, and small structures of the set-up phase: where there is no memory for these, the program ends with a message
+ * and status 3, the only place where the library does so. What grows with a scene or a file reports instead. */
+
+/* malloc'ed printf; never NULL */
 char *quern_format(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 char *quern_copy(const char *);
 
-/* zeroed memory, never NULL: small structures of the set-up phase only, fields report instead */
+/* zeroed memory, never NULL */
 void *quern_take(size_t count, size_t size);
 /* grows `*items` so that entry n exists; capacity doubles */
 void *quern_grow(void *items, size_t n, size_t *capacity, size_t size);

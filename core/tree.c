@@ -1,9 +1,12 @@
 #include "tree.h"
 #include "text.h"
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <yaml.h>
 
 /* A scene is written by hand: these limits are far above any, and keep alias bombs and binary files harmless. */
@@ -134,19 +137,40 @@ static bool next(reader *r, yaml_event_t *event) {
 
 static quern_node *value(reader *r, yaml_event_t *event, int depth);
 
-static bool duplicate(reader *r, const quern_node *map, const char *key, quern_mark mark) {
-	for (size_t i = 0; i < map->n; i++)
-		if (!strcmp(map->entries[i].key, key)) {
-			quern_report_add(r->report, mark, "'%s' stands twice in this map; first at line %zu: remove one",
-				key, map->entries[i].mark.line);
-			return true;
-		}
-	return false;
-}
-
 static void keep(quern_node *node, char *key, quern_mark mark, quern_node *child) {
 	node->entries = quern_grow(node->entries, node->n, &node->capacity, sizeof(quern_entry));
 	node->entries[node->n++] = (quern_entry) { key, mark, child };
+}
+
+static int by_key(const void *pa, const void *pb) {
+	const quern_entry *a = *(const quern_entry *const *)pa, *b = *(const quern_entry *const *)pb;
+	const int order = strcmp(a->key, b->key);
+	return order ? order : a < b ? -1 : 1;
+}
+
+/* Of a key that stands several times the first counts. */
+static void drop_repeated(reader *r, quern_node *map) {
+	const quern_entry **sorted = quern_take(map->n, sizeof *sorted), *first = NULL;
+	bool *again = quern_take(map->n, sizeof *again);
+	for (size_t i = 0; i < map->n; i++) sorted[i] = &map->entries[i];
+	qsort(sorted, map->n, sizeof *sorted, by_key);
+	for (size_t i = 0; i < map->n; i++) {
+		if (!first || strcmp(first->key, sorted[i]->key) != 0) {
+			first = sorted[i];
+			continue;
+		}
+		again[sorted[i] - map->entries] = true;
+		quern_report_add(r->report, sorted[i]->mark,
+			"'%s' stands twice in this map; first at line %zu: remove one", first->key, first->mark.line);
+	}
+	size_t kept = 0;
+	for (size_t i = 0; i < map->n; i++) {
+		if (again[i]) free(map->entries[i].key), keep(&r->dropped, NULL, map->mark, map->entries[i].value);
+		else map->entries[kept++] = map->entries[i];
+	}
+	map->n = kept;
+	free(sorted);
+	free(again);
 }
 
 static bool children(reader *r, quern_node *node, int depth) {
@@ -157,8 +181,11 @@ static bool children(reader *r, quern_node *node, int depth) {
 		quern_mark mark;
 		if (!next(r, &event)) return false;
 		mark = mark_of(r, event.start_mark);
-		if (event.type == (map ? YAML_MAPPING_END_EVENT : YAML_SEQUENCE_END_EVENT))
-			return yaml_event_delete(&event), true;
+		if (event.type == (map ? YAML_MAPPING_END_EVENT : YAML_SEQUENCE_END_EVENT)) {
+			yaml_event_delete(&event);
+			if (map) drop_repeated(r, node);
+			return true;
+		}
 		if (map) {
 			if (event.type != YAML_SCALAR_EVENT) {
 				yaml_event_delete(&event);
@@ -170,11 +197,6 @@ static bool children(reader *r, quern_node *node, int depth) {
 		}
 		quern_node *child = value(r, &event, depth + 1);
 		if (!child) return free(key), false;
-		if (map && duplicate(r, node, key, mark)) {
-			free(key);
-			keep(&r->dropped, NULL, mark, child);
-			continue;
-		}
 		keep(node, key, mark, child);
 	}
 }
@@ -285,37 +307,43 @@ static quern_node *parse(
 
 quern_tree *quern_tree_parse(const char *name, const char *data, size_t length, quern_report *report) {
 	quern_tree *tree = quern_take(1, sizeof *tree);
+	tree->source = memcpy(quern_take(length + 1, 1), data, length);
+	tree->length = length;
 	tree->root = parse(tree, name, data, length, false, report);
 	if (!tree->root && !quern_report_errors(report))
 		quern_report_add(report, (quern_mark) { .file = tree->names[0] }, "the scene is empty");
 	return tree;
 }
 
+/* NULL if it is all there, else why it is not. A pipe is refused: it could block, and a message reads the file once
+ * more, to show the line that it is about. */
+static const char *read_bytes(int fd, quern_text *text) {
+	char buffer[65536];
+	struct stat is;
+	ssize_t n = -1;
+	if (fstat(fd, &is)) return strerror(errno);
+	if (!S_ISREG(is.st_mode) && !S_ISDIR(is.st_mode)) return "it is no regular file";
+	while (text->length <= MAX_BYTES && (n = read(fd, buffer, sizeof buffer)) > 0) {
+		text->data = quern_grow(text->data, text->length + (size_t)n, &text->capacity, 1);
+		memcpy(text->data + text->length, buffer, (size_t)n);
+		text->length += (size_t)n;
+	}
+	if (text->length > MAX_BYTES) return "it is larger than 16 MiB, so it is no scene";
+	return n < 0 ? strerror(errno) : NULL;
+}
+
 quern_tree *quern_tree_read(const char *path, quern_report *report) {
 	quern_text text = { 0 };
-	char buffer[65536];
-	FILE *file = fopen(path, "rb");
-	if (!file) {
-		quern_report_add(report, (quern_mark) { .file = path }, "cannot be opened: %s", strerror(errno));
-		return quern_take(1, sizeof(quern_tree));
-	}
-	size_t n;
-	while (text.length <= MAX_BYTES && (n = fread(buffer, 1, sizeof buffer, file)) > 0) {
-		text.data = quern_grow(text.data, text.length + n, &text.capacity, 1);
-		memcpy(text.data + text.length, buffer, n);
-		text.length += n;
-	}
-	const bool unreadable = ferror(file);
-	const int why = errno;
-	fclose(file);
 	quern_tree *tree = NULL;
-	if (unreadable || text.length > MAX_BYTES) {
-		quern_report_add(report, (quern_mark) { .file = path }, "cannot be read: %s",
-			unreadable ? strerror(why) : "it is larger than 16 MiB, so it is no scene");
-		tree = quern_take(1, sizeof(quern_tree));
-	} else tree = quern_tree_parse(path, text.data ? text.data : "", text.length, report);
+	const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+	const char *why = fd < 0 ? strerror(errno) : read_bytes(fd, &text);
+	if (why)
+		quern_report_add(
+			report, (quern_mark) { .file = path }, "cannot be %s: %s", fd < 0 ? "opened" : "read", why);
+	else tree = quern_tree_parse(path, text.data ? text.data : "", text.length, report);
+	if (fd >= 0) close(fd);
 	quern_text_finish(&text);
-	return tree;
+	return tree ? tree : quern_take(1, sizeof *tree);
 }
 
 void quern_tree_destroy(quern_tree *tree) {
@@ -323,12 +351,29 @@ void quern_tree_destroy(quern_tree *tree) {
 	quern_node_destroy(tree->root);
 	for (size_t i = 0; i < tree->n_names; i++) free(tree->names[i]);
 	free(tree->names);
+	free(tree->source);
 	free(tree);
 }
 
 bool quern_node_is_null(const quern_node *node) {
 	if (!node || node->kind != QUERN_NODE_SCALAR || node->quoted) return !node;
 	return !*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null");
+}
+
+bool quern_node_bool(const quern_node *node, bool *value) {
+	static const char *const words[][3] = { { "false", "False", "FALSE" }, { "no", "No", "NO" },
+		{ "off", "Off", "OFF" }, { "true", "True", "TRUE" }, { "yes", "Yes", "YES" }, { "on", "On", "ON" } };
+	if (node->kind != QUERN_NODE_SCALAR || node->quoted) return false;
+	for (size_t i = 0; i < 18; i++)
+		if (!strcmp(words[i / 3][i % 3], node->text)) return *value = i >= 9, true;
+	return false;
+}
+
+const quern_entry *quern_node_item(const quern_node *list, const char *number) {
+	const size_t n = strspn(number, "0123456789");
+	if (list->kind != QUERN_NODE_LIST || !n || n > 9 || number[n] || (*number == '0' && n > 1)) return NULL;
+	const size_t k = strtoul(number, NULL, 10);
+	return k < list->n ? &list->entries[k] : NULL;
 }
 
 const quern_entry *quern_node_entry(const quern_node *map, const char *key) {
@@ -357,9 +402,8 @@ const char *quern_node_say(const quern_node *node, char buffer[64]) {
 /* One step of a path: the entry of that name or index, made if it is a map's new key. NULL: no such item. */
 static quern_entry *descend(quern_node *node, const char *key, quern_mark mark) {
 	if (node->kind == QUERN_NODE_LIST) {
-		char *end;
-		const unsigned long k = strtoul(key, &end, 10);
-		return *key && !*end && k < node->n ? &node->entries[k] : NULL;
+		const quern_entry *item = quern_node_item(node, key);
+		return item ? &node->entries[item - node->entries] : NULL;
 	}
 	if (node->kind == QUERN_NODE_SCALAR) { /* a plugin's bare name is opened: affine -> {affine: {}} */
 		const bool bare = !strcmp(node->text, key);
@@ -514,16 +558,38 @@ void quern_node_merge(quern_node *map, const quern_node *over) {
 		quern_node_merge_entry(map, &over->entries[i]);
 }
 
+/* One character of UTF-8, and how many bytes it has. */
+static int character_at(const char *text, unsigned *code) {
+	const unsigned char *c = (const unsigned char *)text;
+	const int n = *c < 0xc0 ? 1 : *c < 0xe0 ? 2 : *c < 0xf0 ? 3 : 4;
+	*code = n == 1 ? *c : *c & (0xffu >> (n + 1));
+	for (int i = 1; i < n; i++) {
+		if ((c[i] & 0xc0u) != 0x80u) return 1;
+		*code = *code << 6 | (c[i] & 0x3fu);
+	}
+	return n;
+}
+
+/* Control characters, line separators and the like do not come back as they are. */
+static bool must_be_escaped(unsigned code) {
+	return code < 32 || (code >= 0x7f && code < 0xa0) || code == 0x2028 || code == 0x2029 || code == 0xfeff ||
+		   code == 0xfffe || code == 0xffff;
+}
+
 static void print_scalar(const quern_node *node, quern_text *out) {
-	if (!node->quoted) {
+	/* a plain text may have stood where a comma or a bracket means nothing */
+	if (!node->quoted && !node->text[strcspn(node->text, ",[]{}#:\n\"'")]) {
 		quern_text_add(out, "%s", node->text);
 		return;
 	}
 	quern_text_add(out, "\"");
-	for (const char *c = node->text; *c; c++)
+	unsigned code;
+	for (const char *c = node->text; *c; c += character_at(c, &code)) {
+		const int n = character_at(c, &code);
 		if (*c == '"' || *c == '\\') quern_text_add(out, "\\%c", *c);
-		else if ((unsigned char)*c < 32) quern_text_add(out, "\\x%02x", (unsigned)*c);
-		else quern_text_add(out, "%c", *c);
+		else if (must_be_escaped(code)) quern_text_add(out, "\\u%04x", code);
+		else quern_text_add(out, "%.*s", n, c);
+	}
 	quern_text_add(out, "\"");
 }
 

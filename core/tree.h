@@ -14,7 +14,8 @@ typedef struct quern_entry {
 
 struct quern_node {
 	quern_node_kind kind;
-	bool quoted; /* a scalar in quotes is text, never null or a number */
+	bool
+		quoted; /* a scalar in quotes is text: never null, a bare number, true or false; "5 mm" is text anyway */
 	quern_mark mark;
 	char *text; /* scalar */
 	quern_entry *entries;
@@ -26,23 +27,30 @@ typedef struct quern_tree {
 	quern_node *root; /* NULL if the document could not be read */
 	char **names;
 	size_t n_names, names_capacity;
+	char *source; /* the text it was read from, `length` bytes; NULL if it was not read */
+	size_t length;
 } quern_tree;
 
-/* Reads a file; faults (syntax, duplicate keys, too deep, too many aliases, too large) go to the report. */
+/* Reads a regular file; faults (syntax, duplicate keys, too deep, too many aliases, too large) go to the report. */
 quern_tree *quern_tree_read(const char *path, quern_report *);
 quern_tree *quern_tree_parse(const char *name, const char *data, size_t length, quern_report *);
 void quern_tree_destroy(quern_tree *);
 /* A copy of the text that lives as long as the tree. */
 const char *quern_tree_keep(quern_tree *, const char *);
 
-/* Applies "path.to.key=value" with value in YAML; null removes the key. A number in the path counts list
- * items from 0. Faults are reported under the option's own text. */
+/* Applies "path.to.key=value" with value in YAML; null removes the key. Items of a list are named by their number from
+ * 0, written as people do: 7, not 07 or +7. Faults are reported under the option's own text. */
 void quern_tree_set(quern_tree *, const char *assignment, quern_report *);
 
 /* The value of a key, or NULL; NULL also where the value is null. */
 quern_node *quern_node_find(const quern_node *map, const char *key);
 const quern_entry *quern_node_entry(const quern_node *map, const char *key);
 bool quern_node_is_null(const quern_node *);
+/* The item of a list that is named by its number from 0, or NULL. */
+const quern_entry *quern_node_item(const quern_node *list, const char *number);
+/* true, yes and on, or false, no and off, as YAML has them: in small letters, with a capital, or in capitals. False if it
+ * is none of them. */
+bool quern_node_bool(const quern_node *, bool *value);
 
 /* Building and writing: a dotted name opens maps on its way. Each returns the new node, owned by its parent. */
 quern_node *quern_node_create(quern_node_kind);

@@ -55,13 +55,10 @@ void harness_settle(quern_run *run) {
 quern_status harness_try(quern_run *run, int64_t n) {
 	quern_clock *c = &run->clock;
 	harness_settle(run);
-	if (c->frame < 0) c->frame = 0;
+	if (c->frame < 0) quern_run_frame(run);
 	for (int64_t i = 0; i < n && run->status == QUERN_OK; i++) {
 		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
-		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) {
-			c->frame++;
-			c->at = c->steps_in = 0;
-		}
+		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) quern_run_frame(run);
 	}
 	quern_plan_refresh(run->plan);
 	return run->status;

@@ -7,11 +7,11 @@ ROWS = [
     ("grains", "moving and fixed, at the end", lambda s: f"{s['grains']}"),
     ("points", "at the end", lambda s: f"{s['points']}"),
     ("wall time", "settling apart", lambda s: f"{s['wall_seconds'] - s['settle_seconds']:.1f} s, settling {s['settle_seconds']:.1f} s, {s['threads']} threads"),
-    ("run-out", "99 % of the connected mass", lambda s: f"{s['runout']['front']['last']:.4f} m"),
-    ("height", "99 % of the connected mass", lambda s: f"{s['runout']['height']['last']:.4f} m"),
+    ("run-out", "99 % of the connected mass", lambda s: f"{s['observers']['runout']['front']['last']:.4f} m"),
+    ("height", "99 % of the connected mass", lambda s: f"{s['observers']['runout']['height']['last']:.4f} m"),
     ("discrete share", "of the mass, mean over time", lambda s: f"{s['discrete_share']:.3f}"),
-    ("ledger", "sum of |entries| over the mass, mean over time", lambda s: f"{s['ledger']['entries']['mean']:.4f}"),
-    ("carried mass", "over that at the start, minus 1, last and worst", lambda s: f"{s['ledger']['carried']['last']:+.4f}, {max((s['ledger']['carried'][k] for k in ('min', 'max')), key=abs):+.4f}"),
+    ("ledger", "sum of |entries| over the mass, mean over time", lambda s: f"{s['observers']['ledger']['entries']['mean']:.4f}"),
+    ("carried mass", "over that at the start, minus 1, last and worst", lambda s: f"{s['observers']['ledger']['carried']['last']:+.4f}, {max((s['observers']['ledger']['carried'][k] for k in ('min', 'max')), key=abs):+.4f}"),
     ("invariants", "mass and momentum, relative, worst step", lambda s: f"{s['invariant_defect']:.1e}"),
 ]
 

@@ -18,8 +18,12 @@
  * Units.    SI. A 2-D scene is a slab one metre thick: kg, N, Pa and kg/m^3 mean the same in both
  *           dimensions. 2-D vectors have two components, axial ones (spin, torque, slip) one.
  * Growth.   Structs grow at the end only. What a plugin fills carries its size (or a stride in
- *           quern_library); what the host fills needs none, since a host refuses a plugin whose minor
- *           version is newer than its own. A breaking change renames the exported symbol. */
+ *           quern_library), and the host takes an older, shorter one: what it does not know is zero. Sets,
+ *           slots, stages and outputs carry none yet, so they cannot grow. What the host fills needs none,
+ *           since a host refuses a plugin whose minor version is newer than its own. A breaking change
+ *           renames the exported symbol.
+ * Looks.    The host looks at all tables when it loads a plugin, and refuses by one sentence what cannot be
+ *           true: rows without an end, members outside the instance, a function missing for a dimension. */
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
@@ -86,11 +90,12 @@ enum {
 
 /* One row feeds the scene reader, `describe`, the JSON Schema, the resolved scene and the fuzzer. */
 typedef struct quern_param {
-	const char *name;               /* scene key; a dot opens a map: "radius.mean" */
-	const char *unit, *doc;         /* SI: "Pa", "kg/m^3", "1" */
-	const char *const *choices;     /* NULL-terminated, or NULL */
-	const char *text;               /* default of a T_TEXT */
-	const char *from;               /* default taken from this published quantity, see publish() */
+	const char *name;           /* scene key; a dot opens a map: "radius.mean" */
+	const char *unit, *doc;     /* SI: "Pa", "kg/m^3", "1" */
+	const char *const *choices; /* NULL-terminated, or NULL */
+	const char *text;           /* default of a T_TEXT */
+	const char *from; /* default taken from this published quantity, see publish(); where nobody publishes it,
+	                     `def` if that is not 0, else the scene must give the value, or may leave out a MAYBE */
 	const struct quern_param *rows; /* T_LIST: the rows of one item */
 	quern_real def, planar;
 	quern_real min, max;        /* inclusive unless *_OPEN; min == max: unbounded */
@@ -146,6 +151,8 @@ typedef enum {
 	QUERN_ID          /* 1 int64_t, unique for ever within its set; the host numbers new entries */
 } quern_shape;
 
+#define QUERN_NO_TARGET (-1) /* an INDEX that points at nothing */
+
 enum {
 	QUERN_OPTIONAL = 1, /* attaches to the field if somebody else needs it; its column is NULL otherwise */
 	QUERN_OTHERS = 2,   /* this READ looks at other entities: if its stage changes the field too, the
@@ -164,7 +171,8 @@ typedef struct quern_use {
 	const char *when;   /* parameter of this plugin: the row counts only if that is not zero */
 	const char *with;   /* another field: the row counts only if that one exists */
 	const char *target; /* INDEX: the set it points into; rewritten when that set is reordered, and
-	                           an entry whose target is gone is dropped */
+	                           an entry whose target is gone is dropped. A field that may hold
+	                           QUERN_NO_TARGET, which is left as it is, has it as `initial` */
 	quern_real initial; /* of a new entry; diagonal of SYMMETRIC and TENSOR */
 	uint8_t access, shape, flags;
 	uint8_t hook; /* which function of the kind touches it (0: the main one) */
@@ -225,7 +233,8 @@ typedef struct quern_host {
 	uint32_t (*workers)(quern_run *);
 	/* [stage, or this worker's own in a parallel body] 64-byte aligned, kept until asked for more. */
 	void *(*scratch)(quern_run *, uint32_t worker, size_t bytes);
-	/* [stage] Zeroed memory until the stage returns. NULL if there is none: return QUERN_E_MEMORY. */
+	/* [stage] Zeroed, 64-byte aligned memory until the stage returns, also of 0 bytes. NULL only if memory is
+	 * gone: return QUERN_E_MEMORY. */
 	void *(*memory)(quern_run *, size_t bytes);
 	/* [stage] Sum in a fixed binary tree over the index: the same for any number of threads. */
 	quern_real (*sum)(quern_run *, size_t n, const quern_real *);

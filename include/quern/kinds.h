@@ -7,7 +7,9 @@
 extern "C" {
 #endif
 
-enum { QUERN_MOST_USES = 16 }; /* rows of a plugin in a slot */
+/* Most rows that the uses of one plugin in a slot may have, whatever its kind; a plugin with more is refused when it is
+ * loaded. Whoever calls plugins sizes its arrays of columns by it. The rows of a solver's stages are the solver's own. */
+enum { QUERN_MOST_USES = 32 };
 
 /* ---- contact: one law, one pair of materials, one dimension per batch ----
  * The first of a pair is the grain of lower id, for ever; against a body it is the grain. Open pairs may be in a
@@ -282,6 +284,7 @@ typedef struct quern_output {
 typedef struct quern_observer_batch {
 	uint32_t n, dim; /* entries of this leaf; `whole`: 0 */
 	quern_real time, gravity[3], lower[3], upper[3];
+	/* by row of `uses`; in `map` the columns of `set` begin at the leaf's first entry, others are whole */
 	const quern_column *use;
 	const uint32_t *count; /* `whole`: entries by row of `uses`; NULL in `map` */
 } quern_observer_batch;
@@ -289,7 +292,7 @@ typedef struct quern_observer_batch {
 typedef struct quern_observer_ops {
 	uint32_t size, pad;
 	const char *set;             /* that `map` runs over; NULL: `whole` */
-	const quern_output *outputs; /* NULL-name terminated */
+	const quern_output *outputs; /* NULL-name terminated; what comes out must be finite */
 	void (*map)(
 		const void *self, const quern_observer_batch *, quern_real *partial); /* [batch] one per output */
 	quern_status (*whole)(const void *self, const quern_observer_batch *, quern_real *out, const quern_host *,

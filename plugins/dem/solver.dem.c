@@ -40,8 +40,8 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
 	QUERN_PARAM_AS(dem, overlap_most, "overlap.most", "1",
-		"Overlap over the smaller radius that ends the run where it lasts; 0: none does.",
-		.def = 0.1, .max = 1e6),
+		"Overlap over the smaller radius that ends the run where it lasts; 0: none does.", .def = 0.1,
+		.max = 1e6),
 	QUERN_PARAM_AS(dem, overlap_start, "overlap.start", "1",
 		"Overlap over the smaller radius that grains of place and file may have at the start.", .def = 0.01,
 		.max = 1e6),
@@ -95,7 +95,7 @@ static const quern_slot slots[] = {
 };
 
 #define DISPLACEMENT                                                                                         \
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR,                                                 \
+	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY,                            \
 		.doc = "Farthest way of a grain since the last list; infinite: the list is stale.")
 #define FIXED(access)                                                                                        \
 	F("grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed",                        \

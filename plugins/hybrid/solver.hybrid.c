@@ -97,7 +97,7 @@ static const quern_use update_uses[] = { F("grain.position", "m", QUERN_UPDATE, 
 	F("total.draws", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Radii drawn for new grains."),
 	F("total.updates", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Zone updates so far."),
 	F("total.mass_initial", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass at the release."),
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR),
+	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY),
 	F("total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX),
 	F("total.mass_defect", "1", QUERN_READ, QUERN_SCALAR),
 	F("total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR), QUERN_END_USES };
@@ -138,7 +138,7 @@ static const quern_use back_uses[] = { F("grain.position", "m", QUERN_UPDATE, QU
 	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR),
 	F("grain.weight", "1", QUERN_READ, QUERN_SCALAR), FIXED, F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR),
 	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), F("mixture.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR),
+	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY),
 	F("mixture.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR),
 	F("mixture.change", "m/s", QUERN_READ, QUERN_VECTOR), QUERN_END_USES };
 

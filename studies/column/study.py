@@ -25,18 +25,18 @@ def run(out, model, seed, threads):
     summary = out / "summary.json"
     if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
         sets = [f"seed={seed}"] + MODELS[model]
-        subprocess.run([ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--quiet", "--threads", str(threads)]
-                       + [word for one in sets for word in ("--set", one)], check=True)
+        subprocess.run([ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--force", "--quiet"]
+                       + ["--threads", str(threads)] + [word for one in sets for word in ("--set", one)], check=True)
     return json.loads(summary.read_text())
 
 
 def row(model, seed, s):
     """One run as a row of the table."""
-    ledger = s.get("ledger", {})
+    ledger = s["observers"].get("ledger", {})
     share = f"{s['discrete_share']:.3f}" if model == "hybrid" else ""
     entries = f"{ledger['entries']['mean']:.4f}" if model == "hybrid" else ""
     carried = f"{ledger['carried']['mean']:+.4f}, {max((ledger['carried'][k] for k in ('min', 'max')), key=abs):+.4f}" if model == "hybrid" else ""
-    return (f"| {model} | {seed} | {s['runout']['front']['last']:.4f} | {s['runout']['height']['last']:.4f} | {s['settle_seconds']:.0f} "
+    return (f"| {model} | {seed} | {s['observers']['runout']['front']['last']:.4f} | {s['observers']['runout']['height']['last']:.4f} | {s['settle_seconds']:.0f} "
             f"| {s['wall_seconds'] - s['settle_seconds']:.0f} | {share} | {entries} | {carried} | {s['invariant_defect']:.0e} |")
 
 
@@ -59,7 +59,7 @@ def report(runs, threads):
               "| model | figure | difference | twice its standard error |", "|---|---|---|---|"]
     for model in (model for model in MODELS if model != "grains"):
         for figure, key in FIGURES:
-            off, error = difference(*([s["runout"][key]["last"] for s in runs[m]] for m in (model, "grains")))
+            off, error = difference(*([s["observers"]["runout"][key]["last"] for s in runs[m]] for m in (model, "grains")))
             lines.append(f"| {model} | {figure} | {100 * off:+.1f} % | {100 * error:.1f} % |")
     return "\n".join(lines) + "\n"
 

@@ -28,7 +28,8 @@ def run(out, sets, threads=1, until=None):
     """Runs the column into `out` unless it is there; returns its summary, with the processor time it took."""
     summary = out / "summary.json"
     if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
-        command = [ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--quiet", "--threads", str(threads)]
+        command = [ROOT / "build/quern", "run", ROOT / "configs/column.yaml", "-o", out, "--force", "--quiet", "--threads",
+                   str(threads)]
         for one in sets:
             command += ["--set", one]
         if until is not None:
@@ -70,9 +71,9 @@ def profile(out):
 
 
 def measure(out, summary):
-    return {"core_seconds": summary["core_seconds"], "front": summary["runout"]["front"]["last"],
-            "height": summary["runout"]["height"]["last"], "share": summary["discrete_share"],
-            "entries": summary["ledger"]["entries"]["mean"], "carried": summary["ledger"]["carried"]["last"],
+    return {"core_seconds": summary["core_seconds"], "front": summary["observers"]["runout"]["front"]["last"],
+            "height": summary["observers"]["runout"]["height"]["last"], "share": summary["discrete_share"],
+            "entries": summary["observers"]["ledger"]["entries"]["mean"], "carried": summary["observers"]["ledger"]["carried"]["last"],
             "defect": summary["invariant_defect"], "profile": profile(out).tolist()}
 
 

@@ -47,13 +47,10 @@ static quern_run *open_run(void) {
 static void steps(quern_run *run, int n) {
 	quern_clock *c = &run->clock;
 	c->settled = 1;
-	if (c->frame < 0) c->frame = 0;
+	if (c->frame < 0) quern_run_frame(run);
 	for (int i = 0; i < n && run->status == QUERN_OK; i++) {
 		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
-		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) {
-			c->frame++;
-			c->at = c->steps_in = 0;
-		}
+		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) quern_run_frame(run);
 	}
 }
 
@@ -106,7 +103,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
 	const char *folder = getenv("TMPDIR"); /* best in memory */
 	snprintf(path, sizeof path, "%.200s", folder ? folder : "/tmp");
 	run->folder = quern_copy(path);
-	if (quern_checkpoint_write(run, 1) != QUERN_OK) abort();
+	if (quern_checkpoint_write(run, run->clock.frame + 1) != QUERN_OK) abort();
 	quern_run_destroy(run);
 	strcat(path, "/checkpoint.h5");
 	FILE *f = fopen(path, "rb");
@@ -197,28 +194,42 @@ static void edit(hid_t file, bytes *b) {
 	}
 }
 
+static bool save(hid_t file, char why[256]) {
+	H5Fflush(file, H5F_SCOPE_GLOBAL);
+	const ssize_t n = H5Fget_file_image(file, NULL, 0);
+	char *edited = n > 0 ? malloc(512 + (size_t)n) : NULL;
+	if (!edited || H5Fget_file_image(file, edited + 512, (size_t)n) != n) abort();
+	H5Fclose(file);
+	quern_h5_seal(edited, 512 + (size_t)n);
+	const bool good = quern_save_bytes(path, edited, 512 + (size_t)n, why);
+	free(edited);
+	return good;
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-	char why[256];
+	char broken[256];
 	int64_t rows = 0;
+	quern_text said = { 0 }, why = { 0 };
 	bytes b = { data, data + size };
 	bool good;
-	if (size >= 5 && !memcmp(data, "quern", 5)) good = quern_save_bytes(path, data, size, why);
+	if (size >= 5 && !memcmp(data, "quern", 5)) good = quern_save_bytes(path, data, size, broken);
 	else {
-		quern_h5 h = { .file = open_image(), .user_block = 512 };
-		edit(h.file, &b);
-		good = quern_h5_save(&h, path, why);
+		const hid_t file = open_image();
+		edit(file, &b);
+		good = save(file, broken);
 	}
 	if (!good) abort();
 	quern_run *run = open_run();
-	*why = 0;
-	good = quern_checkpoint_read(run, path, &rows, why) == QUERN_OK;
-	if (!good && (!*why || !memchr(why, 0, sizeof why))) abort();
+	good = quern_checkpoint_read(run, path, size % 2, &rows, &said, &why) == QUERN_OK;
+	if (!good && !why.length) abort();
 	if (!size && !good) {
-		fprintf(stderr, "the checkpoint as it was written is refused: %s\n", why);
+		fprintf(stderr, "the checkpoint as it was written is refused: %s\n", why.data);
 		abort();
 	}
 	if (good) quern_run_account(run);
 	if (!size) steps(run, STEPS);
+	quern_text_finish(&said);
+	quern_text_finish(&why);
 	quern_run_destroy(run);
 	unlink(path);
 	return 0;

@@ -10,7 +10,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 		quern_scene_destroy(scene);
 		return 0;
 	}
-	free(quern_scene_resolved(scene));
+	free(quern_scene_resolved(scene, NULL));
 	quern_run *run = quern_run_create(scene, 1);
 	if (run) quern_run_destroy(run);
 	return 0;

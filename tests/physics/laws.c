@@ -18,7 +18,7 @@ static quern_run *touching(int dim, const char *laws, bool fixed) {
 		"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
 		"time: {end: 1e-6, step: 1e-9}, output: {fields: [contact.force, touch.force, contact.age, "
 		"touch.age,\n"
-		"  contact.mark0, contact.mark12, touch.mark0, touch.mark12]},\n"
+		"  contact.mark0, contact.mark28, touch.mark0, touch.mark28]},\n"
 		"bodies: [{plane: {point: %s, normal: %s}}],\n"
 		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, contact: [%s],\n"
 		"  place: [{position: [0.01, %s0.00099]}, {position: [0.01199, %s0.00099], fixed: %s},\n"
@@ -59,7 +59,7 @@ static int entry_with(quern_run *run, const char *set, double mark) {
 	return -1;
 }
 
-/* A law that counts steps in an INDEX, reads ids and flags, and fills thirteen more columns finds all of them its own. */
+/* A law that counts steps in an INDEX, reads ids and flags, and fills 29 more columns finds all of them its own. */
 static void rows_of_every_kind(void **state) {
 	(void)state;
 	for (int dim = 2; dim <= 3; dim++)
@@ -72,14 +72,14 @@ static void rows_of_every_kind(void **state) {
 			assert_true(pair >= 0 && floor >= 0);
 			assert_int_equal(harness_field(run, "contact.age").index[pair], 4);
 			assert_int_equal(harness_field(run, "touch.age").index[floor], 4);
-			assert_true(harness_field(run, "contact.mark12").real[0][pair] == 13 + (fixed ? 2e6 : 0));
-			assert_true(harness_field(run, "touch.mark12").real[0][floor] == 12);
+			assert_true(harness_field(run, "contact.mark28").real[0][pair] == 29 + (fixed ? 2e6 : 0));
+			assert_true(harness_field(run, "touch.mark28").real[0][floor] == 28);
 			if (!fixed)
 				assert_true(entry_with(run, "touch", 1001) >= 0); /* of a body both ids are the first's */
 			for (uint32_t i = 0; i < harness_count(run, "contact"); i++)
 				if ((int)i != pair) {
 					assert_int_equal(harness_field(run, "contact.age").index[i], -1);
-					assert_true(harness_field(run, "contact.mark12").real[0][i] == -13);
+					assert_true(harness_field(run, "contact.mark28").real[0][i] == -29);
 				}
 			harness_close(run);
 		}

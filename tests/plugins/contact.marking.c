@@ -31,7 +31,9 @@ static const quern_use uses[] = { { .field = "contact.age",
 		.shape = QUERN_INDEX,
 		.flags = QUERN_OTHERS | QUERN_OPTIONAL },
 	MARK(0), MARK(1), MARK(2), MARK(3), MARK(4), MARK(5), MARK(6), MARK(7), MARK(8), MARK(9), MARK(10),
-	MARK(11), MARK(12), QUERN_END_USES };
+	MARK(11), MARK(12), MARK(13), MARK(14), MARK(15), MARK(16), MARK(17), MARK(18), MARK(19), MARK(20),
+	MARK(21), MARK(22), MARK(23), MARK(24), MARK(25), MARK(26), MARK(27), MARK(28), QUERN_END_USES };
+_Static_assert(sizeof uses / sizeof *uses == QUERN_MOST_USES + 1, "as many rows as there may be");
 
 /* Mark k: 1000 times the first id plus the second plus k, and a million where the first is fixed, two where the second is. */
 static void force(const void *self, const quern_contact_batch *b) {

@@ -1,4 +1,6 @@
-"""quern check: every installed plugin passes, and a plugin broken on purpose fails in the property that it breaks."""
+"""quern check: every installed plugin passes, and every property that it states is seen to fail on a plugin that breaks it
+on purpose."""
+import concurrent.futures
 import re
 import tempfile
 
@@ -10,13 +12,34 @@ def failures(text):
     return set(re.findall(r"^  FAILED  ([^:]+):", text, re.M))
 
 
+def at_once(function, items):
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        return list(pool.map(function, items))
+
+
+def properties_of(path):
+    done = workshop.subprocess.run([workshop.QUERN, "check", path], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, f"{path}: exit status {done.returncode}\n{done.stdout}"
+    kind = str(path).rsplit("/", 1)[1].split(".")[0]
+    return {(kind, name) for name in re.findall(r"^  ok +([^:]+):", done.stdout, re.M)}
+
+
 def check_installed():
+    """All of them pass; returns what they are said to keep, as (kind, property)."""
     paths = sorted(path for path in PLUGINS.glob("*.so") if not re.search(r"\.v[34]\.so$", path.name))
     assert len(paths) > 10
-    for path in paths:
-        done = workshop.subprocess.run([workshop.QUERN, "check", path], capture_output=True, text=True, timeout=300)
-        assert done.returncode == 0, f"{path.stem}: exit status {done.returncode}\n{done.stdout}"
+    stated = set().union(*at_once(properties_of, paths))
     print(f"{len(paths)} installed plugins pass")
+    return stated
+
+
+def check_templates():
+    """Those that `quern new` writes pass too; an observer that maps is among them alone."""
+    stated = set()
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in ("observer", "solver"):
+            stated |= properties_of(compile(source(kind), f"{kind}.mine", folder))
+    return stated
 
 
 LINEAR, VERLET = "dem/contact.linear.c", "dem/integrator.velocity_verlet.c"
@@ -29,7 +52,14 @@ def around(statement):
     return (ADD, ADD.replace("force(2, self, b); }", "force(2, self, b); " + statement + " }"))
 
 
-# source, change, the property that must fail
+INIT, UNISTD = "(void)setup, (void)err;", ("#include <quern/contact.h>", "#include <quern/contact.h>\n#include <unistd.h>")
+PAIR = "if (n < cap) out[n] = (quern_pair) { (int32_t)i, (int32_t)k };\n\t\t\t\tn++;"
+NO_FEATURES = "static uint32_t none(const void *self, const quern_pose *pose, const quern_real x[3], quern_real reach,\n" \
+              "\tuint32_t cap, int32_t *feature) { (void)self, (void)pose, (void)x, (void)reach, (void)cap, (void)feature; " \
+              "return 0; }\n"
+FIXED = '{ .field = "grain.fixed", .unit = "1", .access = QUERN_READ, .shape = QUERN_SCALAR }, QUERN_END_USES'
+
+# a plugin's source or the template of a kind, change, the property that must fail
 BROKEN = [
     ("adds nothing", LINEAR, [(FORCE, "b->force[0][i] = f.x;")], "laws add up"),
     ("pushes one body only", LINEAR, [(FORCE, "b->force[0][i] += f.x + 1e-6;")], "action and reaction"),
@@ -48,7 +78,20 @@ BROKEN = [
     ("says nothing", LINEAR, [('"Normal spring k_n."', '""')], "parameter rows"),
     ("has no unit", LINEAR, [('"N/m", "Normal', '"newtonn/m", "Normal')], "parameter rows"),
     ("starts outside", LINEAR, [(".def = 0.5, .max = 10", ".def = 11, .max = 10")], "parameter rows"),
-    ("uses nobody's field", LINEAR, [('.field = "contact.slip"', '.field = "slip"')], "uses"),
+    ("has two units for one field", LINEAR, [('.unit = "rad/s"', '.unit = "m/s"')], "uses"),
+    ("says nothing of itself", "contact", [("A spring and a dashpot with viscous friction.", "")], "identity"),
+    ("cannot be set up", LINEAR, [(INIT, 'return setup->host->fail(err, QUERN_E_PARAM, NULL, "no");')], "set-up"),
+    ("moves", LINEAR, [(INIT, INIT + ' if (chdir("/")) return QUERN_E_IO;'), UNISTD], "environment"),
+    ("lets exceptions strike", LINEAR, [(INIT, INIT + " __builtin_ia32_ldmxcsr(0x1d80);")], "environment"),
+    ("has no period", "contact", [("3.141592653589793 * __builtin_sqrt", "0 * __builtin_sqrt")],
+     "period, stiffness, reach"),
+    ("is driven by its dashpot", "contact", [("= quern_vec_axpy(-spring, n, f);",
+                                              "= quern_vec_scale(-1, quern_vec_axpy(-spring, n, f));")],
+     "dashpots only take"),
+    ("stores too much", "contact", [("b->stored[i] += 0.5 * spring", "b->stored[i] += 2 * spring")], "books of energy"),
+    ("keeps what it has stored", "contact", [("b->stored[i] +=", "b->stored[i] += 1e-6 +")], "silence when apart"),
+    ("has a stiffness of its own", "contact", [("? p.stiffness * overlap[i]", "? (p.stiffness + 100) * overlap[i]")],
+     "homogeneous in (stiffness, mass)"),
     ("does not turn", "mpm_hypo/material.elastic.c", [
         ("const tensor l = TENSOR_AT(b->gradient, i, dim);",
          "tensor l = TENSOR_AT(b->gradient, i, dim); l.xy = l.yx = 0.5 * (l.xy + l.yx);")], "rotation"),
@@ -76,22 +119,158 @@ BROKEN = [
     ("misses pairs", "dem/neighbours.cells.c", [("if (c + 1 < count) out[n++] = c + 1;", "")],
      "the same pairs as by brute force"),
     ("bends normals", "bodies/body.plane.c", [("/ length;", "/ (1.001 * length);")], "unit normals"),
+    ("finds pairs twice", "neighbours", [(PAIR, f"for (int t = 0; t < 2; t++) {{ {PAIR} }}")],
+     "each once, in its block"),
+    ("counts what fits", "neighbours", [("\treturn n;\n", "\treturn n < cap ? n : cap;\n")], "room"),
+    ("forgets now and then", "neighbours", [("\treturn n;\n", "\tstatic int calls; return n - (++calls % 3 == 0);\n")],
+     "threads"),
+    ("drifts", "integrator", [("x[i] + dt * nv[i]", "x[i] + 1.001 * dt * nv[i]")], "no force"),
+    ("slows down a spring", "integrator", [("->drag * dt)", "->drag * dt + 5 * dt)")], "a spring"),
+    ("stretches gaps", "body", [("= side * (distance - size)", "= 1.01 * side * (distance - size)")],
+     "gap along the normal"),
+    ("enlarges grains", "body", [("- radius[i]", "- 1.1 * radius[i]")], "gap and radius"),
+    ("is larger than it says", "body", [(": p->centre[k] - p->radius", ": p->centre[k]")], "bounds"),
+    ("does not move", "body", [("quern_vec_add(drift, quern_vec_cross(spin, arm))", "quern_vec_cross(spin, arm)")],
+     "moved pose"),
+    ("does not turn", "body", [("quern_vec_add(drift, quern_vec_cross(spin, arm))", "drift")], "turned pose"),
+    ("hides a feature", "body", [(".bounds = bounds", ".bounds = bounds, .features = none"),
+                                 ("static const quern_body_ops", NO_FEATURES + "static const quern_body_ops")], "features"),
+    ("is denser than it says", "material", [("*density = m->density;", "*density = 1.1 * m->density;")],
+     "moduli and density"),
+    ("relaxes", "material", [("quern_max(-trace / dim, 0)", "0.9 * quern_max(-trace / dim, 0)")], "assign twice"),
+    ("bursts", "material", [("open ? 0 :", "open ? 0 : b->density[i] > 1.05 * m->density ? 0.0 / 0.0 :")],
+     "large gradients"),
+    ("bends lines", "shape", [("= 1 - (t - cell);", "= 1 - (t - cell) * (t - cell);"),
+                              ("= t - cell;", "= (t - cell) * (t - cell);")], "linear completeness"),
+    ("leans", "shape", [("slope[0][i] = -inverse;", "slope[0][i] = -1.1 * inverse;")], "slopes sum to zero"),
+    ("jumps", "shape", [("= 1 - (t - cell);", "= t - cell < 0.5 ? 1 : 0;"), ("= t - cell;", "= t - cell < 0.5 ? 0 : 1;")],
+     "no jumps"),
+    ("has large walls", "shape", [("*wall = 0.5;", "*wall = 0.6;")], "shares and stiffness"),
+    ("pulls apart what is together", "coupling", [("* (other[i] - v[i]) : 0;", "* (other[i] - v[i]) + 1e-3 : 0;")],
+     "equal velocities stay"),
+    ("overdoes it", "coupling", [("both ? share * (", "both ? 2.5 * share * (")], "no energy gained"),
+    ("marks the end of numbers", "oracle", [("height - up[i];", "(height - up[i]) / (up[i] > 0.5 ? 0 : 1);")],
+     "levels are numbers"),
+    ("wishes for more", "oracle", [(": QUERN_CONTINUUM;", ": 7;")], "wishes are zones"),
+    ("leaves the region", "packer", [("!job->inside(job, spot.x) || ", "")], "inside the region"),
+    ("makes grains small", "packer", [(".radius = job->radius(job)", ".radius = 0.9 * job->radius(job)")],
+     "the radius that waits"),
+    ("remembers", "packer", [("const quern_real pitch = 2", "static int calls; const quern_real pitch = (2 + 1e-6 * ++calls)")],
+     "the same again"),
+    ("does nothing", "packer", [("\tfor (uint64_t k = 0;", "\tif (pitch > 0) return;\n\tfor (uint64_t k = 0;")],
+     "places grains"),
+    ("writes itself", "packer", [("const quern_real pitch", "((lattice *)(uintptr_t)self)->gap *= 1.1; const quern_real pitch")],
+     "self"),
+    ("explains no output", "observer", [("Largest speed.", "")], "outputs"),
+    ("counts leaves", "observer", [("partial[MOVING] = 0;", "partial[MOVING] = 1;")], "partition"),
+    ("counts calls", "observer", [("partial[MOVING] = 0;", "partial[MOVING] = 0; static int calls; partial[TOP] = ++calls;")],
+     "threads"),
+    ("has one output more", "observer", [("partial[MOVING] = 0;", "partial[MOVING] = partial[3] = 0;")], "guards"),
+    ("has no end of motion", "observer", [(">= threshold ? 1 : 0", ">= threshold ? 1 / (threshold - threshold) : 0")],
+     "finite"),
+    ("takes an index for a number", "observer", [("QUERN_VECTOR }, QUERN_END_USES", "QUERN_VECTOR }, " + FIXED)], "uses"),
+    ("explains no set", "solver", [("Discs or spheres.", "")], "sets"),
+    ("explains no slot", "solver", [("slots[] = { {", "slots[] = { { .name = \"law\", .kind = QUERN_CONTACT, .list = 1, "
+                                     ".stage = { \"mine.move\" } }, {")], "slots"),
+    ("explains no stage", "solver", [("Places the grains.", "")], "stages"),
 ]
 
 
 def broken_id(path):
-    return path.rsplit("/", 1)[1][:-2]
+    return path.rsplit("/", 1)[1][:-2] if "/" in path else path + ".mine"
 
 
-def check_broken():
-    for what, path, changes, wanted in BROKEN:
-        with tempfile.TemporaryDirectory() as folder:
-            object_file = compile(source(path, *changes), broken_id(path), folder, beside=path.rsplit("/", 1)[0])
-            done = workshop.subprocess.run([workshop.QUERN, "check", object_file], capture_output=True, text=True)
-            found = failures(done.stdout)
-            assert wanted in found, f"a plugin that {what} passes '{wanted}'; it fails in {sorted(found)}"
-            assert done.returncode == 2, f"a plugin that {what} ends with exit status {done.returncode}"
+def check_one(broken):
+    what, path, changes, wanted = broken
+    with tempfile.TemporaryDirectory() as folder:
+        beside = path.rsplit("/", 1)[0] if "/" in path else ""
+        object_file = compile(source(path, *changes), broken_id(path), folder, beside=beside)
+        done = workshop.subprocess.run([workshop.QUERN, "check", object_file], capture_output=True, text=True)
+        found = failures(done.stdout)
+        assert wanted in found, f"a plugin that {what} passes '{wanted}'; it fails in {sorted(found)}\n{done.stderr}"
+        assert done.returncode == 2, f"a plugin that {what} ends with exit status {done.returncode}"
+    return {(broken_id(path).split(".")[0], name) for name in found}
+
+
+def check_broken(stated):
+    failed = set().union(*at_once(check_one, BROKEN))
     print(f"{len(BROKEN)} plugins broken on purpose fail where they should")
+    # what all kinds have in common is the same code for each of them
+    common = {name for kind in ("contact", "shape") for k, name in failed if k == kind} & {
+        "identity", "parameter rows", "uses", "set-up", "parameters", "finite", "batches", "threads", "guards", "inputs",
+        "self", "arithmetic", "environment"}
+    never = {(kind, name) for kind, name in stated - failed if name not in common}
+    assert not never, f"stated, and never seen to fail: {sorted(never)}"
+    print(f"each of {len(stated)} properties that check states is seen to fail")
+
+
+ADHESION = [  # the pull of grains that attract each other as long as they touch
+    ("friction;\n} law;", "friction, pull;\n} law;"),
+    ("\tQUERN_END_PARAMS };", '\tQUERN_PARAM(law, pull, "N", "Adhesion.", .def = 0.05, .max = 1e9), QUERN_END_PARAMS };'),
+    ("touching ? pushed : 0;", "touching ? pushed - p.pull : 0;"), ("p.friction * normal", "p.friction * quern_max(normal, 0)"),
+    ("quern_vec_axpy(-spring, n, f); /*", "quern_vec_axpy(-(spring - (touching ? p.pull : 0)), n, f); /*"),
+    ("b->stored[i] += 0.5 * spring * (touching ? overlap[i] : 0);",
+     "b->stored[i] += (0.5 * spring - p.pull) * (touching ? overlap[i] : 0);")]
+DRUM = [  # a ball whose surface runs round
+    ("bool hollow;", "bool hollow;\n\tquern_real rate;"),
+    ("\tQUERN_END_PARAMS };", '\tQUERN_PARAM(ball, rate, "rad/s", "Turns.", .def = 3, .max = 1e3), QUERN_END_PARAMS };'),
+    ("gap[i] =", "const quern_vec own = quern_vec_scale(size, quern_vec_turn_back(pose->turn, out)), z = { 0, 0, p->rate };\n"
+     "const quern_vec run = quern_vec_turn(pose->turn, quern_vec_cross(z, own)); gap[i] ="),
+    ("QUERN_VEC_PUT(b->velocity, i, velocity, dim);", "QUERN_VEC_PUT(b->velocity, i, quern_vec_add(velocity, run), dim);")]
+# a couple against rolling, and no force at all
+ROLLING = """
+#include <quern/abi.h>
+typedef struct { quern_real drag; } law;
+static const quern_param params[] = { QUERN_PARAM(law, drag, "N m s", "Couple per spin.", .def = 1e-9, .max = 1),
+	QUERN_END_PARAMS };
+static const quern_use uses[] = {
+	{ .field = "contact.couple", .unit = "N m", .doc = "C.", .access = QUERN_ADD, .shape = QUERN_AXIAL },
+	{ .field = "grain.spin", .unit = "rad/s", .doc = "S.", .access = QUERN_READ, .shape = QUERN_AXIAL,
+		.flags = QUERN_OTHERS }, QUERN_END_USES };
+static void force(const void *self, const quern_contact_batch *b) {
+	for (int k = 0; k < (b->normal[2] ? 3 : 1); k++)
+		for (uint32_t i = 0; i < b->n; i++) b->couple[k][i] -= b->overlap[i] > 0 ? ((const law *)self)->drag * b->spin[k][i] : 0;
+}
+static const quern_contact_ops ops = { .size = sizeof ops, .force = { force, force } };
+static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_CONTACT, .dims = 3, .id = "contact.rolling",
+	.brief = "Rolling.", .instance_size = sizeof(law), .params = params, .uses = uses, .ops = &ops };
+QUERN_LIBRARY(plugin, "1", "MIT");
+"""
+
+
+def check_legitimate():
+    """Physics that is unlike the installed plugins' and all the same sound."""
+    plugins = [("contact.mine", source("contact", *ADHESION)), ("body.mine", source("body", *DRUM)),
+               ("contact.rolling", ROLLING)]
+    for name, text in plugins:
+        with tempfile.TemporaryDirectory() as folder:
+            said = quern("check", compile(text, name, folder), status=0)
+            assert "all ok" in said, said
+    with tempfile.TemporaryDirectory() as folder:  # and what is unsound in the same physics is found
+        backwards = ROLLING.replace("b->couple[k][i] -=", "b->couple[k][i] +=").replace("1e-9", "1e-5")
+        said = quern("check", compile(backwards, "contact.rolling", folder), status=2)
+        assert failures(said) == {"impacts gain no energy", "books of energy"}, said
+    print("adhesion, couples alone and surfaces that run pass")
+
+
+FORBIDDEN = [("exit(0);", "ended the program in linear.init, 2-D"), ("_exit(0);", "ended the program in linear.init, 2-D"),
+             ("quick_exit(0);", "ended the program in linear.init, 2-D"), ("abort();", "crashed (SIGABRT) in linear.init"),
+             ("for (int fd = 0; fd < 64; fd++) close(fd);", "linear.init, 2-D, with setting 0 of its parameters: changes what "
+              "is open for reading and printing")]
+if not workshop.SANITIZED:  # there, processes cannot be forbidden
+    FORBIDDEN += [("fork();", "started a process in linear.init"), ("for (;;) fork();", "started a process in linear.init"),
+                  ("for (;;) if (!fork()) setsid();", "started a process in linear.init"),
+                  ('if (system("true")) abort();', "started a process in linear.init")]
+
+
+def check_forbidden():
+    """What init must not do to the program and the machine is found, and done to a child alone."""
+    for statement, sentence in FORBIDDEN:
+        with tempfile.TemporaryDirectory() as folder:
+            text = source(LINEAR, (INIT, INIT + " " + statement), UNISTD)
+            said = quern("check", compile("#include <stdlib.h>\n" + text, "contact.linear", folder), status=2)
+            assert sentence in said and "properties FAILED" in said, f"'{sentence}' is not in\n{said}"
+    print(f"{len(FORBIDDEN)} things that a plugin must not do are one sentence each")
 
 
 def check_crashes():
@@ -112,13 +291,22 @@ def check_options():
     elastic = PLUGINS / "material.elastic.so"
     assert "all ok" in quern("check", elastic, "--set", "poisson=0.2", status=0)
     assert "poisson is 0.7, must be" in quern("check", elastic, "--set", "poisson=0.7", status=2)
+    box = [PLUGINS / "body.box.so", "--set", "lower=[0, 0]", "--set", "upper=[0.1, 0.2]"]
+    assert "must be a list of 3 numbers" in quern("check", *box, status=2)
+    assert "all ok" in quern("check", *box, "--dimension", 2, status=0)
+    assert "must be a list of 3 numbers" in quern("check", *box, "--dimension", 3, status=2)
+    assert "must be a whole number between 2 and 3" in quern("check", *box, "--dimension", 4, status=1)
+    with tempfile.TemporaryDirectory() as folder:
+        flat = compile(source("body", ("QUERN_2D | QUERN_3D", "QUERN_2D")), "body.mine", folder)
+        assert "body.mine does not work in 3 dimensions" in quern("check", flat, "--dimension", 3, status=2)
     assert "a plugin is missing" in quern("check", status=1)
     assert "No such file" in quern("check", "nowhere.so", status=2)
     print("options of check")
 
 
 if __name__ == "__main__":
-    check_installed()
-    check_broken()
+    check_broken(check_installed() | check_templates())
+    check_legitimate()
     check_crashes()
+    check_forbidden()
     check_options()

@@ -148,15 +148,20 @@ def refusals(folder):
     damaged.mkdir(parents=True)
     (damaged / "000004.h5").write_bytes(b"no such thing")
     write_frame(folder / "void", 2, "nothing", {})
+    write_frame(folder / "nan", 2, "no places", {"grains": {"position": ("m", np.full((3, 3), np.nan))}})
+    write_frame(folder / "huge", 2, "a lie", {})
+    with h5py.File(folder / "huge/frames/000000.h5", "a") as file:
+        file.create_dataset("grains/position", shape=(1 << 50, 3), chunks=(1 << 10, 3))
     for words, status, part in [([folder / "two", "--frame", 99], 2, "its frames are 0 to 20"),
                                 ([folder / "nowhere"], 2, "holds no frames"),
                                 ([folder / "damaged"], 2, "missing or damaged"),
                                 ([folder / "void"], 2, "neither grains nor points"),
+                                ([folder / "nan"], 2, "is damaged"), ([folder / "huge"], 2, "is damaged"),
                                 ([folder / "h2", "--field", "point.presure"], 1, "point.pressure, point.velocity"),
                                 ([folder / "h2", "--field", "grain.radius", "-o", folder / "no/a.png"], 4, "written"),
                                 ([folder / "h2", "--field", "grain.radius.y"], 1, "no field"),
                                 ([folder / "h2", "--width", 10], 1, "between 600 and 8000"),
-                                ([folder / "h2", "--colour"], 1, "unknown argument"), ([], 1, "is missing")]:
+                                ([folder / "h2", "--colour"], 1, "unknown option '--colour'"), ([], 1, "is missing")]:
         said = run("render", *words, status=status)
         assert part in said, f"render {words}: {said}"
     print("every fault is refused in one sentence")

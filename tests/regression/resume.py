@@ -71,7 +71,8 @@ def check(kills, place):
         names = lab.differences(base / "frames" / last, out / "frames" / last)
         assert not names, f"kill {len(done)}, resumed at {done[-1]}: the last frame differs in {', '.join(names)}"
         assert (out / "series.csv").read_bytes() == (base / "series.csv").read_bytes(), "series.csv differs"
-        lab.differences(base / "checkpoint.h5", out / "checkpoint.h5")
+        names = lab.differences(base / "checkpoint.h5", out / "checkpoint.h5")
+        assert not names, f"kill {len(done)}, resumed at {done[-1]}: the checkpoint differs in {', '.join(names)}"
     steps = [step for _, _, step in done if step is not None]
     print(f"{kills} kills in a run of {length:.2f} s: {sum(n for n, _, _ in done)} frames left, all whole; "
           f"{len(done) - len(steps)} before a checkpoint, {sum(s <= 0 for s in steps)} while settling, "

@@ -21,6 +21,7 @@ print(f"{len(plugins)} plugins export quern_library_1 alone")
 
 names = symbols(QUERN.parent / "core/libcore.a", "-g", "--defined-only")
 assert len(names) > 100
-wrong = {s for s in names if not s.startswith(("quern_", "__", "_", "asan."))}
+ends = {"exit", "_exit", "_Exit"}  # a plugin that calls them finds the program's, see core/watch.c
+wrong = {s for s in names - ends if not s.startswith(("quern_", "__", "_", "asan."))}
 assert not wrong, f"without the prefix quern_: {sorted(wrong)}"
 print(f"{len(names)} symbols of the core begin with quern_")

@@ -6,6 +6,7 @@ import subprocess
 QUERN = os.environ["QUERN"]
 SOURCE = pathlib.Path(os.environ["QUERN_SOURCE"])
 PLUGINS = pathlib.Path(os.environ["QUERN_PLUGINS_DIR"])
+SANITIZED = any(name in pathlib.Path(QUERN).read_bytes() for name in (b"__asan_init", b"__tsan_init"))
 for sanitizer in ("ASAN_OPTIONS", "TSAN_OPTIONS"):  # plugins crash on purpose: the program's own handlers shall see it
     os.environ[sanitizer] = os.environ.get(sanitizer, "") + ":handle_segv=0:handle_sigill=0"
 FLAGS = ["-std=c17", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno",
@@ -26,9 +27,16 @@ def compile(text, name, folder, *link, beside=""):
     return f"{stem}.so"
 
 
+def source_of(path):
+    """A plugin's source, or that of the template of a kind, whose plugin is called mine."""
+    if "/" in path:
+        return (SOURCE / "plugins" / path).read_text()
+    return (SOURCE / f"core/templates/{path}.c").read_text().replace("my_name", "mine")
+
+
 def source(path, *changes):
-    """A plugin's source with some places changed; each must be there once."""
-    text = (SOURCE / "plugins" / path).read_text()
+    """The same with some places changed; each must be there once."""
+    text = source_of(path)
     for old, new in changes:
         assert text.count(old) == 1, f"{path}: '{old}' stands there {text.count(old)} times"
         text = text.replace(old, new)

@@ -84,5 +84,5 @@ void beyond_expect_culprit(const quern_run *run, const char *stage, const char *
 void beyond_force_step(quern_run *run, double step) {
 	run->scene->general.step = step;
 	run->scene->general.force = true;
-	run->clock.at = run->clock.steps_in = 0;
+	quern_run_cut(run);
 }

@@ -135,6 +135,23 @@ static void drops_orphans(void **state) {
 	assert_int_equal(column(s, ID).id[4], 5);
 }
 
+/* An index that points at nothing stays so; one into a set that has no entries has lost its target. */
+static void points_at_nothing(void **state) {
+	static const int32_t from[] = { 4, 3, 2, 1, 0 };
+	quern_store *s = *state;
+	fill(s);
+	column(s, SECOND).index[2] = QUERN_NO_TARGET;
+	assert_int_equal(quern_store_remap(s, GRAIN, 5, from, 0, NULL), QUERN_OK);
+	assert_int_equal(s->sets[CONTACT].n, 4);
+	assert_int_equal(column(s, FIRST).index[2], 2);
+	assert_int_equal(column(s, SECOND).index[2], QUERN_NO_TARGET);
+	assert_int_equal(quern_store_fill(s, GRAIN, 0), QUERN_OK);
+	assert_int_equal(s->sets[CONTACT].n, 0);
+	assert_int_equal(quern_store_fill(s, CONTACT, 3), QUERN_OK); /* at entry 0 of no grains */
+	assert_int_equal(quern_store_fill(s, GRAIN, 2), QUERN_OK);
+	assert_int_equal(s->sets[CONTACT].n, 0);
+}
+
 static void keeps_two_copies(void **state) {
 	quern_store *s = *state;
 	s->fields[POSITION].twice = true;
@@ -185,6 +202,6 @@ static void copies(void **state) {
 int main(void) {
 #define STORE(test) cmocka_unit_test_setup_teardown(test, open_store, close_store)
 	const struct CMUnitTest tests[] = { STORE(starts_as_new), STORE(reorders), STORE(copies),
-		STORE(drops_orphans), STORE(keeps_two_copies), STORE(grows) };
+		STORE(drops_orphans), STORE(points_at_nothing), STORE(keeps_two_copies), STORE(grows) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -84,10 +84,10 @@ static void defaults(void **state) {
 }
 
 static void values(void **state) {
-	reading r =
-		read_text("stiffness: 5\nangle: 180 deg\nmaybe: 50 %\nheight: 1 cm\nnumber: {of: 7}\nlaw: uniform\n"
-				  "on: true\nname: 'x'\ncorner: [1 mm, 2 mm]\nitems: [{at: [1, 2]}, {at: [3, 4]}]\n",
-			2);
+	reading r = read_text(
+		"stiffness: 5\nangle: \"180 deg\"\nmaybe: 50 %\nheight: 1 cm\nnumber: {of: 7}\nlaw: uniform\n"
+		"on: true\nname: 'x'\ncorner: [1 mm, 2 mm]\nitems: [{at: [1, 2]}, {at: [3, 4]}]\n",
+		2);
 	(void)state;
 	assert_int_equal(quern_report_errors(r.report), 0);
 	assert_true(fabs(r.s.angle - 3.141592653589793) < 1e-12);
@@ -111,6 +111,9 @@ static void faults(void **state) {
 		{ "stiffness: 1\nnumber: {of: 2.5}", "must be a whole number" },
 		{ "stiffness: 1\nlaw: normla", "must be one of: normal, uniform; did you mean 'normal'?" },
 		{ "stiffness: 1\non: maybe", "must be true or false" },
+		{ "stiffness: 1\non: 'true'", "must be true or false" },
+		{ "stiffness: '5'", "\"5\" in quotes is a text, not a number" },
+		{ "stiffness: 1\nnumber: {of: \"5 \"}", "in quotes is a text, not a number" },
 		{ "stiffness: 1\nname: [x]", "must be a text, not a list of 1" },
 		{ "stiffness: 1\ncorner: [1, 2, 3]",
 			"must be a list of 2 numbers, one per dimension, not a list of 3" },
@@ -132,12 +135,38 @@ static void faults(void **state) {
 	}
 }
 
+/* A number that another part of the scene gives is never 0 because nobody gives it: the scene must, unless the row says
+ * what stands in its place or that it may be left out. */
+static void from_nobody(void **state) {
+	static const struct {
+		uint8_t flags;
+		quern_real def;
+		size_t faults;
+		quern_real value;
+	} cases[] = { { 0, 0, 1, NAN }, { QUERN_REQUIRED, 0, 1, NAN }, { QUERN_REQUIRED, 3, 1, NAN },
+		{ 0, 3, 0, 3 }, { QUERN_MAYBE, 0, 0, NAN } };
+	(void)state;
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		const quern_param row[] = { QUERN_PARAM(sample, height, "m", "Height.", .from = "nobody.knows",
+										.flags = cases[i].flags, .def = cases[i].def),
+			QUERN_END_PARAMS };
+		quern_report *report = quern_report_create();
+		const quern_reading how = { report, NULL, 2, &published, 1, NULL };
+		sample s = { 0 };
+		quern_params_read(&how, "sample", row, NULL, (quern_mark) { 0 }, NULL, &s);
+		assert_int_equal(quern_report_errors(report), cases[i].faults);
+		if (!cases[i].faults)
+			assert_true(isnan(cases[i].value) ? isnan(s.height) : s.height == cases[i].value);
+		quern_report_destroy(report);
+	}
+}
+
 static void writes(void **state) {
 	reading r = read_text("{stiffness: 0.1, corner: [1, 2], items: [{at: [1, 2]}], name: 'a \"b\"'}", 2);
 	quern_node *map = quern_node_create(QUERN_NODE_MAP);
 	quern_text out = { 0 };
 	(void)state;
-	quern_params_write(rows, &r.s, 2, map);
+	quern_params_write(rows, &r.s, 2, NULL, map);
 	quern_node_print(map, 0, &out);
 	reading again = read_text(quern_text_string(&out), 2);
 	assert_int_equal(quern_report_errors(again.report), 0);
@@ -162,6 +191,7 @@ static void marks(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(defaults), cmocka_unit_test(values),
-		cmocka_unit_test(faults), cmocka_unit_test(writes), cmocka_unit_test(marks) };
+		cmocka_unit_test(faults), cmocka_unit_test(from_nobody), cmocka_unit_test(writes),
+		cmocka_unit_test(marks) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -169,7 +169,7 @@ static void conflicts(void **state) {
 	refused((const quern_stage *[]) { w, STAGES("two.seconds", QUERN_COUPLE, seconds) }, 2,
 		"grain.a: two.seconds takes it in s, others in m");
 	refused((const quern_stage *[]) { w, STAGES("two.vector", QUERN_COUPLE, vectors) }, 2,
-		"grain.a: two.vector takes it in another shape than others do");
+		"grain.a: two.vector takes it for a vector, one.write for a scalar");
 }
 
 /* A row that hangs on a parameter or is optional makes nothing by itself. */

@@ -40,8 +40,8 @@ static void refuses(void **state) {
 	} cases[] = { { "", "m", "is no number" }, { "five", "m", "'five' is no number" },
 		{ "nan", "1", "is no number" }, { ".inf", "1", "is no number" }, { "inf", "1", "is no number" },
 		{ "0x10", "1", "is no decimal number" }, { "1e400", "m", "is too large" },
-		{ "1e308 km", "m", "is too large" }, { "5 kg", "m", "'kg' cannot be turned into m" },
-		{ "5 mmm", "m", "'mmm' is no unit; m is wanted" },
+		{ "1e308 km", "m", "is too large" }, { "1e-400", "s", "is too small" },
+		{ "5 kg", "m", "'kg' cannot be turned into m" }, { "5 mmm", "m", "'mmm' is no unit; m is wanted" },
 		{ "5 m", "1", "cannot be turned into a pure number" }, { "5 %", "m", "'%' cannot be turned into m" },
 		{ "30 deg", "1", "cannot be turned into a pure number" }, { "20 degC", "K", "has an offset" },
 		{ "2 3", "1", "'3' is no unit" }, { "2 3 m", "m", "is no unit" }, { "0,1 s", "s", "a decimal comma" },
@@ -76,8 +76,19 @@ static void equal_units(void **state) {
 	assert_false(quern_units_equal(*state, "nonsense", "m"));
 }
 
+static void masses(void **state) {
+	static const struct {
+		const char *unit;
+		int power;
+	} cases[] = { { "1", 0 }, { "m/s", 0 }, { "kg", 1 }, { "g", 1 }, { "N/m", 1 }, { "kg/m^3", 1 },
+		{ "J/kg", 0 }, { "1/Pa", -1 }, { "kg2", 2 }, { "deg", 0 }, { "nonsense", 0 } };
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+		if (quern_units_mass(*state, cases[i].unit) != cases[i].power)
+			fail_msg("%s has kg^%d", cases[i].unit, quern_units_mass(*state, cases[i].unit));
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(reads), cmocka_unit_test(refuses),
-		cmocka_unit_test(long_text), cmocka_unit_test(equal_units) };
+		cmocka_unit_test(long_text), cmocka_unit_test(equal_units), cmocka_unit_test(masses) };
 	return cmocka_run_group_tests(tests, open_units, close_units);
 }

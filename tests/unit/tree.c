@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <text.h>
+#include <time.h>
 #include <tree.h>
 
 typedef struct {
@@ -128,7 +129,8 @@ static void set_values(void **state) {
 }
 
 static void set_faults(void **state) {
-	static const char *const options[] = { "a", "=1", "a.b.c=1", "l.9=1", "l.x=1", "a=[1", "" };
+	static const char *const options[] = { "a", "=1", "a.b.c=1", "l.9=1", "l.x=1", "l.00=1", "l.+0=1",
+		"l. 0=1", "a=[1", "" };
 	(void)state;
 	for (size_t i = 0; i < sizeof options / sizeof *options; i++) {
 		document d = parse("a: {b: 1}\nl: [1, 2]\n");
@@ -162,6 +164,59 @@ static void writes(void **state) {
 	finish(&d);
 }
 
+/* true and false have YAML's six words in three spellings each, and none of them in quotes. */
+static void booleans(void **state) {
+	static const struct {
+		const char *text;
+		int value; /* -1: none */
+	} cases[] = { { "true", 1 }, { "Yes", 1 }, { "ON", 1 }, { "false", 0 }, { "no", 0 }, { "Off", 0 },
+		{ "tRue", -1 }, { "y", -1 }, { "1", -1 }, { "'true'", -1 }, { "[true]", -1 }, { "", -1 } };
+	(void)state;
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char text[32];
+		bool value = false;
+		snprintf(text, sizeof text, "a: %s", cases[i].text);
+		document d = parse(text);
+		const bool is = quern_node_bool(quern_node_entry(d.tree->root, "a")->value, &value);
+		if (is != (cases[i].value >= 0) || (is && value != cases[i].value))
+			fail_msg("%s is taken for %d", text, is ? value : -1);
+		finish(&d);
+	}
+}
+
+/* Items of a list have one name each: their number as people write it. */
+static void items(void **state) {
+	static const char *const none[] = { "00", "01", "+0", "-0", " 0", "0 ", "", "0x0", "2", "4294967296",
+		"99999999999999999999" };
+	(void)state;
+	document d = parse("[a, b]");
+	assert_string_equal(quern_node_item(d.tree->root, "1")->value->text, "b");
+	for (size_t i = 0; i < sizeof none / sizeof *none; i++)
+		if (quern_node_item(d.tree->root, none[i])) fail_msg("'%s' names an item", none[i]);
+	finish(&d);
+}
+
+/* Of a key that stands several times the first counts, every other one is a fault with its place, and an anchor in it may
+ * still be named. The cost is that of sorting: it took minutes when every key was held against all others. */
+static void repeated_keys(void **state) {
+	enum { KEYS = 60000 };
+	quern_text text = { 0 };
+	(void)state;
+	document d = parse("a: 1\nb: 2\na: &x 3\nc: *x\na: 4\n");
+	assert_int_equal(quern_report_errors(d.report), 2);
+	assert_string_equal(at(d.tree->root, "a")->text, "1");
+	assert_string_equal(at(d.tree->root, "c")->text, "3");
+	assert_int_equal(d.tree->root->n, 3);
+	finish(&d);
+	for (int k = 0; k < KEYS; k++) quern_text_add(&text, "k%d: 1\n", k % (KEYS - 1));
+	const clock_t begin = clock();
+	d = parse(quern_text_string(&text));
+	assert_int_equal(quern_report_errors(d.report), 1);
+	assert_true(clock() - begin < 5 * CLOCKS_PER_SEC);
+	finish(&d);
+	quern_text_finish(&text);
+}
+
 static void merges(void **state) {
 	document base = parse("a: {b: 1, c: 2}\nd: 3\n"), over = parse("a: {c: 4}\nd: {e: 5}\nf: 6\n");
 	(void)state;
@@ -177,6 +232,7 @@ static void merges(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(marks), cmocka_unit_test(aliases),
 		cmocka_unit_test(faults), cmocka_unit_test(limits), cmocka_unit_test(set_values),
-		cmocka_unit_test(set_faults), cmocka_unit_test(writes), cmocka_unit_test(merges) };
+		cmocka_unit_test(set_faults), cmocka_unit_test(booleans), cmocka_unit_test(items),
+		cmocka_unit_test(repeated_keys), cmocka_unit_test(writes), cmocka_unit_test(merges) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,124 @@
+"""What observers leave: an object each in the summary and columns of their own in the series, under labels that differ; any
+number of outputs; and no number that is not finite."""
+import os
+import pathlib
+import subprocess
+
+import lab
+import workshop
+
+ALONE = """
+quern: 1
+dimension: 2
+gravity: [0, -9.81]
+domain: {lower: [0, 0], upper: [1, 1]}
+time: {end: 1 ms}
+output: {every: 1 ms}
+grains:
+  material: {density: 2500, radius: {mean: 1 cm}}
+  contact: {linear: {stiffness: 1e5}}
+  place: [%s]
+"""
+
+
+def start(folder, observe, *options, status=0, **environment):
+    done = subprocess.run([lab.QUERN, "run", "--quiet", lab.scene("two_grains"), "-o", str(folder), "--set=time.end=1 ms",
+                           f"--set=observe={observe}", *options], capture_output=True, text=True,
+                          env={**os.environ, **environment})
+    assert done.returncode == status, f"{observe}: exit status {done.returncode}, not {status}\n{done.stderr}"
+    return done.stderr
+
+
+def objects(place):
+    """Energy and momentum are keys of the run as a whole too: the observers of that name keep their own place."""
+    start(place / "two", "[energy, momentum]")
+    s = lab.summary(place / "two")
+    assert list(s["observers"]) == ["energy", "momentum"]
+    assert isinstance(s["energy"], float) and isinstance(s["momentum"], list)
+    assert s["observers"]["energy"]["budget"]["last"] > 0 and s["observers"]["momentum"]["x"]["unit"] == "kg m/s"
+
+
+def labels(place):
+    start(place / "labels", "[mass, {mass: {label: mine}}, mass, {energy: {label: mass_3}}, mass]")
+    header, rows = lab.series(place / "labels")
+    names = [name.split(".")[0] for name in header if name.endswith(".carried [kg]")]
+    assert names == ["mass", "mine", "mass_2", "mass_4"], names
+    assert len(set(header)) == len(header), "two columns have one name"
+    assert list(lab.summary(place / "labels")["observers"]) == ["mass", "mine", "mass_2", "mass_3", "mass_4"]
+    said = start(place / "no", "[{mass: {label: a}}, {energy: {label: a}}]", status=2)
+    assert "two observers are labelled 'a'" in said, said
+    said = start(place / "no", "[{mass: {label: a.b}}]", status=2)
+    assert "the label 'a.b' is no name" in said, said
+    print("columns and objects by label; equal labels are refused")
+
+
+def many(place):
+    """Forty uses and a hundred outputs, over a set or whole; a column of another set is not cut to the leaf."""
+    n, uses = 100, 40
+    text = """
+#include <quern/abi.h>
+typedef struct { int32_t unused; } observer;
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { { .field = "total.trembling", .unit = "1", .access = QUERN_READ, .shape = QUERN_INDEX }, %s, QUERN_END_USES };
+static const quern_output outputs[] = { %s, { .name = NULL } };
+static void map(const void *self, const quern_observer_batch *b, quern_real *partial) {
+	(void)self;
+	for (int k = 0; k < %d; k++) partial[k] = 0;
+	for (uint32_t i = 0; i < b->n; i++)
+		for (int k = 0; k < %d; k++) partial[k] += k * b->use[1 + k %% %d].real[0][i] + b->use[0].index[0];
+}
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+	(void)host, (void)run;
+	quern_observer_batch one = *b;
+	one.n = b->count[%d];
+	map(self, &one, out);
+	return QUERN_OK;
+}
+static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, %s };
+static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_OBSERVER, .revision = 1, .dims = 3,
+	.id = "observer.%s", .brief = "Many numbers.", .instance_size = sizeof(observer), .params = params, .uses = uses, .ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");
+"""
+    row = '{ .field = "grain.mass", .unit = "kg", .access = QUERN_READ, .shape = QUERN_SCALAR }'
+    outputs = ", ".join(f'{{ .name = "o{k}", .unit = "kg", .doc = "One of many." }}' for k in range(n))
+    for name, how in (("mapped", ".map = map, .set = \"grain\""), ("wholly", ".whole = whole")):
+        body = text % (", ".join([row] * uses), outputs, n, n, uses, uses, how, name)
+        body = body.replace("static quern_status whole", "static __attribute__((unused)) quern_status whole")
+        workshop.compile(body, f"observer.{name}", place)
+    grains = ", ".join(f"{{position: [{x} mm, {y} mm], radius: 1 mm}}" for x in range(-48, 48, 4) for y in range(-48, 48, 4))
+    start(place / "many", "[mapped, wholly, mass]", f"--set=grains.place=[{grains}]", QUERN_PLUGIN_PATH=str(place))
+    observers = lab.summary(place / "many")["observers"]
+    mass = observers["mass"]["grains"]["last"]
+    for name in ("mapped", "wholly"):
+        assert list(observers[name]) == [f"o{k}" for k in range(n)], f"{name}: {list(observers[name])}"
+        for k in range(n):
+            found = observers[name][f"o{k}"]["last"]
+            assert abs(found - k * mass) <= 1e-12 * (1 + k * mass), f"{name}: o{k} is {found}, not {k * mass}"
+    print(f"{n} outputs and {uses + 1} uses of one observer")
+
+
+def finite(place):
+    spin = "--set=grains.place.0.spin=[1e300, 0]"
+    said = start(place / "inf", "[mass, {energy: {label: joules}}]", spin, status=3)
+    assert "observer joules: column joules.spin is infinite at t = 0 s" in said, said
+    assert lab.summary(place / "inf")["status"] == "failed"
+    assert "inf" not in (place / "inf/series.csv").read_text()
+    said = start(place / "unseen", "[]", spin, status=3)
+    assert "the kinetic energy of the run is no finite number at t = 0 s" in said, said
+    print("numbers that are not finite end the run")
+
+
+def nothing_moves(place):
+    """Of fixed grains alone nothing is carried, and nothing is missing."""
+    scene = place / "fixed.yaml"
+    scene.write_text(ALONE % "{position: [0.5, 0.5], fixed: true}")
+    workshop.quern("run", scene, "-o", place / "fixed", status=0)
+    s = lab.summary(place / "fixed")
+    assert s["mass_initial"] == 0 and s["mass_defect"] == 0 and s["discrete_share"] == 0, s
+
+
+if __name__ == "__main__":
+    with lab.workplace() as name:
+        place = pathlib.Path(name)
+        for test in (objects, labels, many, finite, nothing_moves):
+            test(place)

@@ -1,0 +1,113 @@
+"""The JSON Schema of scenes: it knows what the tables say, takes every scene that this tree ships or a run leaves, and refuses
+most that the program refuses."""
+import copy
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+import lab
+
+QUERN, SOURCE = os.environ["QUERN"], pathlib.Path(os.environ["QUERN_SOURCE"])
+MALFORMED = SOURCE / "tests/regression/malformed"
+
+
+def said(*words, **options):
+    done = subprocess.run([QUERN, *map(str, words)], capture_output=True, text=True, timeout=120, **options)
+    assert done.returncode == 0, f"{words}: {done.stderr}"
+    return done.stdout
+
+
+SCHEMA = json.loads(said("schema"))
+
+
+def check_tables():
+    """Types, ranges, defaults and what is required come from the rows, at every depth."""
+    scene = SCHEMA["properties"]
+    assert set(SCHEMA["required"]) == {"quern", "dimension", "gravity", "domain", "time"}
+    assert set(scene["domain"]["required"]) == {"lower", "upper"} and scene["time"]["required"] == ["end"]
+    quantity = {"$ref": "#/definitions/quantity"}
+    step = scene["time"]["properties"]["step"]["anyOf"]
+    assert {"type": "number"} in step and quantity in step and {"const": "auto"} in step
+    end = scene["time"]["properties"]["end"]
+    assert {"type": "number", "minimum": 0.0, "maximum": 1e12} in end["anyOf"] and quantity in end["anyOf"]
+    assert scene["output"]["properties"]["compress"]["default"] is True
+    assert scene["checkpoint"]["properties"]["every"]["default"] == 300
+    grains = scene["grains"]["else"]
+    assert not grains["additionalProperties"] and {"material", "contact"} <= set(grains["required"])
+    law = next(one for one in grains["properties"]["contact"]["anyOf"][0]["anyOf"] if "properties" in one)["properties"]
+    assert law["linear"]["required"] == ["stiffness"] and not law["linear"]["additionalProperties"]
+    assert {"type": "number", "exclusiveMinimum": 0.0, "maximum": 1e15} in law["linear"]["properties"]["stiffness"]["anyOf"]
+    pattern = re.compile(SCHEMA["definitions"]["quantity"]["pattern"])
+    for text in ("5 mm", "5", "-.5e-3 m/s^2", "24 deg", "10 %", "3 1/s", "5mm", "1e5"):
+        assert pattern.match(text), text
+    for text in ("", "mm", "5 5", "five", "0,1 s", "5 -m"):
+        assert not pattern.match(text), text
+    print("the schema says what the tables say")
+
+
+def check_scenes(validator, yaml):
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        # as resolved, with every default written out
+        lab.run("two_grains", folder / "two_grains")
+        lab.run("column", folder / "column", *lab.SMALL["column"], "--set=time.end=1 ms", "--set=output.every=1 ms")
+        scenes = [*SOURCE.glob("configs/*.yaml"), *SOURCE.glob("tests/bench/*.yaml"), *folder.glob("*/scene.yaml")]
+        texts = [path.read_text() for path in scenes]
+    texts += re.findall(r"```yaml\n(.*?)```", (SOURCE / "README.md").read_text(), re.S)
+    for path, text in zip([*map(str, scenes), "README.md"], texts):
+        faults = [f"{list(e.absolute_path)}: {e.message}" for e in validator.iter_errors(yaml.safe_load(text))]
+        assert not faults, f"{path}: {faults}"
+    print(f"{len(texts)} scenes are good")
+
+
+def check_malformed(validator, yaml):
+    refused, passed = 0, []
+    for path in sorted(MALFORMED.glob("*.yaml")):
+        try:
+            scene = yaml.safe_load(path.read_text())
+        except (yaml.YAMLError, UnicodeDecodeError, ValueError):
+            continue
+        if list(validator.iter_errors(scene)):
+            refused += 1
+        else:
+            passed.append(path.stem)
+    assert refused >= 100, f"only {refused} malformed scenes are refused"
+    for name in ("law_key_misspelt", "gravity_missing", "restitution_above", "material_case", "law_unknown", "section_list",
+                 "points_fraction", "cell_missing", "fill_settle_word", "radius_law", "place_without_position"):
+        assert name not in passed, f"{name} passes the schema"
+    print(f"{refused} malformed scenes are refused, {len(passed)} need more than a schema")
+
+
+def check_words(validator, yaml):
+    """What the program takes in more than one form, the schema takes in each."""
+    scene = yaml.safe_load((SOURCE / "configs/two_grains.yaml").read_text())
+    for place, values in {("time", "end"): [0.02, "20 ms", "0.02 s"], ("output", "compress"): [True, "no", "on"],
+                          ("time", "step"): ["auto", 1e-6, "1 us"], ("grains", "solver"): ["dem", "other"]}.items():
+        for value in values:
+            other = copy.deepcopy(scene)
+            other[place[0]][place[1]] = value
+            assert validator.is_valid(other), f"{place}: {value}"
+    for place, value in {("time", "end"): "soon", ("output", "compress"): "maybe", ("time", "step"): "never",
+                         ("seed",): 1.5, ("time", "end "): 1}.items():
+        other = copy.deepcopy(scene)
+        (other[place[0]] if len(place) == 2 else other)[place[-1]] = value
+        assert not validator.is_valid(other), f"{place}: {value} passes"
+    print("quantities and switches have all their forms")
+
+
+if __name__ == "__main__":
+    check_tables()
+    try:
+        import jsonschema
+        import yaml as reader
+    except ImportError:
+        print("python3-jsonschema or python3-yaml is missing: no scene was held against the schema")
+        sys.exit(77)
+    jsonschema.Draft7Validator.check_schema(SCHEMA)
+    draft = jsonschema.Draft7Validator(SCHEMA)
+    for test in (check_scenes, check_malformed, check_words):
+        test(draft, reader)
