@@ -106,7 +106,7 @@ def try_force(folder, place):
             sentence(done, expected, *where, f"{out} keeps {frames} frames and a checkpoint of step ",
                      "from which --resume goes on")
     compile(source(LINEAR), "contact.linear", folder)
-    quern(folder, "run", scene, "-o", out, "--quiet", "--resume", status=0)
+    quern(folder, "run", scene, "-o", out, "--quiet", "--resume", "--force", status=0)  # another plugin
     print(f"{len(cases)} ends in a kernel leave frames and a checkpoint, and say so")
 
 
@@ -120,7 +120,7 @@ def check_stage(folder):
         text = source("solver", ("moving m = {", statement + " moving m = {")).replace(
             "#include <stdio.h>", "#include <signal.h>\n#include <stdio.h>\n#include <stdlib.h>")
         compile(text, "solver.mine", folder)
-        sentence(quern(folder, "run", scene, "-o", folder / "flight", "--quiet", status=3), expected, "keeps 1 frame and ")
+        sentence(quern(folder, "run", scene, "-o", folder / "flight", "--quiet", "--force", status=3), expected, "keeps 1 frame and ")
     os.remove(folder / "solver.mine.so")
     print("so do ends in a stage")
 
@@ -135,7 +135,7 @@ def check_environment(folder):
                             ('if (chdir("/")) abort();', "the working folder"),
                             ("close(0);", "what is open for reading and printing")]:
         compile(in_init(statement), "contact.linear", folder)
-        for words in (["plan", SCENE], ["run", SCENE, "-o", "out", "--quiet"]):
+        for words in (["plan", SCENE], ["run", SCENE, "-o", "out", "--quiet", "--force"]):
             sentence(quern(folder, *words, status=2), "two_grains.yaml:", f"contact.linear: init changes {what}")
     assert not (folder / "out/frames").exists() and not os.path.exists("/out")
     print("arithmetic, folder and streams are watched")

@@ -53,8 +53,8 @@ def labels(place):
 
 
 def many(place):
-    """Forty uses and a hundred outputs, over a set or whole; a column of another set is not cut to the leaf."""
-    n, uses = 100, 40
+    """As many uses as there may be and a hundred outputs, over a set or whole; a column of another set is not cut to the leaf."""
+    n, uses = 100, 31
     text = """
 #include <quern/abi.h>
 typedef struct { int32_t unused; } observer;
