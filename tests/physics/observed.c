@@ -92,8 +92,23 @@ static void two_observers_of_one_body(void **state) {
 	assert_true(good);
 }
 
+/* A spin whose energy is beyond all numbers, which no scene may begin with: the run's account says so. */
+static void sums_are_finite(void **state) {
+	(void)state;
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [1, 1]},\n"
+		"time: {end: 1}, output: {every: 0.1},\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.01}}, contact: {linear: {stiffness: 1e5}},\n"
+		"  place: [{position: [0.5, 0.5]}]}}\n");
+	assert_int_equal(quern_run_check_account(run), QUERN_OK);
+	harness_field(run, "grain.spin").real[0][0] = 1e300;
+	assert_int_equal(quern_run_check_account(run), QUERN_E_NUMERIC);
+	assert_non_null(strstr(run->message, "kinetic energy"));
+	harness_close(run);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(weights),
-		cmocka_unit_test(two_observers_of_one_body) };
+		cmocka_unit_test(two_observers_of_one_body), cmocka_unit_test(sums_are_finite) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
