@@ -5,10 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Without a log, as in `plan`, a warning goes to the terminal all the same. */
 static void host_log(quern_run *run, int level, const char *fmt, ...) {
 	va_list list;
 	va_start(list, fmt);
 	if (run->log) quern_log_addv(run->log, level, fmt, list);
+	else if (level >= 2) {
+		fputs("warning: ", stderr);
+		vfprintf(stderr, fmt, list);
+		fputs("\n", stderr);
+	}
 	va_end(list);
 }
 
@@ -99,6 +105,10 @@ static const void *host_extension(const char *id) {
 	return NULL;
 }
 
+static bool host_has(quern_run *run, const char *section) {
+	return quern_scene_section(run->scene, section) != NULL;
+}
+
 const quern_host quern_host_table = {
 	.abi = QUERN_ABI,
 	.fail = quern_scene_fail,
@@ -116,4 +126,5 @@ const quern_host quern_host_table = {
 	.grid = host_grid,
 	.cover = host_cover,
 	.extension = host_extension,
+	.has = host_has,
 };

@@ -315,18 +315,39 @@ static void bind_uses(quern_plan *p) {
 	}
 }
 
-/* Lanes of a row in the order in which fields were first named. */
+static void lay_field(quern_plan *p, int k, bool *laid) {
+	quern_field *field = &p->store.fields[k];
+	quern_set_store *set = &p->store.sets[field->set];
+	if (!set->rows || laid[k]) return;
+	laid[k] = true;
+	field->lane = set->lanes;
+	set->lanes += field->n_components;
+	if (set->lanes > 8)
+		quern_report_add(
+			p->scene->report, (quern_mark) { 0 }, "%s: a node row holds at most 8 numbers", set->name);
+}
+
+static bool owns_set(const quern_section *section, const char *name) {
+	for (const quern_set *set = section->ops->sets; set && set->name; set++)
+		if (!strcmp(set->name, name)) return true;
+	return false;
+}
+
+/* Lanes of a row in the order in which the stages of the set's owner first name its fields, whoever else has named them
+ * before: the owner's kernels count on it. What others add comes after. */
 static void lay_rows(quern_plan *p) {
-	for (size_t i = 0; i < p->store.n_fields; i++) {
-		quern_field *field = &p->store.fields[i];
-		quern_set_store *set = &p->store.sets[field->set];
-		if (!set->rows) continue;
-		field->lane = set->lanes;
-		set->lanes += field->n_components;
-		if (set->lanes > 8)
-			quern_report_add(
-				p->scene->report, (quern_mark) { 0 }, "%s: a node row holds at most 8 numbers", set->name);
+	bool *laid = quern_take(p->store.n_fields, sizeof(bool));
+	for (size_t i = 0; i < p->n_stages; i++) {
+		const quern_plan_stage *stage = &p->stages[i];
+		for (size_t k = stage->first_use; k < stage->first_use + stage->n_uses; k++) {
+			const quern_plan_use *u = &p->uses[k];
+			if (u->target < 0) continue;
+			const char *set = p->store.sets[p->store.fields[u->target].set].name;
+			if (stage->section && owns_set(stage->section, set)) lay_field(p, u->target, laid);
+		}
 	}
+	for (size_t i = 0; i < p->store.n_fields; i++) lay_field(p, (int)i, laid);
+	free(laid);
 }
 
 /* ---- order ---- */

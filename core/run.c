@@ -203,7 +203,8 @@ quern_step quern_run_record(quern_run *run, const quern_section *section) {
 		.slot = section ? (const quern_bound *const *)run->plan->slots[i] : NULL,
 		.n_slot = section ? run->plan->n_slot[i] : NULL,
 		.host = &quern_host_table,
-		.run = run };
+		.run = run,
+		.before_output = run->clock.settled && run->clock.at + 1 == run->clock.steps_in };
 	memcpy(step.gravity, g->gravity, sizeof step.gravity);
 	memcpy(step.lower, g->lower, sizeof step.lower);
 	memcpy(step.upper, g->upper, sizeof step.upper);

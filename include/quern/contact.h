@@ -37,26 +37,34 @@ typedef struct quern_cone {
 	quern_real spring, damper; /* shares in [0, 1] */
 } quern_cone;
 
-/* Inside the cone both stay. Outside, the spring shrinks until |s a + b| = cap; where |b| alone is beyond the cone, the
- * spring goes and the damper is clipped. The root is written without cancellation. */
+/* Inside the cone both stay. Outside, the spring shrinks until |s a + b| = cap: to the largest such s, so that the total
+ * keeps its side and changes smoothly. Where no s in [0, 1] brings it into the cone, the spring shrinks to where the total
+ * is least, and both are clipped. The root is written without cancellation. */
 QUERN_INLINE quern_cone quern_cone_shares(quern_vec a, quern_vec b, quern_real cap) {
 	const quern_vec sum = quern_vec_add(a, b);
-	const quern_real total = quern_vec_dot(sum, sum, 3), bb = quern_vec_dot(b, b, 3), q = cap * cap - bb;
-	const quern_real ab = quern_vec_dot(a, b, 3), aa = quern_vec_dot(a, a, 3);
-	const quern_real inner = ab * ab + aa * q, root = __builtin_sqrt(inner > 0 ? inner : 0), up = ab + root;
-	const quern_real share = ab > 0 ? q / (up > 0 ? up : 1) : (root - ab) / (aa > 0 ? aa : 1);
-	const quern_real clipped = share < 1 ? (share > 0 ? share : 0) : 1;
-	const bool slides = total > cap * cap, beyond = slides & (q <= 0);
-	const quern_real clip = cap / __builtin_sqrt(bb > 0 ? bb : 1);
-	return (quern_cone) { slides ? (beyond ? 0 : clipped) : 1, beyond ? clip : 1 };
+	const quern_real ab = quern_vec_dot(a, b, 3), aa = quern_vec_dot(a, a, 3), cc = cap * cap;
+	const quern_real q = cc - quern_vec_dot(b, b, 3), inner = ab * ab + aa * q;
+	const quern_real root = __builtin_sqrt(inner > 0 ? inner : 0), up = ab + root;
+	const quern_real one_over = 1 / (aa > 0 ? aa : 1);
+	const quern_real share = ab > 0 ? q / (up > 0 ? up : 1) : (root - ab) * one_over;
+	const quern_real part =
+		ab < 0 ? (-ab < aa ? -ab * one_over : 1) : 0; /* of the spring, for the least total */
+	const quern_vec least = quern_vec_axpy(part, a, b);
+	const quern_real least2 = quern_vec_dot(least, least, 3);
+	const bool slides = quern_vec_dot(sum, sum, 3) > cc, beyond = least2 >= cc;
+	const quern_real clip = cap / __builtin_sqrt(least2 > 0 ? least2 : 1);
+	const quern_real kept = share < 1 ? (share > part ? share : part) : 1;
+	return (quern_cone) { slides ? (beyond ? part * clip : kept) : 1, slides & beyond ? clip : 1 };
 }
 
 /* The same along one line, a and b of either sign; returns what is left of a + b, and of a alone in *spring. */
 QUERN_INLINE quern_real quern_cone_planar(quern_real a, quern_real b, quern_real cap, quern_real *spring) {
-	const quern_real sum = a + b, up = sum > cap ? cap : sum, inside = up < -cap ? -cap : up;
-	const bool slides = sum != inside, beyond = slides & (b * b >= cap * cap);
-	const quern_real total = beyond ? (b > 0 ? cap : -cap) : inside;
-	*spring = slides ? (beyond ? 0 : total - b) : a;
+	const quern_real sum = a + b, up = sum > cap ? cap : sum, total = up < -cap ? -cap : up;
+	const quern_real size = sum < 0 ? -sum : sum;
+	const bool slides = sum != total, against = a * b < 0;
+	const quern_real least = against ? a * a : cap * cap; /* what b must exceed for no spring to do */
+	const quern_real clipped = against ? a * (cap / (size > 0 ? size : 1)) : 0;
+	*spring = slides ? (b * b >= least ? clipped : total - b) : a;
 	return total;
 }
 

@@ -37,6 +37,13 @@ static const quern_use place_uses[] = { F("body.impulse", "N s", QUERN_WRITE, QU
 											.doc = "Given to the material since the release."),
 	QUERN_END_USES };
 
+static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
+	const uint32_t *n_slot, quern_err *err) {
+	(void)self, (void)slot, (void)err;
+	setup->host->publish(setup, "bodies.count", "1", n_slot[0]);
+	return QUERN_OK;
+}
+
 static quern_status place(const void *self, const quern_step *s) {
 	const uint32_t n = s->n_slot[0];
 	int32_t *from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
@@ -53,7 +60,9 @@ static const quern_stage stages[] = { { .name = "bodies.place",
 										  .run = place },
 	{ .name = NULL } };
 
-static const quern_solver_ops ops = { .size = sizeof ops, .sets = sets, .slots = slots, .stages = stages };
+static const quern_solver_ops ops = {
+	.size = sizeof ops, .sets = sets, .slots = slots, .stages = stages, .ready = ready
+};
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.kind = QUERN_SOLVER,
 	.revision = 1,

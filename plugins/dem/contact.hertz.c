@@ -130,6 +130,14 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 	return contact / __builtin_sqrt(turning > 1 ? turning : 1);
 }
 
+/* sqrt 5 zeta sqrt(m k) d^(1/4) over 2 sqrt(m k_n), k_n = (3/2) k sqrt d; and 2 sqrt(5/6) zeta sqrt(k_t m) over 2 sqrt(m k_t),
+ * on m/3 or m/3.5. */
+static quern_real damping(const void *self, uint32_t dim) {
+	const hertz *law = self;
+	const quern_real share = 0.91287092917527686 * law->damping_ratio; /* sqrt(5/6) */
+	return share * (law->friction > 0 ? __builtin_sqrt(dim == 2 ? 3 : 3.5) : 1);
+}
+
 /* dF/dd of F = k d^(3/2) at F = at_force: (3/2) k^(2/3) F^(1/3) */
 static quern_real stiffness(const void *self, uint32_t dim, quern_real radius, quern_real at_force) {
 	const hertz *law = self;
@@ -138,9 +146,11 @@ static quern_real stiffness(const void *self, uint32_t dim, quern_real radius, q
 	return 1.5 * quern_cbrt(k * k * at_force);
 }
 
-static const quern_contact_ops ops = {
-	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .stiffness = stiffness
-};
+static const quern_contact_ops ops = { .size = sizeof ops,
+	.force = { force_2d, force_3d },
+	.period = period,
+	.stiffness = stiffness,
+	.damping = damping };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.kind = QUERN_CONTACT,
 	.revision = 1,

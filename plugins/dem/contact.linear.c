@@ -125,14 +125,24 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 	return 3.14159265358979312 * __builtin_sqrt(mass / (law->stiffness * (turning > 1 ? turning : 1)));
 }
 
+/* Of the normal mode, and of the tangential one, whose spring and dashpot act on m/3 or m/3.5. */
+static quern_real damping(const void *self, uint32_t dim) {
+	const linear *law = self;
+	const quern_real turning = dim == 2 ? 3 : 3.5,
+					 share = law->tangential_damping * __builtin_sqrt(turning / law->tangential_stiffness);
+	return 0.5 * law->loss * (law->friction > 0 && share > 1 ? share : 1);
+}
+
 static quern_real stiffness(const void *self, uint32_t dim, quern_real radius, quern_real at_force) {
 	(void)dim, (void)radius, (void)at_force;
 	return ((const linear *)self)->stiffness;
 }
 
-static const quern_contact_ops ops = {
-	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .stiffness = stiffness
-};
+static const quern_contact_ops ops = { .size = sizeof ops,
+	.force = { force_2d, force_3d },
+	.period = period,
+	.stiffness = stiffness,
+	.damping = damping };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.kind = QUERN_CONTACT,
 	.revision = 1,

@@ -9,10 +9,13 @@ typedef struct dem {
 	radius_law radii;
 	quern_list fill, place;
 	const char *file;
+	quern_real overlap_most, overlap_start; /* over the smaller radius */
 	int32_t settle_most;
-	bool fixed; /* some grains do not move */
+	bool fixed;    /* some grains do not move */
+	bool features; /* some bodies have several */
 	bool settles;
-	quern_real reach; /* m, of the laws beyond touching */
+	quern_real reach;  /* m, of the laws beyond touching */
+	quern_real height; /* m, of the fill, or of the domain where there is none */
 	uint32_t dim;
 } dem;
 
@@ -54,7 +57,8 @@ enum {
 	NEAR_FIRST,
 	NEAR_SECOND,
 	NEAR_GRAIN,
-	NEAR_BODY
+	NEAR_BODY,
+	NEAR_FEATURE
 };
 /* rows of dem.forces */
 enum {
@@ -88,7 +92,13 @@ enum {
 	FORCE_DAMPED,
 	FORCE_RUBBED,
 	FORCE_ID,
-	FORCE_TREMBLING
+	FORCE_TREMBLING,
+	FORCE_CONTACT_COUPLE,
+	FORCE_TOUCH_COUPLE,
+	FORCE_FEATURE,
+	FORCE_DEEP_FIRST,
+	FORCE_DEEP_SECOND,
+	FORCE_DEEP_TIME
 };
 
 /* moment of inertia over mass times radius squared */
@@ -98,6 +108,8 @@ quern_status quern_dem_fill(const void *self, const quern_step *);
 quern_status quern_dem_open(const void *self, const quern_step *);
 quern_status quern_dem_neighbours(const void *self, const quern_step *);
 quern_status quern_dem_forces(const void *self, const quern_step *);
+/* Ends the run for a grain that is out of the domain along an axis. */
+quern_status quern_dem_left(const quern_step *, int64_t id, uint32_t axis, quern_real x);
 bool quern_dem_settled(const void *self, const quern_step *);
 
 /* ---- grain_file.c ---- */

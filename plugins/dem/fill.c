@@ -126,27 +126,64 @@ static bool is_near(const quern_step *s, const dem_place *grain) {
 	return near;
 }
 
-/* A grain that somebody has placed, number k of `param`: no law has a direction for grains whose centres coincide. */
+/* ---- grains that somebody has placed ---- */
+
+enum { WORDS = 200 };
+
+/* Whether it may stand there, after all those before it; says why not. */
+static bool may_stand(const filling *f, const dem_place *grain, char why[WORDS]) {
+	const quern_step *s = f->step;
+	quern_spot spot = { .radius = grain->radius };
+	quern_real by;
+	memcpy(spot.x, grain->position, sizeof spot.x);
+	const int32_t other = quern_placer_worst(&f->placer, &spot, (1 + 1e-9) * f->d->overlap_start, &by);
+	if (other >= 0 && !(grain->fixed && f->grain[other].fixed)) {
+		const quern_real *x = f->grain[other].position;
+		const bool placed = (uint32_t)other < f->d->place.n;
+		snprintf(why, WORDS,
+			"overlaps that of %s %u, at (%g, %g, %g) m, by %.2g of a radius; overlap.start allows %g",
+			placed ? "place" : "file, row", placed ? (uint32_t)other : (uint32_t)other - f->d->place.n, x[0],
+			x[1], x[2], by, f->d->overlap_start);
+		return false;
+	}
+	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES] && !grain->fixed; b++) {
+		const quern_bound *body = &s->slot[SLOT_BODIES][b];
+		if (!quern_body_is_there(body, f->d->settles)) continue;
+		const quern_real in = -quern_body_gap(body, s->dim, spot.x, spot.radius, NULL) / spot.radius;
+		if (!(in > (1 + 1e-9) * f->d->overlap_start)) continue;
+		if (in >= 1) snprintf(why, WORDS, "starts in body %u, a %s, with its centre", b, body->id);
+		else
+			snprintf(why, WORDS, "overlaps body %u, a %s, by %.2g of a radius; overlap.start allows %g", b,
+				body->id, in, f->d->overlap_start);
+		return false;
+	}
+	return true;
+}
+
+/* Number k of `param`. No law has a direction for grains whose centres coincide. */
 static quern_status add_given(filling *f, const dem_place *given, const char *param, uint32_t k) {
 	const quern_step *s = f->step;
 	dem_place grain = *given;
-	const char *wrong = NULL;
+	char why[WORDS], item[40];
 	if (isnan(grain.radius)) grain.radius = f->d->radii.mean;
 	quern_spot centre = { .radius = 1e-3 * grain.radius };
 	memcpy(centre.x, grain.position, sizeof centre.x);
-	if (!is_near(s, &grain)) wrong = "lies outside of the domain";
+	bool good = false;
+	if (!is_near(s, &grain)) snprintf(why, WORDS, "lies outside of the domain");
+	else if (quern_too_fast(grain.velocity, 1) || quern_too_fast(grain.spin, grain.radius))
+		snprintf(why, WORDS, "moves or turns faster than light");
 	else if (!grain.fixed && !quern_placer_free(&f->placer, &centre))
-		wrong = "has its centre within another grain";
-	if (!wrong) return add(f, &grain), QUERN_OK;
-	char item[40];
+		snprintf(why, WORDS, "has its centre within another grain");
+	else good = may_stand(f, &grain, why);
+	if (good) return add(f, &grain), QUERN_OK;
 	snprintf(item, sizeof item, "%s.%u", param, k);
 	return s->host->stop(s->run, QUERN_E_PARAM, item, -1, "the grain at (%g, %g, %g) m %s", centre.x[0],
-		centre.x[1], centre.x[2], wrong);
+		centre.x[1], centre.x[2], why);
 }
 
 static quern_status add_all(filling *f, const dem_place *grain, uint32_t n, const char *param) {
 	quern_status status = QUERN_OK;
-	f->placer.n_bodies = 0; /* a grain may start behind a wall that it shall be pushed out of */
+	f->placer.n_bodies = 0; /* they are asked for one by one */
 	for (uint32_t i = 0; i < n && status == QUERN_OK; i++) status = add_given(f, &grain[i], param, i);
 	return status;
 }
@@ -243,7 +280,7 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 /* The hybrid books an impulse for each force; an integrator that acts in two steps gives half of it later. */
 static quern_status refuse_two_steps(const quern_step *s) {
 	const quern_bound *integrator = &s->slot[SLOT_INTEGRATOR][0];
-	if (!s->use[FILL_WEIGHT].real[0] || !((const quern_integrator_ops *)integrator->ops)->open[s->dim - 2])
+	if (!s->host->has(s->run, "hybrid") || !((const quern_integrator_ops *)integrator->ops)->open[s->dim - 2])
 		return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_PARAM, "integrator", -1,
 		"%s acts in two steps, and the books of a hybrid take one: use symplectic_euler", integrator->id);

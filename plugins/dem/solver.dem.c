@@ -1,4 +1,5 @@
 /* solver.dem - grains: discs and spheres with contact laws. docs/theory/grains.md */
+#include "../common/height.h"
 #include "dem.h"
 #include <math.h>
 #include <quern/math.h>
@@ -38,6 +39,12 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
+	QUERN_PARAM_AS(dem, overlap_most, "overlap.most", "1",
+		"Overlap over the smaller radius that ends the run where it lasts; 0: none does.", .def = 0.1,
+		.max = 1e6),
+	QUERN_PARAM_AS(dem, overlap_start, "overlap.start", "1",
+		"Overlap over the smaller radius that grains of place and file may have at the start.", .def = 0.01,
+		.max = 1e6),
 	QUERN_PARAM_AS(dem, rest, "settle.energy", "1",
 		"At rest when the mean kinetic energy of a grain is below this share of m g d.", .def = 1e-5,
 		.flags = QUERN_MIN_OPEN, .max = 1),
@@ -48,6 +55,9 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 		"Most steps of settling; then the run goes on with a warning.", .def = 1e6, .min = 1, .max = 2e9),
 	QUERN_PARAM(dem, fixed, NULL,
 		"Keep a flag for grains that do not move; set by itself where one is needed.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, features, NULL,
+		"Keep with every touch which feature of the body it is on; set by itself where bodies have several.",
 		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
@@ -106,15 +116,18 @@ static const quern_use open_uses[] = { F("grain.position", "m", QUERN_UPDATE, QU
 	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
 	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
 	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), FIXED(QUERN_READ), DISPLACEMENT, QUERN_END_USES };
-static const quern_use near_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
-										   .flags = QUERN_OTHERS),
+/* positions are brought back through periodic faces in place, all of them before anybody looks at others */
+static const quern_use near_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
 	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
 	F("grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS), FIXED(QUERN_READ), DISPLACEMENT,
 	F("grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made."),
 	F("contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of lower id."),
 	F("contact.second", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of higher id."),
 	F("touch.grain", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain."),
-	F("touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body."), QUERN_END_USES };
+	F("touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body."),
+	F("touch.feature", "1", QUERN_WRITE, QUERN_INDEX, .when = "features",
+		.doc = "The body's face, edge or vertex."),
+	QUERN_END_USES };
 #define ENERGY(name, access, text)                                                                           \
 	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = text)
 static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
@@ -153,6 +166,17 @@ static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUE
 	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."), F("grain.id", "1", QUERN_READ, QUERN_ID),
 	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
 		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
+	F("contact.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
+		.doc = "On the first, unweighted."),
+	F("touch.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
+		.doc = "On the grain, unweighted."),
+	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"),
+	F("total.deep_first", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", .initial = -1,
+		.doc = "Id of the grain whose deep contact is watched; -1: none is."),
+	F("total.deep_second", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
+		.doc = "Id of its partner; -1 - k for body k."),
+	F("total.deep_time", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
+		.doc = "For how long the contact has been deep."),
 	QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "dem.fill",
@@ -178,9 +202,19 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 		.run = quern_dem_forces },
 	{ .name = NULL } };
 
+static quern_status refuse_settling(const dem *d, const quern_setup *setup, quern_err *err, const char *why) {
+	const dem_fill *fill = d->fill.items;
+	char param[40];
+	uint32_t i = 0;
+	while (i + 1 < d->fill.n && !fill[i].settle) i++;
+	snprintf(param, sizeof param, "fill.%u.settle", i);
+	return setup->host->fail(err, QUERN_E_PARAM, param, "%s", why);
+}
+
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	dem *d = self;
-	quern_real g2 = 0, height = 0;
+	quern_real g2 = 0;
+	fill_height loose = fill_height_of(setup);
 	d->dim = setup->dim;
 	d->radii.stream = setup->stream;
 	const dem_fill *fill = d->fill.items;
@@ -196,9 +230,10 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			if (fill[i].lower[k] < setup->lower[k] - slack || fill[i].upper[k] > setup->upper[k] + slack)
 				return setup->host->fail(
 					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
-			const quern_real extent = fill[i].upper[k] - fill[i].lower[k];
-			height = !fill[i].fixed && extent > height ? extent : height;
 		}
+		if (quern_too_fast(fill[i].velocity, 1))
+			return setup->host->fail(err, QUERN_E_PARAM, "fill", "the velocity is beyond that of light");
+		if (!fill[i].fixed) fill_height_add(&loose, fill[i].lower, fill[i].upper);
 		d->fixed = d->fixed || fill[i].fixed;
 		d->settles = d->settles || fill[i].settle;
 	}
@@ -208,16 +243,46 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
 	if (d->file) d->fixed = true; /* its header may say so */
 	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
+	if (d->settles && !(g2 > 0))
+		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
 	if (isnan(d->drag)) d->drag = 0.1 * sqrt(gravity / diameter);
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
+	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
+	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->density);
 	setup->host->publish(setup, "grain.radius_spread", "1", d->radii.spread);
 	setup->host->publish(setup, "grain.radius_law", "1", d->radii.law);
-	setup->host->publish(
-		setup, "fill.height", "m", height > 0 ? height : setup->upper[d->dim - 1] - setup->lower[d->dim - 1]);
+	const quern_real height = fill_height_all(&loose);
+	d->height = height > 0 ? height : setup->upper[loose.axis] - setup->lower[loose.axis];
+	setup->host->publish(setup, "fill.height", "m", d->height);
 	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
 	return QUERN_OK;
+}
+
+/* The largest grain that any source brings; a table that cannot be read is found later, with its place. */
+static quern_real widest(const dem *d) {
+	const dem_place *place = d->place.items;
+	quern_real most = quern_radius_most(&d->radii);
+	grain_table table = { 0 };
+	char why[200];
+	for (uint32_t i = 0; i < d->place.n; i++) most = place[i].radius > most ? place[i].radius : most;
+	if (d->file && quern_grain_table_load(d->file, d->dim, &table, why))
+		for (uint32_t i = 0; i < table.n; i++)
+			most = table.grain[i].radius > most ? table.grain[i].radius : most;
+	quern_grain_table_finish(&table);
+	return most;
+}
+
+/* How far the law acts beyond touching, between two of the largest grains and of one on each body. */
+static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32_t bodies) {
+	const quern_contact_ops *ops = law->ops;
+	quern_real reach = ops->reach(law->self, 0.5 * radius);
+	for (uint32_t b = 0; b < bodies; b++) {
+		const quern_real on_body = ops->reach(law->n_variant ? law->variant[b] : law->self, radius);
+		reach = on_body > reach ? on_body : reach;
+	}
+	d->reach = reach > d->reach ? reach : d->reach;
 }
 
 /* A random packing's bulk modulus, from the affine estimates of docs/theory/grains.md, section 5, with what real
@@ -226,21 +291,20 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	const uint32_t *n_slot, quern_err *err) {
 	dem *d = self;
 	quern_real kn = 0, g2 = 0;
-	(void)err;
+	if (d->settles && !n_slot[SLOT_CONTACT])
+		return refuse_settling(d, setup, err, "without a contact law grains fall for ever: give contact one");
+	d->features = false;
+	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
+		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
 	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
-	quern_real height = setup->upper[d->dim - 1] - setup->lower[d->dim - 1];
-	const dem_fill *fill = d->fill.items;
-	for (uint32_t i = 0; i < d->fill.n; i++)
-		if (!fill[i].fixed) height = fill[i].upper[d->dim - 1] - fill[i].lower[d->dim - 1];
-	const quern_real pressure = packing * d->density * sqrt(g2) * height;
+	const quern_real pressure = packing * d->density * sqrt(g2) * d->height;
 	const quern_real force = pressure * diameter * (d->dim == 3 ? diameter : 1);
 	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
 		const quern_bound *law = &slot[SLOT_CONTACT][l];
 		const quern_contact_ops *ops = law->ops;
 		if (ops->stiffness) kn += ops->stiffness(law->self, d->dim, 0.5 * d->radii.mean, 0.5 * force);
-		const quern_real reach = ops->reach ? ops->reach(law->self, 0.5 * quern_radius_most(&d->radii)) : 0;
-		d->reach = reach > d->reach ? reach : d->reach;
+		if (ops->reach) find_reach(d, law, widest(d), n_slot[SLOT_BODIES]);
 	}
 	const quern_real bulk =
 		d->dim == 2 ? 0.3 * kn : 0.6 * 5 * packing * kn / (3 * 3.141592653589793 * diameter);
@@ -251,13 +315,42 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	return QUERN_OK;
 }
 
+/* ---- the step ---- */
+
+typedef struct {
+	const dem *d;
+	quern_real period, hard,
+		damping; /* s: the shortest half-period and the shortest hard limit; ratio of that law */
+	const char *law, *where, *body;
+} shortest;
+
+/* The fastest mode of a packing: a grain has several contacts. omega_max^2 = 6 k/m of a triangular lattice and 8 k/m of a
+ * face-centred one are 3 and 4 times that of a pair. */
+static quern_real crowding(uint32_t dim) { return dim == 2 ? 1.7320508075688772 : 2; }
+
+/* 0.2 of the half-period, and the limit of explicit dashpots in a packing, omega dt < 2 (sqrt(1 + zeta^2) - zeta). */
+static void consider(shortest *s, const quern_bound *law, const void *self, quern_real mass,
+	quern_real radius, const char *where, const char *body) {
+	const quern_contact_ops *ops = law->ops;
+	if (!ops->period) return;
+	const quern_real t = ops->period(self, s->d->dim, mass, radius), c = crowding(s->d->dim);
+	const quern_real ratio = ops->damping ? ops->damping(self, s->d->dim) : 0, zeta = c * ratio;
+	const quern_real damped = 2 * (sqrt(1 + zeta * zeta) - zeta) / c * t / 3.141592653589793;
+	const quern_real hard = damped < 0.2 * t ? damped : 0.2 * t;
+	s->hard = hard < s->hard ? hard : s->hard;
+	if (!(t < s->period)) return;
+	s->period = t, s->damping = ratio;
+	s->law = law->id, s->where = where, s->body = body;
+}
+
 /* The stiffest contact is that of the two lightest grains, or of the lightest against a body. */
 static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	const dem *d = self;
 	const quern_set_view grains = s->host->set(s->run, "grain");
 	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
 	const int32_t *fixed = s->use[FILL_FIXED].index;
-	quern_real least[2] = { INFINITY, INFINITY }, small = INFINITY, shortest = INFINITY;
+	quern_real least[2] = { INFINITY, INFINITY }, small = INFINITY;
+	shortest found = { .d = d, .period = INFINITY, .hard = INFINITY };
 	for (uint32_t i = 0; i < grains.n; i++) {
 		if (fixed && fixed[i]) continue;
 		if (mass[i] < least[0]) least[1] = least[0], least[0] = mass[i], small = radius[i];
@@ -267,28 +360,26 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		small = quern_radius_least(&d->radii);
 		least[0] = least[1] = quern_radius_mass(small, d->density, d->dim);
 	}
-	const quern_real pair = isfinite(least[1]) ? least[0] * least[1] / (least[0] + least[1]) : least[0];
+	const bool two = isfinite(least[1]);
+	const quern_real pair = two ? least[0] * least[1] / (least[0] + least[1]) : least[0];
 	const quern_bound *law = s->slot[SLOT_CONTACT];
 	for (uint32_t l = 0; l < s->n_slot[SLOT_CONTACT]; l++) {
-		const quern_contact_ops *ops = law[l].ops;
-		if (!ops->period) continue;
-		quern_real t = ops->period(law[l].self, d->dim, pair, 0.5 * small);
-		if (t < shortest)
-			shortest = t,
-			snprintf(reason, 160, "%s %s", law[l].id,
-				isfinite(least[1]) ? "between the two lightest grains" : "on the lightest grain");
-		for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
-			t = ops->period(law[l].n_variant ? law[l].variant[b] : law[l].self, d->dim, least[0], small);
-			if (t < shortest)
-				shortest = t, snprintf(reason, 160, "%s of the lightest grain on %s", law[l].id,
-								  s->slot[SLOT_BODIES][b].id);
-		}
+		consider(&found, &law[l], law[l].self, pair, 0.5 * small,
+			two ? "between the two lightest grains" : "on the lightest grain", "");
+		for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++)
+			consider(&found, &law[l], law[l].n_variant ? law[l].variant[b] : law[l].self, least[0], small,
+				"of the lightest grain on ", s->slot[SLOT_BODIES][b].id);
 	}
-	const size_t n = __builtin_strlen(reason);
-	if (isfinite(shortest)) snprintf(reason + n, 160 - n, ", half-period %.3g s / 50", shortest);
+	*hard = found.hard;
+	const bool by_period = found.period / 50 <= 0.5 * found.hard;
+	char damped[48] = "";
+	if (found.hard < 0.2 * found.period)
+		snprintf(damped, sizeof damped, ", damping ratio %.3g", found.damping);
+	if (isfinite(found.period))
+		snprintf(reason, 160, "%s %s%s, half-period %.3g s%s%s", found.law, found.where, found.body,
+			found.period, by_period ? " / 50" : "", damped);
 	else snprintf(reason, 160, "grains without a contact law");
-	*hard = 0.2 * shortest;
-	return shortest / 50;
+	return by_period ? found.period / 50 : 0.5 * found.hard;
 }
 
 static void account(const void *self, const quern_step *s, quern_account *out) {

@@ -107,6 +107,8 @@ quern_status quern_hybrid_sort(update *d) {
 	d->drop_point = take(d, d->n_points, sizeof(bool));
 	d->mass = take(d, d->n_cells, sizeof(quern_real));
 	d->spread = take(d, d->n_cells, sizeof(quern_real));
+	d->wall = take(d, d->n_cells, sizeof(quern_real));
+	d->open = take(d, d->n_cells, sizeof(quern_real));
 	d->zone = take(d, d->n_cells, sizeof(int32_t));
 	for (uint32_t k = 0; k < s->dim; k++) d->velocity[k] = take(d, d->n_cells, sizeof(quern_real));
 	if (d->failed) return QUERN_E_MEMORY;
@@ -159,8 +161,9 @@ void quern_hybrid_averages(update *d) {
 	}
 }
 
-/* A grain counts as the square or cube of its volume: sums are exact, and a cell of a diameter or more hardly sees the
- * difference. A cell with a tenth of a full cell's mass in points is full: so is what points stand for. */
+/* Of the room that bodies leave. A grain counts as the square or cube of its volume: sums are exact, and a cell of a diameter
+ * or more hardly sees the difference. A cell with a tenth of the mass that fills it in points is full: so is what points
+ * stand for. */
 void quern_hybrid_fractions(update *d) {
 	const quern_column *u = d->u;
 	quern_real *fraction = u[U_FRACTION].real[0];
@@ -198,7 +201,8 @@ void quern_hybrid_fractions(update *d) {
 		quern_real mass = 0;
 		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
 			mass += u[U_POINT_MASS].real[0][d->point[q]];
-		if (mass >= 0.1 * d->full) fraction[c] = 1;
+		const quern_real room = d->open[c] > 0.125 ? d->open[c] : 0.125;
+		fraction[c] = mass >= 0.1 * room * d->full ? 1 : fraction[c] / room;
 	}
 }
 

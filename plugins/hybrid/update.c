@@ -8,10 +8,12 @@
 static quern_status reckon(update *d) {
 	quern_hybrid_move_entries(d);
 	quern_hybrid_averages(d);
+	quern_status status = quern_hybrid_walls(d);
+	if (status != QUERN_OK) return status;
 	quern_hybrid_fractions(d);
 	quern_hybrid_rates(d);
 	if (d->failed) return QUERN_E_MEMORY;
-	quern_status status = quern_hybrid_zones(d);
+	status = quern_hybrid_zones(d);
 	if (status != QUERN_OK) return status;
 	quern_hybrid_weigh(d);
 	quern_hybrid_net(d);

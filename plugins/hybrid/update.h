@@ -4,7 +4,9 @@
 
 typedef struct new_point {
 	quern_real position[3], velocity[3], stress[6], mass, weight;
+	quern_real volume; /* of a part of others; else the one that goes with the stress is taken */
 	int32_t cell;
+	int32_t parent; /* old entry that it is a part of, -1: none */
 } new_point;
 
 typedef struct new_grain {
@@ -23,8 +25,9 @@ typedef struct update {
 	int32_t *grain, *point;
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
-	quern_real full, nominal;                /* kg: of a full cell, of one point in it */
-	int32_t *zone; /* by cell: the new one; the old one stands in the field until the end */
+	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that lies in none */
+	quern_real full, nominal; /* kg: of a full cell, of one point in it */
+	int32_t *zone;            /* by cell: the new one; the old one stands in the field until the end */
 	bool *drop_grain, *drop_point;
 	new_point *points;
 	uint32_t n_new_points, cap_points;
@@ -54,6 +57,12 @@ bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stres
 /* Normals of the zone at every particle, and where each is, for the next update. After the sets have their new order. */
 quern_status quern_hybrid_normals(update *);
 void quern_hybrid_homes(update *);
+
+/* ---- walls.c ---- */
+quern_status quern_hybrid_walls(update *);
+/* Whether a body stands between two places, one of them in that cell and the other in it or in one beside it, be it ever so
+ * thin. */
+bool quern_hybrid_walled(const update *, uint32_t entry, const quern_real from[3], const quern_real to[3]);
 
 /* ---- zones.c ---- */
 quern_status quern_hybrid_zones(update *);

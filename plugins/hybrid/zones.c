@@ -19,7 +19,7 @@ typedef struct {
 	heap_entry *heap;
 	size_t n, cap;
 	quern_real *distance; /* by cell */
-	int16_t (*way)[3];    /* by cell: to its source, in cells */
+	int32_t (*way)[3];    /* by cell: to its source, in cells */
 	bool boxes;           /* the source is a whole cell, not its centre */
 	bool failed;
 } spreading;
@@ -56,7 +56,7 @@ static heap_entry pop(spreading *p) {
 	return top;
 }
 
-static quern_real length_of(const spreading *p, const int16_t way[3]) {
+static quern_real length_of(const spreading *p, const int32_t way[3]) {
 	quern_real sum = 0;
 	for (uint32_t k = 0; k < p->d->g->dim; k++) {
 		quern_real x = abs(way[k]);
@@ -66,7 +66,7 @@ static quern_real length_of(const spreading *p, const int16_t way[3]) {
 	return sqrt(sum) * p->d->g->cell;
 }
 
-static void offer(spreading *p, uint32_t cell, const int16_t way[3]) {
+static void offer(spreading *p, uint32_t cell, const int32_t way[3]) {
 	const quern_real distance = length_of(p, way);
 	if (!(distance < p->distance[cell])) return;
 	p->distance[cell] = distance;
@@ -86,10 +86,10 @@ static void spread(spreading *p, const bool *open) {
 				for (int x = -1; x <= 1; x++) {
 					const int step[3] = { x, y, z };
 					int32_t to[3];
-					int16_t way[3];
+					int32_t way[3];
 					for (uint32_t k = 0; k < 3; k++) {
 						to[k] = cell[k] + step[k];
-						way[k] = (int16_t)(p->way[e.cell][k] - step[k]);
+						way[k] = p->way[e.cell][k] - step[k];
 					}
 					const int32_t c = quern_hybrid_entry(p->d, to);
 					if (c >= 0 && (!open || open[c])) offer(p, (uint32_t)c, way);
@@ -110,7 +110,7 @@ quern_status quern_hybrid_nearest(update *d, const bool *source, int32_t *neares
 	quern_real *distance = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	if (!spreading_init(&p, d, false, distance)) return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++)
-		if (source[c]) offer(&p, c, (const int16_t[3]) { 0, 0, 0 });
+		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
 	spread(&p, NULL);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
@@ -130,28 +130,19 @@ typedef struct {
 	uint32_t *queue;
 } surface;
 
-/* A place is behind a body if it lies in one that is there now. */
-static bool in_body(const update *d, const quern_real x[3]) {
-	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
-		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
-		if (quern_body_is_there(body, d->s->settling) && quern_body_gap(body, d->s->dim, x, 0, NULL) < 0)
-			return true;
-	}
-	return false;
-}
-
-/* What lies one step from a cell: nothing that counts, open space, or a wall. */
+/* What lies one step from a cell: another one, open space, or a wall, which may stand between two cells. */
 enum { BESIDE_CELL, BESIDE_OPEN, BESIDE_WALL };
 
-static int beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t *entry) {
+static int beside(
+	const update *d, uint32_t c, const int32_t cell[3], uint32_t axis, int step, int32_t *entry) {
 	int32_t other[3];
-	quern_real x[3];
+	quern_real from[3], to[3];
 	*entry = quern_hybrid_beside(d, cell, axis, step, other);
-	if (*entry >= 0) return BESIDE_CELL;
-	if (*entry == -1) return BESIDE_OPEN; /* not allocated: nothing is there */
-	quern_hybrid_centre(d, cell, x);
-	x[axis] += step * d->g->cell;
-	return in_body(d, x) ? BESIDE_WALL : BESIDE_OPEN;
+	quern_hybrid_centre(d, cell, from);
+	quern_hybrid_centre(d, cell, to);
+	to[axis] += step * d->g->cell;
+	if (quern_hybrid_walled(d, c, from, to)) return BESIDE_WALL;
+	return *entry < 0 ? BESIDE_OPEN : BESIDE_CELL; /* not allocated: nothing is there */
 }
 
 /* Outside is what the open boundary reaches through cells that are marked so; a void within does not count. */
@@ -163,16 +154,16 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 		if (!quern_hybrid_cell(d, c, cell) || f->solid[c] || level[c] > 0) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2)
-				open = open || beside(d, cell, k, step, &other) == BESIDE_OPEN;
+				open = open || beside(d, c, cell, k, step, &other) == BESIDE_OPEN;
 		if (open) f->outside[c] = true, f->queue[n++] = c;
 	}
 	for (uint32_t q = 0; q < n; q++) {
-		int32_t cell[3], other[3];
+		int32_t cell[3], c;
 		quern_hybrid_cell(d, f->queue[q], cell);
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2) {
-				const int32_t c = quern_hybrid_beside(d, cell, k, step, other);
-				if (c < 0 || f->outside[c] || f->solid[c] || level[c] > 0) continue;
+				if (beside(d, f->queue[q], cell, k, step, &c) != BESIDE_CELL) continue;
+				if (f->outside[c] || f->solid[c] || level[c] > 0) continue;
 				f->outside[c] = true;
 				f->queue[n++] = (uint32_t)c;
 			}
@@ -191,10 +182,8 @@ static quern_status surface_distance(
 		return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
-		quern_real x[3];
 		if (!quern_hybrid_cell(d, c, cell)) continue;
-		quern_hybrid_centre(d, cell, x);
-		f.solid[c] = in_body(d, x);
+		f.solid[c] = d->open[c] == 0;
 		if (!(flags & QUERN_SURFACE_FLOOD)) f.outside[c] = !f.solid[c] && level[c] <= 0;
 	}
 	if (flags & QUERN_SURFACE_FLOOD) flood(d, &f, level);
@@ -204,12 +193,12 @@ static quern_status surface_distance(
 		if (!f.inside[c] || !quern_hybrid_cell(d, c, cell)) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2) {
-				const int what = beside(d, cell, k, step, &other);
+				const int what = beside(d, c, cell, k, step, &other);
 				const bool wall = what == BESIDE_WALL || (what == BESIDE_CELL && f.solid[other]);
 				const bool nothing = what == BESIDE_OPEN && flags & QUERN_SURFACE_FLOOD;
 				const bool open = nothing || (what == BESIDE_CELL && f.outside[other]);
-				int16_t way[3] = { 0 };
-				way[k] = (int16_t)step;
+				int32_t way[3] = { 0 };
+				way[k] = step;
 				if (open || (wall && flags & QUERN_SURFACE_WALLS)) offer(&p, c, way);
 			}
 	}
@@ -228,9 +217,8 @@ typedef struct {
 
 static void ask(const update *d, const quern_bound *oracle, uint32_t b, const quern_real *distance,
 	quern_real shift, oracle_memory *m, quern_real *level, int32_t *wish) {
-	enum { MOST_ROWS = 16 };
 	const quern_oracle_ops *ops = oracle->ops;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_cell_batch batch = { .n = N,
 		.cap = N,
 		.dim = d->s->dim,
@@ -249,7 +237,7 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 	}
 	for (uint32_t k = 0; k < d->s->dim; k++) batch.centre[k] = m->centre[k];
 	if (distance) batch.distance = m->shifted;
-	for (uint32_t r = 0; r < oracle->n_uses && r < MOST_ROWS; r++)
+	for (uint32_t r = 0; r < oracle->n_uses; r++)
 		own[r] = quern_column_from(oracle->column[r], oracle->uses[r].shape, b * N);
 	if (distance) ops->decide(oracle->self, &batch);
 	else ops->mark(oracle->self, &batch);

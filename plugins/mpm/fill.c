@@ -58,20 +58,78 @@ static void place(const mpm *p, const quern_step *s, const mpm_fill *item, const
 	}
 }
 
-/* A hybrid starts from all grains: its oracle decides where points go. */
-quern_status quern_mpm_fill(const void *self, const quern_step *s) {
-	const mpm *p = self;
+/* ---- what bodies leave of it ---- */
+
+enum { CHUNK = 64 };
+
+typedef struct {
+	_Alignas(64) quern_real radius[CHUNK], gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
+} near_points;
+
+/* Marks the points that lie in a body; returns how many were not marked before. */
+static uint32_t mark_inside(const quern_step *s, const quern_bound *body, uint32_t n, bool *inside) {
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	near_points w = { .radius = { 0 } };
+	uint32_t found = 0;
+	for (uint32_t i = 0; i < n; i += CHUNK) {
+		const uint32_t m = n - i < CHUNK ? n - i : CHUNK;
+		quern_body_batch batch = {
+			.n = m, .cap = CHUNK, .dim = s->dim, .pose = &still, .radius = w.radius, .gap = w.gap
+		};
+		for (uint32_t k = 0; k < s->dim; k++) {
+			batch.position[k] = s->use[FILL_POSITION].real[k] + i;
+			batch.normal[k] = w.normal[k];
+			batch.velocity[k] = w.velocity[k];
+		}
+		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
+		for (uint32_t q = 0; q < m; q++) {
+			if (inside[i + q] || !(w.gap[q] < 0)) continue;
+			inside[i + q] = true;
+			found++;
+		}
+	}
+	return found;
+}
+
+/* A fill may reach into bodies: what lies in one that acts on the continuum after the release is left out, and said. */
+static quern_status clip(const quern_step *s, uint32_t *n) {
+	bool *inside = s->host->memory(s->run, (size_t)*n + 1);
+	int32_t *from = s->host->memory(s->run, ((size_t)*n + 1) * sizeof(int32_t));
+	uint32_t kept = 0;
+	if (!inside || !from) return QUERN_E_MEMORY;
+	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
+		const quern_bound *body = &s->slot[SLOT_BODIES][b];
+		const body_item *item = body->item;
+		if (!quern_body_is_there(body, false) || (item->boundary == BOUNDARY_NONE && isnan(item->friction)))
+			continue;
+		const uint32_t found = mark_inside(s, body, *n, inside);
+		if (found == *n)
+			return s->host->stop(
+				s->run, QUERN_E_PARAM, "fill", -1, "lies in body %u, a %s, with all its points", b, body->id);
+		if (found)
+			s->host->log(s->run, 2,
+				"%u of %u points of continuum.fill lie in body %u, a %s, and are left out", found, *n, b,
+				body->id);
+	}
+	for (uint32_t i = 0; i < *n; i++)
+		if (!inside[i]) from[kept++] = (int32_t)i;
+	if (kept == *n) return QUERN_OK;
+	*n = kept;
+	if (!kept) return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1, "lies in bodies with all its points");
+	return s->host->remap(s->run, "point", kept, from, 0, NULL);
+}
+
+/* ---- the stage ---- */
+
+static quern_status count_points(const mpm *p, const quern_step *s, uint32_t *total) {
 	const mpm_fill *item = p->fill.items;
 	quern_real wanted = 0;
-	uint32_t total = 0;
-	s->use[FILL_UNSORTED].index[0] = 1;
-	if (s->use[FILL_WEIGHT].real[0]) return QUERN_OK;
 	for (uint32_t f = 0; f < p->fill.n; f++) {
 		quern_real g = 0;
 		const lattice l = lattice_of(p, &item[f]);
 		wanted += l.wanted;
 		if (wanted > MOST_POINTS) break;
-		total += l.n;
+		*total += l.n;
 		if (item[f].stress == STRESS_AT_REST && gravity_axis(s, &g) < 0 && g != 0)
 			return s->host->stop(
 				s->run, QUERN_E_PARAM, "fill", -1, "stress at_rest needs gravity along an axis");
@@ -79,17 +137,34 @@ quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 	if (wanted > MOST_POINTS)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"asks for about %.2g points, more than %d: make cells larger", wanted, MOST_POINTS);
-	if (!total) return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill");
+	return *total ? QUERN_OK : s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill");
+}
+
+/* A hybrid starts from all grains: its oracle decides where points go. */
+quern_status quern_mpm_fill(const void *self, const quern_step *s) {
+	const mpm *p = self;
+	const mpm_fill *item = p->fill.items;
+	uint32_t total = 0;
+	s->use[FILL_UNSORTED].index[0] = 1;
+	if (p->rasterise == RASTERISE_PLAIN && s->use[FILL_AFFINE].real[0])
+		return s->host->stop(s->run, QUERN_E_PARAM, "rasterise", -1,
+			"is plain, and the hybrid's coupling compares velocities at one place, for which points must "
+			"send their gradient: take affine, or hybrid.coupling: lumped");
+	if (s->host->has(s->run, "hybrid")) return QUERN_OK;
+	quern_status status = count_points(p, s, &total);
+	if (status != QUERN_OK) return status;
 	int32_t *from = s->host->memory(s->run, ((size_t)total + 1) * sizeof(int32_t));
 	if (!from) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < total; i++) from[i] = -1;
-	const quern_status status = s->host->remap(s->run, "point", total, from, 0, NULL);
+	status = s->host->remap(s->run, "point", total, from, 0, NULL);
 	if (status != QUERN_OK) return status;
 	for (uint32_t f = 0, first = 0; f < p->fill.n; f++) {
 		const lattice l = lattice_of(p, &item[f]);
 		place(p, s, &item[f], &l, first);
 		first += l.n;
 	}
+	status = clip(s, &total);
+	if (status != QUERN_OK) return status;
 	s->host->log(s->run, 0, "%u points placed", total);
 	const quern_column *u = s->use;
 	const stressed_points points = {

@@ -1,4 +1,5 @@
 /* observer.runout - how far and how high the material lies, by quantiles of the connected mass */
+#include "../common/height.h"
 #include "observers.h"
 #include <math.h>
 #include <stdlib.h>
@@ -58,25 +59,16 @@ static int by_up(const void *a, const void *b) {
 	return order(x->up, y->up, x->number, y->number);
 }
 
-/* The axis along which gravity acts, and its direction; the last axis, upwards, where there is none. */
-static uint32_t vertical(const quern_observer_batch *b, quern_real *sign) {
-	uint32_t axis = b->dim - 1;
-	for (uint32_t k = 0; k < b->dim; k++)
-		if (fabs(b->gravity[k]) > fabs(b->gravity[axis])) axis = k;
-	*sign = b->gravity[axis] > 0 ? -1 : 1;
-	return axis;
-}
-
 static uint32_t collect(const observer *o, const quern_observer_batch *b, item *out) {
-	quern_real sign;
-	const uint32_t up = vertical(b, &sign);
+	const uint32_t up = quern_vertical(b->dim, b->gravity);
+	const bool down = b->gravity[up] > 0; /* gravity points to higher coordinates */
 	uint32_t n = 0;
 	for (int point = 0; point < 2; point++) {
 		const quern_column *x = &b->use[point ? POINT_POSITION : GRAIN_POSITION];
 		for (uint32_t i = 0; i < cloud_size(b, point); i++) {
 			const quern_real m = carried(b, point, i);
 			if (!(m > 0)) continue;
-			const quern_real h = sign > 0 ? x->real[up][i] - b->lower[up] : b->upper[up] - x->real[up][i];
+			const quern_real h = down ? b->upper[up] - x->real[up][i] : x->real[up][i] - b->lower[up];
 			out[n] = (item) { x->real[o->axis][i] - o->origin, h, m, n };
 			n++;
 		}

@@ -4,20 +4,34 @@
 
 typedef struct {
 	int32_t body;
+	quern_real bodies; /* there are */
 } observer;
 static const quern_param params[] = { QUERN_PARAM(observer, body, "1",
 										  "Number of the body in the scene's list, from 0.", .max = 1e6),
+	QUERN_PARAM(observer, bodies, "1", "Bodies that there are.", .from = "bodies.count",
+		.flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),
 	QUERN_END_PARAMS };
-enum { IMPULSE, BEFORE, SINCE };
+enum { IMPULSE, BEFORE, SINCE, FORCE };
 static const quern_use uses[] = { F("body.impulse", "N s", QUERN_READ, QUERN_VECTOR,
 									  .doc = "Given to the material since the release."),
 	F("body.impulse_before", "N s", QUERN_UPDATE, QUERN_VECTOR, .doc = "The same, at the last observation."),
 	F("body.observed", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Time of the last observation."),
+	F("body.force", "N", QUERN_UPDATE, QUERN_VECTOR,
+		.doc = "Mean force of the material between the last two observations."),
 	QUERN_END_USES };
 static const quern_output outputs[] = { { .name = "x", .unit = "N", .doc = "Along x." },
 	{ .name = "y", .unit = "N", .doc = "Along y." },
 	{ .name = "z", .unit = "N", .doc = "Along z; 0 in 2-D." }, { .name = NULL } };
 
+static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
+	const observer *o = self;
+	if (isnan(o->bodies)) return QUERN_OK;
+	if (o->body < o->bodies) return QUERN_OK;
+	return setup->host->fail(err, QUERN_E_PARAM, "body",
+		"there is no body %d; the scene has %.0f, counted from 0", o->body, o->bodies);
+}
+
+/* Several observers may look at one body: the first of them at a time takes stock, and all say the same. */
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
 	const observer *o = self;
@@ -27,12 +41,12 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 		return host->stop(run, QUERN_E_PARAM, NULL, -1,
 			"wall_force: there is no body %d; the scene has %u, counted from 0", o->body, b->count[IMPULSE]);
 	const quern_real length = b->time - u[SINCE].real[0][i];
-	for (uint32_t k = 0; k < b->dim; k++) {
-		const quern_real given = u[IMPULSE].real[k][i] - u[BEFORE].real[k][i];
-		out[k] = length > 0 ? -given / length : 0;
+	for (uint32_t k = 0; k < b->dim && length > 0; k++) {
+		u[FORCE].real[k][i] = (u[BEFORE].real[k][i] - u[IMPULSE].real[k][i]) / length;
 		u[BEFORE].real[k][i] = u[IMPULSE].real[k][i];
 	}
-	u[SINCE].real[0][i] = b->time;
+	if (length > 0) u[SINCE].real[0][i] = b->time;
+	for (uint32_t k = 0; k < b->dim; k++) out[k] = u[FORCE].real[k][i];
 	return QUERN_OK;
 }
 
@@ -47,5 +61,6 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.instance_size = sizeof(observer),
 	.params = params,
 	.uses = uses,
+	.init = init,
 	.ops = &ops };
 QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -2,7 +2,7 @@
 #include <quern/abi.h>
 
 typedef struct {
-	quern_real critical, depth, half_width;
+	quern_real critical, depth, half_width, cell;
 	bool walls;
 } surface;
 
@@ -13,6 +13,8 @@ static const quern_param params[] = {
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(surface, half_width, "m", "Half the width of the hybrid zone; a cell at least.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(
+		surface, cell, "m", "Cell of the grid.", .from = "grid.cell", .flags = QUERN_MAYBE | QUERN_ADVANCED),
 	QUERN_PARAM(surface, walls, NULL, "Walls and floors count as surface too, so that grains meet them."),
 	QUERN_END_PARAMS
 };
@@ -26,6 +28,9 @@ static const quern_use uses[] = { { .field = "cell.packing_fraction",
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	const surface *p = self;
+	if (p->half_width < (1 - 1e-9) * p->cell)
+		return setup->host->fail(err, QUERN_E_PARAM, "half_width",
+			"must be a cell at least, %.4g m: a narrower zone is none in places", p->cell);
 	if (p->depth > p->half_width) return QUERN_OK;
 	return setup->host->fail(err, QUERN_E_PARAM, "half_width",
 		"must be less than the depth, %.4g m: grains must be left at the surface", p->depth);

@@ -3,7 +3,7 @@
 #include <quern/abi.h>
 
 typedef struct {
-	quern_real shear_rate, inertial_number, release, depth, half_width;
+	quern_real shear_rate, inertial_number, release, depth, half_width, cell;
 	bool by_rate, by_number;
 } shear;
 
@@ -18,6 +18,8 @@ static const quern_param params[] = { QUERN_PARAM(shear, shear_rate, "1/s",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(shear, half_width, "m", "Half the width of the hybrid zone; a cell at least.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(
+		shear, cell, "m", "Cell of the grid.", .from = "grid.cell", .flags = QUERN_MAYBE | QUERN_ADVANCED),
 	QUERN_PARAM(shear, by_rate, NULL, "Keep the shear rate; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_PARAM(shear, by_number, NULL, "Keep the inertial number; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
@@ -42,6 +44,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	p->by_number = !isnan(p->inertial_number);
 	if (!p->by_rate && !p->by_number)
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "give shear_rate, inertial_number or both");
+	if (p->half_width < (1 - 1e-9) * p->cell)
+		return setup->host->fail(err, QUERN_E_PARAM, "half_width",
+			"must be a cell at least, %.4g m: a narrower zone is none in places", p->cell);
 	if (p->depth > p->half_width) return QUERN_OK;
 	return setup->host->fail(err, QUERN_E_PARAM, "half_width",
 		"must be less than the depth, %.4g m: grains must be left where the flow is fast", p->depth);

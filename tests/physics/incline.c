@@ -39,7 +39,9 @@ static quern_run *open_scene(const incline *c, double angle) {
 	text_add(&t, "time: {end: 10}, output: {every: 0.01, fields: [touch.force]},\n");
 	text_add(&t, "bodies: [{plane: {point: [0, 0%s], normal: [0, 1%s], contact: {friction: %.17g}}}],\n",
 		deep ? ", 0" : "", deep ? ", 0" : "", c->friction);
-	text_add(&t, "grains:\n  {material: {density: 2500, radius: {mean: %.17g}}, contact: ", radius);
+	text_add(&t,
+		"grains:\n  {material: {density: 2500, radius: {mean: %.17g}}, overlap: {start: 0.1}, contact: ",
+		radius);
 	text_add(&t, c->hertz ? "{hertz: {young: 1e9, friction: 0.5, restitution: 0.2}},\n"
 						  : "{linear: {stiffness: 1e6, friction: 0.5, restitution: 0.2}},\n");
 	text_add(&t, "  place: [");

@@ -41,7 +41,8 @@ static quern_run *open_scene(const heap *h) {
 			"total.kinetic,\n"
 			"  total.potential]}, observe: [energy],\n"
 			"bodies: [{plane: {point: [0, 0], normal: [0, 1]}}, {plane: {point: [0, 0], normal: [1, 0]}}],\n"
-			"grains: {material: {density: 2500, radius: {mean: 0.005, spread: 0.2, law: uniform}},\n"
+			"grains: {material: {density: 2500, radius: {mean: 0.005, spread: 0.2, law: uniform}}, overlap: "
+			"{most: 0},\n"
 			"  contact: {%s}, integrator: %s,\n"
 			"  fill: [{region: {box: {lower: [0, 0], upper: [1, 0]}}, fixed: true},\n"
 			"    {region: {box: {lower: [0, 0.01], upper: [%.17g, %.17g]}}}]}}\n",
@@ -56,7 +57,8 @@ static quern_run *open_scene(const heap *h) {
 		"0]}},\n"
 		"  {plane: {point: [0, 0, 0], normal: [0, 0, 1], contact: {friction: 0}}},\n"
 		"  {plane: {point: [0, 0, 0.05], normal: [0, 0, -1], contact: {friction: 0}}}],\n"
-		"grains: {material: {density: 2500, radius: {mean: 0.005, spread: 0.2, law: uniform}},\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.005, spread: 0.2, law: uniform}}, overlap: "
+		"{most: 0},\n"
 		"  contact: {%s}, integrator: %s,\n"
 		"  fill: [{region: {box: {lower: [0, 0, 0.005], upper: [0.6, 0, 0.045]}}, fixed: true},\n"
 		"    {region: {box: {lower: [0, 0.01, 0.005], upper: [%.17g, %.17g, 0.045]}}}]}}\n",

@@ -31,14 +31,14 @@ SMALL = {
         domain__upper="[0.2, 0.32]", time__end="80 ms", output__every="5 ms", hybrid__update=100, output__fields=FIELDS,
         grains__fill__0__region__box="{lower: [0, -0.7 mm], upper: [0.2, -0.7 mm]}",
         grains__fill__1__region__box="{lower: [0.001, 0.001], upper: [0.039, 0.045]}",
-        bodies__2__plane__point="[0.04, 0]", grains__contact__linear__stiffness="1e5 N/m",
+        bodies__2__plane__point="[0.04, 0]", grains__contact__linear__stiffness="1e5 N/m", grains__overlap__most=0,
         grains__settle__energy=1e-3, hybrid__oracle="[{packing_fraction: {depth: 8 mm, half_width: 4 mm}}]"),
     "column_3d": sets(
         domain__upper="[0.1, 0.008, 0.16]", time__end="20 ms", output__every="5 ms", hybrid__update=100,
         output__fields=FIELDS,
         grains__fill__0__region__box="{lower: [0, 0, -0.7 mm], upper: [0.1, 0.008, -0.7 mm]}",
         grains__fill__1__region__box="{lower: [0.001, 0, 0.001], upper: [0.019, 0.008, 0.04]}",
-        bodies__2__plane__point="[0.02, 0, 0]", grains__contact__linear__stiffness="100 N/m",
+        bodies__2__plane__point="[0.02, 0, 0]", grains__contact__linear__stiffness="100 N/m", grains__overlap__most=0,
         continuum__fill__region__box__upper="[0.084, 0.008, 0.124]", grains__settle__energy=1e-3,
         hybrid__oracle="[{packing_fraction: {depth: 8 mm, half_width: 4 mm}}]")}
 

@@ -72,7 +72,7 @@ def filed(place):
     (place / "cf").mkdir()
     scene, out = place / "cf/s.yaml", place / "filed"
     scene.write_text(FILED)
-    (place / "cf/grains.txt").write_text("x y radius vx vy\n0.02 0.01 0.002 0.1 0\n0.0235 0.0101 0.002 -0.1 0\n")
+    (place / "cf/grains.txt").write_text("x y radius vx vy\n0.02 0.01 0.002 0.1 0\n0.0241 0.0101 0.002 -0.1 0\n")
     quern("run", "cf/s.yaml", "-o", "filed", "--quiet", cwd=place)
     assert (out / "input.yaml").read_text() == FILED, "input.yaml is not the scene as it was written"
     stopped = place / "stopped"

@@ -88,6 +88,16 @@ def check_options():
     print("missing files and faulty options are refused by name")
 
 
+def check_warnings():
+    """What is taken with a warning: plan says it too."""
+    scene = ["configs/elastic_bar.yaml", "--set", "bodies=[{box: {lower: [-1, -1], upper: [1, 1]}}]"]
+    done = subprocess.run([QUERN, "plan", *scene], cwd=SCENES.parents[2], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"warning: \d+ of \d+ points of continuum.fill lie in body 0, a body.box, and are left out",
+                     done.stderr), done.stderr
+    print("plan warns of points that lie in a body")
+
+
 def check_pipes():
     """A pipe is no scene, and nothing waits for somebody to write into it."""
     with tempfile.TemporaryDirectory() as folder:
@@ -116,5 +126,6 @@ def check_booleans():
 if __name__ == "__main__":
     check_scenes("--update" in sys.argv[1:])
     check_options()
+    check_warnings()
     check_pipes()
     check_booleans()

@@ -33,8 +33,9 @@ typedef struct {
 	char *said;
 } bench;
 
-/* Sections with these stages, the first one owning the set; what was reported is in b->said. */
-static bench *make(size_t n, const quern_stage *const *stages, double friction) {
+/* Sections with these stages and sets; what was reported is in b->said. */
+static bench *make_with(
+	size_t n, const quern_stage *const *stages, const quern_set *const *sets_of, double friction) {
 	static const char *const names[] = { "one", "two", "three" };
 	bench *b = calloc(1, sizeof *b);
 	size_t size = 0;
@@ -48,8 +49,7 @@ static bench *make(size_t n, const quern_stage *const *stages, double friction) 
 	};
 	b->instance = (quern_instance) { .file = &b->file, .self = &b->knob };
 	for (size_t i = 0; i < n; i++) {
-		b->ops[i] =
-			(quern_solver_ops) { .size = sizeof *b->ops, .sets = i ? NULL : sets, .stages = stages[i] };
+		b->ops[i] = (quern_solver_ops) { .size = sizeof *b->ops, .sets = sets_of[i], .stages = stages[i] };
 		b->scene.sections[i] =
 			(quern_section) { .name = names[i], .solver = &b->instance, .ops = &b->ops[i] };
 	}
@@ -61,6 +61,11 @@ static bench *make(size_t n, const quern_stage *const *stages, double friction) 
 	quern_report_print(b->scene.report, out);
 	fclose(out);
 	return b;
+}
+
+/* The first one owns the set. */
+static bench *make(size_t n, const quern_stage *const *stages, double friction) {
+	return make_with(n, stages, (const quern_set *const[]) { sets, NULL, NULL }, friction);
 }
 
 static void finish(bench *b) {
@@ -209,9 +214,28 @@ static void zeroed(void **state) {
 	finish(b);
 }
 
+/* Lanes of a node's row are the owner's to order, though a section before it names its fields first, backwards. */
+static void lanes_are_the_owners(void **state) {
+	static const quern_use backwards[] = { U("node.extra", QUERN_WRITE, .flags = 0),
+		U("node.force", QUERN_READ, .flags = 0), U("node.mass", QUERN_READ, .flags = 0), QUERN_END_USES };
+	static const quern_use owners[] = { U("node.mass", QUERN_ADD, .flags = 0),
+		U("node.force", QUERN_ADD, .flags = 0), QUERN_END_USES };
+	static const quern_set rows[] = { { .name = "node", .doc = "x", .rows = 8 }, { .name = NULL } };
+	const quern_stage *const stages[] = { STAGES("other.look", QUERN_FROM_GRID, backwards),
+		STAGES("owner.add", QUERN_TO_GRID, owners) };
+	const quern_set *const of[] = { NULL, rows };
+	bench *b = make_with(2, stages, of, 0);
+	(void)state;
+	assert_string_equal(b->said, "");
+	assert_int_equal(field(b, "node.mass")->lane, 0);
+	assert_int_equal(field(b, "node.force")->lane, 1);
+	assert_int_equal(field(b, "node.extra")->lane, 2);
+	finish(b);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(order), cmocka_unit_test(phases),
-		cmocka_unit_test(before_changes), cmocka_unit_test(conflicts), cmocka_unit_test(existence),
-		cmocka_unit_test(kept_twice), cmocka_unit_test(zeroed) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(order), cmocka_unit_test(lanes_are_the_owners),
+		cmocka_unit_test(phases), cmocka_unit_test(before_changes), cmocka_unit_test(conflicts),
+		cmocka_unit_test(existence), cmocka_unit_test(kept_twice), cmocka_unit_test(zeroed) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,7 +20,7 @@ static quern_run *column(uint32_t workers, int dim) {
 		"  fill: {region: {box: {lower: %s, upper: %s}}, velocity: %s}}\n"
 		"bodies:\n  - plane: {point: %s, normal: %s, boundary: sticky}\n"
 		"continuum: {cell: 4 mm, material: mu_i}\n"
-		"hybrid: {oracle: [{packing_fraction: {depth: 6 mm, half_width: 3 mm}}], substeps: 4, update: 20}\n"
+		"hybrid: {oracle: [{packing_fraction: {depth: 6 mm, half_width: 4 mm}}], substeps: 4, update: 20}\n"
 		"observe: [energy, mass]\n",
 		dim, flat ? "[0, -9.81]" : "[0, 0, -9.81]", flat ? "[0, 0]" : "[0, 0, 0]",
 		flat ? "[0.16, 0.08]" : "[0.08, 0.02, 0.06]", flat ? "[false, false]" : "[false, true, false]",

@@ -1,0 +1,97 @@
+/* walls - bodies as cells see them: how far the nearest surface is, how much of a cell is open, and what stands between two
+ * cells. docs/theory/hybrid.md, section 3 */
+#include "update.h"
+#include <math.h>
+
+enum { N = QUERN_BLOCK_CELLS }; /* cells of a block, and places in a cell */
+
+typedef struct {
+	_Alignas(64) quern_real position[3][N], radius[N], gap[N], normal[3][N], velocity[3][N], least[N];
+} places;
+
+/* Gap of every place to the nearest body that is there now; infinite where there is none. */
+static void nearest_bodies(const update *d, places *p) {
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	quern_body_batch batch = {
+		.n = N, .cap = N, .dim = d->s->dim, .pose = &still, .radius = p->radius, .gap = p->gap
+	};
+	for (uint32_t k = 0; k < d->s->dim; k++) {
+		batch.position[k] = p->position[k];
+		batch.normal[k] = p->normal[k];
+		batch.velocity[k] = p->velocity[k];
+	}
+	for (uint32_t i = 0; i < N; i++) p->least[i] = INFINITY, p->radius[i] = 0;
+	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
+		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
+		if (!quern_body_is_there(body, d->s->settling)) continue;
+		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
+		for (uint32_t i = 0; i < N; i++) p->least[i] = p->gap[i] < p->least[i] ? p->gap[i] : p->least[i];
+	}
+}
+
+/* The share of a cell that lies in no body, by 8 x 8 or 4 x 4 x 4 places. */
+static quern_real open_share(const update *d, const int32_t cell[3], places *p) {
+	const uint32_t dim = d->s->dim, side = dim == 2 ? 8 : 4;
+	uint32_t open = 0;
+	for (uint32_t i = 0; i < N; i++) {
+		const uint32_t at[3] = { i % side, i / side % side, i / (side * side) };
+		for (uint32_t k = 0; k < dim; k++)
+			p->position[k][i] = d->g->lower[k] + (cell[k] + (at[k] + 0.5) / side) * d->g->cell;
+	}
+	nearest_bodies(d, p);
+	for (uint32_t i = 0; i < N; i++) open += p->least[i] >= 0;
+	return (quern_real)open / N;
+}
+
+quern_status quern_hybrid_walls(update *d) {
+	const quern_real reach = 0.5 * sqrt(d->s->dim) * d->g->cell;
+	places *p = d->s->host->scratch(d->s->run, 0, sizeof *p);
+	if (!p) return QUERN_E_MEMORY;
+	for (uint32_t b = 0; b < d->g->n_blocks; b++) {
+		quern_real *gap = d->wall + (size_t)b * N, *open = d->open + (size_t)b * N;
+		int32_t cell[3];
+		for (uint32_t i = 0; i < N; i++) {
+			quern_real x[3];
+			quern_hybrid_cell(d, b * N + i, cell);
+			quern_hybrid_centre(d, cell, x);
+			for (uint32_t k = 0; k < d->s->dim; k++) p->position[k][i] = x[k];
+		}
+		nearest_bodies(d, p);
+		for (uint32_t i = 0; i < N; i++) gap[i] = p->least[i];
+		for (uint32_t i = 0; i < N; i++) {
+			open[i] = gap[i] > 0 ? 1 : 0;
+			if (fabs(gap[i]) < reach && quern_hybrid_cell(d, b * N + i, cell))
+				open[i] = open_share(d, cell, p);
+		}
+	}
+	return QUERN_OK;
+}
+
+/* Gap of a place to the nearest body that is there now. */
+static quern_real gap_at(const update *d, const quern_real x[3]) {
+	quern_real least = INFINITY;
+	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
+		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
+		if (!quern_body_is_there(body, d->s->settling)) continue;
+		const quern_real gap = quern_body_gap(body, d->s->dim, x, 0, NULL);
+		least = gap < least ? gap : least;
+	}
+	return least;
+}
+
+/* Goes along the line by steps as long as nothing can be in the way, so that no wall is too thin. */
+bool quern_hybrid_walled(const update *d, uint32_t entry, const quern_real from[3], const quern_real to[3]) {
+	const quern_real near = 1e-6 * d->g->cell;
+	quern_real length = 0, way = 0;
+	if (d->wall[entry] >= 2 * d->g->cell) return false; /* within a cell, or from centre to centre */
+	for (uint32_t k = 0; k < d->s->dim; k++) length += (to[k] - from[k]) * (to[k] - from[k]);
+	length = sqrt(length);
+	for (int i = 0; i < 64 && way < length; i++) {
+		quern_real x[3] = { 0 };
+		for (uint32_t k = 0; k < d->s->dim; k++) x[k] = from[k] + way / length * (to[k] - from[k]);
+		const quern_real gap = gap_at(d, x);
+		if (gap <= near) return true;
+		way += gap;
+	}
+	return false;
+}

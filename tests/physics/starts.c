@@ -1,0 +1,126 @@
+/* How a scene starts: how high its material lies, and what of it may stand where. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <math.h>
+#include <string.h>
+
+static double published(const quern_run *run, const char *name) {
+	for (size_t i = 0; i < run->scene->n_published; i++)
+		if (!strcmp(run->scene->published[i].name, name)) return run->scene->published[i].value;
+	fail_msg("nobody publishes %s", name);
+	return NAN;
+}
+
+/* The height of a fill is its extent along gravity, of all loose fills together, for grains and continuum alike: what is
+ * wide is not high. The bulk modulus of grains with a Hertz law follows it. */
+static void height_is_along_gravity(void **state) {
+	static const struct {
+		const char *name, *gravity, *fills;
+		double height;
+	} scenes[] = { { "a wide bed", "[0, -9.81]", "{region: {box: {lower: [0, 0], upper: [1, 0.05]}}}", 0.05 },
+		{ "the same, gravity askew", "[3.36, -9.22]", "{region: {box: {lower: [0, 0], upper: [1, 0.05]}}}",
+			0.05 },
+		{ "the same, gravity along x", "[9.81, 0]", "{region: {box: {lower: [0, 0], upper: [1, 0.05]}}}", 1 },
+		{ "two layers", "[0, -9.81]",
+			"{region: {box: {lower: [0, 0.05], upper: [1, 0.1]}}}, {region: {box: {lower: [0, 0], upper: [1, "
+			"0.05]}}}",
+			0.1 } };
+	bool good = true;
+	(void)state;
+	table_head("height of the fill, m; PIC rate over sqrt(g/L)");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++)
+		for (int grains = 0; grains <= 1; grains++) {
+			char body[400];
+			snprintf(body, sizeof body,
+				grains ? "grains: {material: {density: 2500, radius: {mean: 5 mm}},\n"
+						 "  contact: {linear: {stiffness: 1e6}}, fill: [%s]}\n"
+					   : "continuum: {cell: 0.05, material: {elastic: {bulk_modulus: 1e6, density: 1500}}, "
+						 "fill: [%s]}\n",
+				scenes[k].fills);
+			quern_run *run = harness_open(1,
+				"quern: 1\ndimension: 2\ngravity: %s\ndomain: {lower: [0, 0], upper: [1, 1]}\ntime: {end: "
+				"1}\n%s",
+				scenes[k].gravity, body);
+			const double height = published(run, "fill.height"), rate = published(run, "fill.rate");
+			good &= table_row(scenes[k].name, height, scenes[k].height, 1e-12);
+			good &=
+				table_row(grains ? "  grains" : "  continuum", rate / sqrt(9.81 / scenes[k].height), 1, 1e-3);
+			harness_close(run);
+		}
+	assert_true(good);
+}
+
+/* The stiffness of a Hertz contact under the weight of the fill is that under its whole height, whatever the order of the
+ * fills: with it goes the bulk modulus that a continuum takes. */
+static void stiffness_is_that_of_the_whole(void **state) {
+	static const char *const fills[] = { "{region: {box: {lower: [0, 0], upper: [0.2, 0.2]}}}",
+		"{region: {box: {lower: [0, 0], upper: [0.2, 0.15]}}}, {region: {box: {lower: [0, 0.15], upper: "
+		"[0.2, "
+		"0.2]}}}",
+		"{region: {box: {lower: [0, 0.15], upper: [0.2, 0.2]}}}, {region: {box: {lower: [0, 0], upper: [0.2, "
+		"0.15]}}}" };
+	double bulk[3];
+	(void)state;
+	for (int k = 0; k < 3; k++) {
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [1, 1]}\ntime: "
+			"{end: "
+			"1}\ngrains: {material: {density: 2500, radius: {mean: 5 mm}}, contact: {hertz: {young: 1e8}}, "
+			"fill: "
+			"[%s]}\n",
+			fills[k]);
+		bulk[k] = published(run, "grain.bulk_modulus");
+		harness_close(run);
+	}
+	assert_true(bulk[0] > 0 && fabs(bulk[1] / bulk[0] - 1) < 1e-12 && fabs(bulk[2] / bulk[0] - 1) < 1e-12);
+}
+
+/* What of a fill lies in a body that acts on the continuum is left out, and no more: the mass is that of the room. */
+static void points_in_bodies_are_left_out(void **state) {
+	static const struct {
+		const char *name, *bodies;
+		double room; /* m^2, of the fill's 0.64 */
+	} scenes[] = { { "no body", "", 0.64 },
+		{ "a plane under it", "{plane: {point: [0, 0.3], normal: [0, 1]}}", 0.8 * 0.6 },
+		{ "an oblique plane", "{plane: {point: [0.1, 0.1], normal: [1, 1]}}", 0.64 },
+		{ "a plane through its corners", "{plane: {point: [0.5, 0.5], normal: [1, 1]}}", 0.34 },
+		{ "a box within", "{box: {lower: [0.3, 0.3], upper: [0.5, 0.6]}}", 0.64 - 0.06 },
+		{ "two that overlap",
+			"{box: {lower: [0.3, 0.3], upper: [0.5, 0.6]}}, {plane: {point: [0, 0.4], normal: [0, 1]}}",
+			0.8 * 0.5 - 0.2 * 0.2 },
+		{ "one of settling", "{plane: {point: [0, 0.3], normal: [0, 1], while: settling}}", 0.64 },
+		{ "one that does nothing to the grid", "{plane: {point: [0, 0.3], normal: [0, 1], boundary: none}}",
+			0.64 } };
+	bool good = true;
+	(void)state;
+	table_head("mass of a fill over its density, m^2");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		quern_run *run = harness_open(1,
+			"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [1, 1]}, time: "
+			"{end: "
+			"1},\nbodies: [%s],\ncontinuum: {cell: 0.1, material: {elastic: {bulk_modulus: 1e6, density: "
+			"1500}},\n  fill: [{region: {box: {lower: [0.1, 0.1], upper: [0.9, 0.5]}}}, {region: {box: "
+			"{lower: "
+			"[0.1, 0.5], upper: [0.9, 0.9]}}}]}}\n",
+			scenes[k].bodies);
+		const quern_column m = harness_field(run, "point.mass");
+		double mass = 0;
+		for (uint32_t i = 0; i < harness_count(run, "point"); i++) mass += m.real[0][i];
+		good &= table_row(scenes[k].name, mass / 1500, scenes[k].room, 1e-9);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(height_is_along_gravity),
+		cmocka_unit_test(stiffness_is_that_of_the_whole), cmocka_unit_test(points_in_bodies_are_left_out) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,134 @@
+/* Zones of the hybrid: which cells lie near a surface, and which is the nearest hybrid one. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <math.h>
+#include <quern/grid.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const double cell = 4e-3;
+
+/* The stage alone, between two steps. */
+static void update(quern_run *run) {
+	for (size_t k = 0; k < run->plan->n_stages; k++) {
+		const quern_plan_stage *stage = &run->plan->stages[k];
+		if (strcmp(stage->name, "hybrid.update") != 0) continue;
+		const quern_step step = quern_run_record(run, stage->section);
+		if (stage->stage->run(stage->section->solver->self, &step) != QUERN_OK) fail_msg("%s", run->message);
+	}
+	quern_plan_refresh(run->plan);
+}
+
+static int32_t cell_at(quern_run *run, double x, double y) {
+	int32_t c[3];
+	const quern_grid_view *g = quern_host_table.grid(run);
+	assert_true(quern_grid_cell_at(g, (const double[3]) { x, y, 0 }, c));
+	return quern_grid_entry(g, c);
+}
+
+/* What a discrete cell owes goes to the nearest hybrid one, be it 39 000 cells away: a heap at the lower end of a channel,
+ * and single grains all along it. */
+static void far_entries_find_a_cell(void **state) {
+	char path[] = "/tmp/quern-zones-XXXXXX";
+	const int file = mkstemp(path);
+	FILE *out = file < 0 ? NULL : fdopen(file, "w");
+	(void)state;
+	assert_non_null(out);
+	fprintf(out, "x y\n");
+	for (int j = 0; j < 28; j++)
+		for (int i = 0; i < 28; i++) fprintf(out, "%.17g %.17g\n", 0.002 * i + 0.002, 0.002 * j + 0.002);
+	for (int i = 3; i < 5000; i++) fprintf(out, "%.17g 0.03\n", 0.032 * i + 0.016);
+	fclose(out);
+	quern_run *run = harness_open(1,
+		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [160, 0.064]}\n"
+		"time: {end: 1e-6, step: 1e-9}\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm}},\n"
+		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
+		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+		"hybrid: {oracle: [{packing_fraction: {depth: 10 mm, half_width: 4 mm}}], substeps: 1, update: 1}\n",
+		path, cell);
+	unlink(path);
+	harness_steps(run, 3);
+	const int32_t far = cell_at(run, 159.984, 0.03);
+	assert_true(far >= 0);
+	assert_int_equal(harness_field(run, "cell.zone").index[far], QUERN_DISCRETE);
+	harness_field(run, "cell.grain_owed").real[0][far] = 1e-6;
+	update(run);
+	assert_true(harness_field(run, "cell.grain_owed").real[0][cell_at(run, 159.984, 0.03)] == 0);
+	harness_close(run);
+}
+
+/* A box whose walls cut its cells, or are a quarter of a cell thick, filled with grains: `walls` is false, so that only the
+ * top is a surface. Below its zone no grain is left, along the walls and the floor neither. */
+static void walls_are_no_surface(void **state) {
+	static const struct {
+		const char *name, *bodies;
+		double left, right, floor;
+	} boxes[] = {
+		{ "planes on cell faces",
+			"{plane: {point: [0.008, 0], normal: [1, 0]}}, {plane: {point: [0.112, 0], normal: [-1, 0]}}, "
+			"{plane: "
+			"{point: [0, 0.008], normal: [0, 1]}}",
+			0.008, 0.112, 0.008 },
+		{ "planes that halve cells",
+			"{plane: {point: [0.006, 0], normal: [1, 0]}}, {plane: {point: [0.114, 0], normal: [-1, 0]}}, "
+			"{plane: "
+			"{point: [0, 0.006], normal: [0, 1]}}",
+			0.006, 0.114, 0.006 },
+		{ "planes that leave two fifths",
+			"{plane: {point: [0.0064, 0], normal: [1, 0]}}, {plane: {point: [0.1136, 0], normal: [-1, 0]}}, "
+			"{plane: {point: [0, 0.0064], normal: [0, 1]}}",
+			0.0064, 0.1136, 0.0064 },
+		{ "thin boxes",
+			"{box: {lower: [0.007, 0], upper: [0.008, 0.12]}}, {box: {lower: [0.112, 0], upper: [0.113, "
+			"0.12]}}, "
+			"{box: {lower: [0, 0.007], upper: [0.12, 0.008]}}",
+			0.008, 0.112, 0.008 },
+		{ "thin boxes within cells",
+			"{box: {lower: [0.0055, 0], upper: [0.0065, 0.12]}}, {box: {lower: [0.1135, 0], upper: [0.1145, "
+			"0.12]}}, {box: {lower: [0, 0.0055], upper: [0.12, 0.0065]}}",
+			0.0065, 0.1135, 0.0065 },
+	};
+	const double top = 0.08;
+	bool good = true;
+	(void)state;
+	table_head("grains left below the zone of the free surface");
+	for (size_t k = 0; k < sizeof boxes / sizeof *boxes; k++) {
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.12, 0.12]}\n"
+			"time: {end: 1e-6, step: 1e-9}\nbodies: [%s]\n"
+			"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
+			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
+			"  fill: {region: {box: {lower: [%g, %g], upper: [%g, %g]}}}}\n"
+			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+			"hybrid: {oracle: [{packing_fraction: {depth: 12 mm, half_width: 4 mm}}], substeps: 1, update: "
+			"1}\n",
+			boxes[k].bodies, boxes[k].left, boxes[k].floor, boxes[k].right, top, cell);
+		harness_steps(run, 4);
+		const quern_column x = harness_field(run, "grain.position");
+		int left = 0;
+		for (uint32_t i = 0; i < harness_count(run, "grain"); i++) left += x.real[1][i] < top - 0.026;
+		good &= table_row(boxes[k].name, left, 0, 0);
+		const quern_column p = harness_field(run, "point.position"); /* and no point was made within a wall */
+		for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+			assert_true(p.real[0][i] > boxes[k].left && p.real[0][i] < boxes[k].right &&
+						p.real[1][i] > boxes[k].floor);
+		assert_true(harness_count(run, "point") > 500);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell),
+		cmocka_unit_test(walls_are_no_surface) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
