@@ -73,12 +73,20 @@ static bool needs_grid(const quern_store *store) {
 	return false;
 }
 
+/* What could not be made whole goes; the scene stays the caller's. */
+static quern_run *give_up(quern_run *run) {
+	run->scene = NULL;
+	quern_run_destroy(run);
+	return NULL;
+}
+
 quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	quern_run *run = quern_take(1, sizeof *run);
 	run->scene = scene;
 	run->clock.frame = -1;
 	run->mass_initial = NAN;
 	run->pool = quern_pool_create(workers);
+	if (!run->pool) return give_up(run);
 	run->plan = quern_plan_create(scene, run->pool);
 	run->has_grid = needs_grid(&run->plan->store);
 	if (run->has_grid && !quern_report_errors(scene->report)) {
@@ -99,10 +107,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 		 i++) /* from now on a NULL column says: there is no such field */
 		if (i != total && !run->plan->store.sets[i].rows)
 			reserved = reserved && quern_store_fill(&run->plan->store, i, 0) == QUERN_OK;
-	if (!reserved) {
-		quern_run_destroy(run);
-		return NULL;
-	}
+	if (!reserved) return give_up(run);
 	quern_plan_refresh(run->plan);
 	return run;
 }

@@ -44,7 +44,7 @@ struct quern_run {
 };
 
 /* Everything short of running: allocates, but no stage has run. Faults go to the scene's report; NULL if memory is
- * gone. Takes the scene over. `workers` 0: all. */
+ * gone. Takes the scene over unless it fails. `workers`: quern_pool_create. */
 quern_run *quern_run_create(quern_scene *, uint32_t workers);
 void quern_run_destroy(quern_run *);
 
