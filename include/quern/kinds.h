@@ -89,7 +89,8 @@ typedef struct quern_integrator_batch {
 } quern_integrator_batch;
 
 typedef struct quern_integrator_ops {
-	uint32_t size, pad;
+	uint32_t size;
+	uint32_t damps; /* 1: takes energy away on purpose, for settling; what it takes stands in no budget */
 	void (*close[2])(const void *self, const quern_integrator_batch *); /* [batch] */
 	void (*open[2])(const void *self, const quern_integrator_batch *);  /* [batch] may be NULL */
 } quern_integrator_ops;
