@@ -5,7 +5,7 @@
 #include "../common/tools.h"
 
 typedef struct dem {
-	quern_real density, skin, drag, rest; /* from the scene */
+	quern_real density, skin, rest, settle_step; /* from the scene */
 	radius_law radii;
 	quern_list fill, place;
 	const char *file;
@@ -27,7 +27,7 @@ typedef struct dem_place {
 } dem_place;
 
 /* slots, in the order of the solver's table */
-enum { SLOT_CONTACT, SLOT_NEIGHBOURS, SLOT_INTEGRATOR, SLOT_BODIES, SLOT_PACKER };
+enum { SLOT_CONTACT, SLOT_NEIGHBOURS, SLOT_INTEGRATOR, SLOT_BODIES, SLOT_PACKER, SLOT_SETTLING };
 
 /* rows of dem.fill */
 enum {
@@ -90,6 +90,11 @@ enum {
 	FORCE_ID,
 	FORCE_TREMBLING
 };
+
+/* The integrator of this step. */
+QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
+	return &s->slot[s->settling ? SLOT_SETTLING : SLOT_INTEGRATOR][0];
+}
 
 /* moment of inertia over mass times radius squared */
 QUERN_INLINE quern_real dem_inertia(uint32_t dim) { return dim == 2 ? 0.5 : 0.4; }

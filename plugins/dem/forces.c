@@ -161,8 +161,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->n_bodies = s->n_slot[SLOT_BODIES];
 	sh->n_laws = s->n_slot[SLOT_CONTACT] < MOST_LAWS ? s->n_slot[SLOT_CONTACT] : MOST_LAWS;
 	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
-	sh->energy = s->use[FORCE_STORED].real[0] != NULL;
-	sh->drag = s->settling ? sh->d->drag : 0;
+	sh->energy = s->use[FORCE_STORED].real[0] != NULL && !s->settling;
 	sh->grain = grains.block;
 	sh->contact = contacts.block;
 	sh->touch = touches.n ? touches.block : NULL;

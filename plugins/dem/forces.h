@@ -14,7 +14,7 @@ typedef struct forces_shared {
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
 	bool spin, energy;
-	quern_real drag, half[3],
+	quern_real half[3],
 		length[3]; /* periodic: half the domain's length and the length; infinite and 0 otherwise */
 	const uint32_t *grain, *contact, *touch; /* partitions */
 	quern_real *impulse;  /* [block][body + 1][dim]: on the material, by bodies and by fixed grains */

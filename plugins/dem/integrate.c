@@ -104,15 +104,6 @@ static void load_grains(
 		for (uint32_t k = 0; k < dim; k++) w->grains[G_DRAG + k][i] = w->drag_row[row + i][k];
 		for (uint32_t k = 0; k < n_spin; k++) w->grains[G_DRAG_TORQUE + k][i] = w->drag_row[row + i][dim + k];
 	}
-	if (sh->drag > 0)
-		for (uint32_t i = 0; i < n; i++) {
-			for (uint32_t k = 0; k < dim; k++)
-				w->grains[G_FORCE + k][i] -=
-					sh->drag * w->grains[G_MASS][i] * u[FORCE_OLD_VELOCITY].real[k][begin + i];
-			for (uint32_t k = 0; k < n_spin; k++)
-				w->grains[G_TORQUE + k][i] -=
-					sh->drag * w->grains[G_INERTIA][i] * u[FORCE_OLD_SPIN].real[k][begin + i];
-		}
 }
 
 /* Fixed grains stay; what they take up is an impulse on the others. */
@@ -134,7 +125,7 @@ static void hold_fixed(
 }
 
 void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums) {
-	const quern_bound *bound = &sh->s->slot[SLOT_INTEGRATOR][0];
+	const quern_bound *bound = dem_integrator(sh->s);
 	const quern_integrator_ops *ops = bound->ops;
 	const quern_column *u = sh->use;
 	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;

@@ -41,9 +41,9 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 	QUERN_PARAM_AS(dem, rest, "settle.energy", "1",
 		"At rest when the mean kinetic energy of a grain is below this share of m g d.", .def = 1e-5,
 		.flags = QUERN_MIN_OPEN, .max = 1),
-	QUERN_PARAM_AS(dem, drag, "settle.drag", "1/s",
-		"Drag on every grain while settling; default sqrt(g/d)/10.", .flags = QUERN_MAYBE, .min = 0,
-		.max = 1e9),
+	QUERN_PARAM_AS(dem, settle_step, "settle.step", "1",
+		"Step while settling, over half the shortest period of a contact.", .def = 0.1, .max = 0.2,
+		.flags = QUERN_MIN_OPEN),
 	QUERN_PARAM_AS(dem, settle_most, "settle.most", "1",
 		"Most steps of settling; then the run goes on with a warning.", .def = 1e6, .min = 1, .max = 2e9),
 	QUERN_PARAM(dem, fixed, NULL,
@@ -81,6 +81,11 @@ static const quern_slot slots[] = {
 		.kind = QUERN_PACKER,
 		.def = "two_point_tangent",
 		.stage = { "dem.fill" } },
+	{ .name = "settling",
+		.doc = "the step in time while settling",
+		.kind = QUERN_INTEGRATOR,
+		.def = "damped",
+		.stage = { "dem.forces", "dem.open" } },
 	{ .name = NULL }
 };
 
@@ -209,7 +214,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (d->file) d->fixed = true; /* its header may say so */
 	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
 	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
-	if (isnan(d->drag)) d->drag = 0.1 * sqrt(gravity / diameter);
+	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->density);
 	setup->host->publish(setup, "grain.radius_spread", "1", d->radii.spread);
@@ -288,7 +293,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	if (isfinite(shortest)) snprintf(reason + n, 160 - n, ", half-period %.3g s / 50", shortest);
 	else snprintf(reason, 160, "grains without a contact law");
 	*hard = 0.2 * shortest;
-	return shortest / 50;
+	return s->settling ? d->settle_step * shortest : shortest / 50;
 }
 
 static void account(const void *self, const quern_step *s, quern_account *out) {
