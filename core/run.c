@@ -201,7 +201,8 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
 		if (!s->ops->limit) continue;
-		const quern_step step = quern_run_record(run, s);
+		quern_step step = quern_run_record(run, s);
+		step.settling = false; /* the steps after the release are meant, whenever this is asked */
 		const uint32_t times = steps_grains(run, s) ? n : 1;
 		char why[160] = "";
 		double beyond = INFINITY;
