@@ -179,6 +179,8 @@ void check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) 
 		if (row->hook != hook || row->access > QUERN_ADD || row->shape == QUERN_ID) continue;
 		if ((row->with || row->flags & (QUERN_OPTIONAL | QUERN_WANTED)) && !optional) continue;
 		if (!check_counts(k->check, k->instance, row)) continue;
+		if (!strcmp(row->field, "contact.couple"))
+			continue; /* says that there are couples: a column of its own */
 		for (uint32_t side = 0; side <= second; side++) {
 			int *use = side ? k->use_second : k->use;
 			const bool history = !strncmp(row->field, "contact.", 8);

@@ -4,7 +4,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OVERLAP, NORMAL, VELOCITY, SPIN, TURN, RADIUS, MASS, FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED };
+enum {
+	OVERLAP,
+	NORMAL,
+	VELOCITY,
+	SPIN,
+	TURN,
+	RADIUS,
+	MASS,
+	FORCE,
+	COUPLE,
+	DASHPOT,
+	STORED,
+	SHEARED,
+	RUBBED,
+	DRAG_COUPLE
+};
 
 static void call(const check_kernel *k, const check_batch *b) {
 	const quern_contact_ops *ops = k->ops;
@@ -26,6 +41,7 @@ static void call(const check_kernel *k, const check_batch *b) {
 	batch.stored = check_at(k, b, STORED, 0);
 	batch.sheared = check_at(k, b, SHEARED, 0);
 	batch.rubbed = check_at(k, b, RUBBED, 0);
+	CHECK_VECTOR(batch.drag_couple, k, b, DRAG_COUPLE, turns);
 	check_columns(k, b, k->use, use);
 	check_columns(k, b, k->use_second, use_second);
 	ops->force[dim - 2](k->instance->self, &batch);
@@ -99,6 +115,7 @@ static void add_columns(const check *c, const check_instance *it, uint32_t varia
 	}
 	if (uses_field(c, it, "contact.couple")) check_add(k, COUPLE, "couple", CHECK_CHANGED, turns);
 	if (!(variant & WITH_ENERGY)) return;
+	if (k->at[COUPLE] >= 0) check_add(k, DRAG_COUPLE, "drag_couple", CHECK_CHANGED, turns);
 	check_add(k, DASHPOT, "dashpot", CHECK_CHANGED, dim);
 	check_add(k, STORED, "stored", CHECK_CHANGED, 1);
 	check_add(k, SHEARED, "sheared", CHECK_CHANGED, 1);
@@ -107,11 +124,11 @@ static void add_columns(const check *c, const check_instance *it, uint32_t varia
 
 /* Forces and energies are added to; between steps they begin at zero again, while histories go on. */
 static void clear_sums(const check_kernel *k) {
-	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED };
+	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED, DRAG_COUPLE };
 	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++) {
-		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT ? k->dim
-							   : sums[s] == COUPLE                    ? check_axial(k->dim)
-																	  : 1;
+		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT        ? k->dim
+							   : sums[s] == COUPLE || sums[s] == DRAG_COUPLE ? check_axial(k->dim)
+																			 : 1;
 		for (uint32_t c = 0; k->at[sums[s]] >= 0 && c < count; c++)
 			memset(check_given(k, sums[s], c), 0, k->n * sizeof(quern_real));
 	}

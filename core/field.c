@@ -113,6 +113,9 @@ typedef struct {
 	uint32_t n;
 } permutation;
 
+/* Where an entry comes from: another one, or -1. */
+static int32_t source(int32_t from) { return from < -1 ? -2 - from : from; }
+
 static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 	const permutation *p = arg;
 	const uint32_t begin = chunk * CHUNK, end = begin + CHUNK < p->n ? begin + CHUNK : p->n;
@@ -120,8 +123,10 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 	if (p->field->shape == QUERN_INDEX) {
 		const int32_t *old = p->old;
 		int32_t *new = p->new;
-		for (uint32_t i = begin; i < end; i++)
-			new[i] = p->from[i] >= 0 ? old[p->from[i]] : (int32_t)p->initial;
+		for (uint32_t i = begin; i < end; i++) {
+			const int32_t from = source(p->from[i]);
+			new[i] = from >= 0 ? old[from] : (int32_t)p->initial;
+		}
 	} else if (p->field->shape == QUERN_ID) {
 		const int64_t *old = p->old;
 		int64_t *new = p->new;
@@ -129,7 +134,10 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 	} else {
 		const double *old = p->old;
 		double *new = p->new;
-		for (uint32_t i = begin; i < end; i++) new[i] = p->from[i] >= 0 ? old[p->from[i]] : p->initial;
+		for (uint32_t i = begin; i < end; i++) {
+			const int32_t from = source(p->from[i]);
+			new[i] = from >= 0 ? old[from] : p->initial;
+		}
 	}
 }
 

@@ -98,6 +98,10 @@ static const void *host_extension(const char *id) {
 	return NULL;
 }
 
+static bool host_has(quern_run *run, const char *section) {
+	return quern_scene_section(run->scene, section) != NULL;
+}
+
 const quern_host quern_host_table = {
 	.abi = QUERN_ABI,
 	.fail = quern_scene_fail,
@@ -115,4 +119,5 @@ const quern_host quern_host_table = {
 	.grid = host_grid,
 	.cover = host_cover,
 	.extension = host_extension,
+	.has = host_has,
 };

@@ -234,15 +234,19 @@ typedef struct quern_host {
 	quern_status (*stop)(quern_run *, quern_status, const char *set, int64_t id, const char *fmt, ...)
 		__attribute__((format(printf, 5, 6)));
 	quern_set_view (*set)(quern_run *, const char *name); /* [stage] n = 0 if there is none */
-	/* [stage] The one structural change: new entry i is old entry from[i], or fresh if from[i] < 0. Carries
-	 * every field of the set, rewrites every INDEX that points into it, drops entries whose target is gone,
-	 * and refreshes every column pointer the host handed out. `block` (n_blocks + 1 entries) is copied. */
+	/* [stage] The one structural change: new entry i is old entry from[i]; fresh if from[i] == -1; and below that a
+	 * copy of old entry -2 - from[i], with an ID of its own. Carries every field of the set, rewrites every INDEX
+	 * that points into it, drops entries whose target is gone, and refreshes every column pointer the host handed
+	 * out. `block` (n_blocks + 1 entries) is copied. */
 	quern_status (*remap)(quern_run *, const char *set, uint32_t n, const int32_t *from, uint32_t n_blocks,
 		const uint32_t *block);
 	const quern_grid_view *(*grid)(quern_run *); /* [stage] valid until cover() */
 	/* [stage] Allocates exactly these blocks of the grid and their neighbours; cells keep their fields. */
 	quern_status (*cover)(quern_run *, uint32_t n, const int32_t (*block)[3]);
 	const void *(*extension)(const char *id); /* [any] NULL if unknown */
+	/* [stage] Whether the scene has this section: "grains", "continuum", "hybrid", "bodies". A field or a set says
+	 * nothing about that, since a scene may have it made only to be written out. */
+	bool (*has)(quern_run *, const char *section);
 } quern_host;
 
 typedef struct quern_setup {

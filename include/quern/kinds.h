@@ -7,6 +7,8 @@
 extern "C" {
 #endif
 
+enum { QUERN_MOST_USES = 16 }; /* rows of a plugin in a slot */
+
 /* ---- contact: one law, one pair of materials, one dimension per batch ----
  * The first of a pair is the grain of lower id, for ever; against a body it is the grain. Open pairs may be in a
  * batch (overlap <= 0): a law without reach gives them exactly zero force and sets its history to `initial`, by
@@ -25,12 +27,16 @@ typedef struct quern_contact_batch {
 	const quern_column *use;        /* by row: contact.*: this batch's; grain.* READ: the first's */
 	const quern_column *use_second; /* grain.* READ: the second's (against a body: the first's) */
 	quern_real *force[3];           /* N on first; laws of a list ADD to it */
-	quern_real *couple[3]; /* N m on first, minus that on second; NULL unless a law uses contact.couple */
+	/* N m on first, minus that on second; laws ADD to it. NULL unless a law of the list has a use of "contact.couple"
+	 * (N m, QUERN_ADD, QUERN_AXIAL), which says that there are couples and no more. */
+	quern_real *couple[3];
 	/* NULL unless energy is observed: */
 	quern_real *dashpot[3]; /* N on first, ADDed: the part of `force` that damps or clamps */
 	quern_real *stored;     /* J, ADDed: in the normal spring */
 	quern_real *sheared;    /* J, ADDed: in the tangential spring */
 	quern_real *rubbed;     /* J, ADDed: lost to sliding in this step */
+	quern_real
+		*drag_couple[3]; /* N m on first, ADDed: the part of `couple` that damps; NULL without couples too */
 } quern_contact_batch;
 
 typedef struct quern_contact_ops {
@@ -113,7 +119,9 @@ typedef struct quern_body_batch {
 typedef struct quern_body_ops {
 	uint32_t size, pad;
 	void (*closest)(const void *self, const quern_body_batch *); /* [batch] */
-	/* [batch] features of this body within reach of a sphere; returns how many there are. NULL: feature 0 alone */
+	/* [batch] features of this body, numbers from 0 on, whose surface may lie within `reach` of x; returns how many
+	 * there are, and writes at most `cap`. A grain touches each of them that closest() finds near, with a history for
+	 * each. NULL: the body is one feature, its nearest place */
 	uint32_t (*features)(const void *self, const quern_pose *, const quern_real x[3], quern_real reach,
 		uint32_t cap, int32_t *feature);
 	/* [setup] box around it in its own frame, infinite where unbounded */

@@ -1,5 +1,6 @@
 #include "cover.h"
 #include "sort.h"
+#include "tools.h"
 #include <string.h>
 
 /* Points on a wall belong to the cell inside; one that is farther out than round-off has left. */
@@ -16,13 +17,10 @@ static int32_t clamp_cell(const quern_grid_view *g, uint32_t axis, quern_real x)
 static quern_status bring_back(const quern_step *s, const quern_grid_view *g, const cover *c, uint32_t n) {
 	for (uint32_t k = 0; k < s->dim; k++) {
 		quern_real *x = c->point.real[k];
-		const quern_real lower = s->lower[k], upper = s->upper[k], length = upper - lower,
-						 slack = 1e-6 * g->cell;
+		const quern_real lower = s->lower[k], upper = s->upper[k], slack = 1e-6 * g->cell;
 		for (uint32_t i = 0; i < n; i++) {
-			if (s->periodic[k]) {
-				x[i] = x[i] >= upper ? x[i] - length : x[i];
-				x[i] = x[i] < lower ? x[i] + length : x[i];
-			} else if (!(x[i] >= lower - slack && x[i] <= upper + slack))
+			if (s->periodic[k]) x[i] = quern_brought_back(x[i], lower, upper);
+			else if (!(x[i] >= lower - slack && x[i] <= upper + slack))
 				return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 					"left the domain along axis %u, at %.6g m: the step is too long or the material unstable",
 					k, x[i]);

@@ -36,12 +36,17 @@ void quern_placer_finish(placer *p) {
 	*p = (placer) { 0 };
 }
 
-static int32_t cell_of(const placer *p, uint32_t k, quern_real x) {
-	const int32_t c = (int32_t)floor((x - p->lower[k]) / p->cell[k]);
+/* Cell of a place, and a cell brought back through a periodic face. Neighbours are counted in cells: a place that is a
+ * cell's width away may round into the cell beyond. */
+static int32_t cell_at(const placer *p, uint32_t k, quern_real x) {
+	return (int32_t)floor((x - p->lower[k]) / p->cell[k]);
+}
+static int32_t wrapped(const placer *p, uint32_t k, int32_t c) {
 	if (!p->periodic[k]) return c;
 	const int32_t m = c % p->wrap[k];
 	return m < 0 ? m + p->wrap[k] : m;
 }
+static int32_t cell_of(const placer *p, uint32_t k, quern_real x) { return wrapped(p, k, cell_at(p, k, x)); }
 
 static void link_spot(placer *p, uint32_t i) {
 	int32_t c[3] = { 0 };
@@ -99,12 +104,14 @@ static bool meets_body(const placer *p, const quern_spot *s) {
  * axis two offsets may name the same cell; looking twice does no harm. */
 bool quern_placer_free(const placer *p, const quern_spot *s) {
 	const int depth = p->dim == 3 ? 1 : 0;
+	int32_t middle[3] = { 0 };
+	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, s->x[k]);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
 				const int offset[3] = { x, y, z };
 				int32_t c[3] = { 0 };
-				for (uint32_t k = 0; k < p->dim; k++) c[k] = cell_of(p, k, s->x[k] + offset[k] * p->cell[k]);
+				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i])
 					if (overlaps(p, s, &p->spot[i])) return false;
 			}
@@ -114,9 +121,10 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const quern_real upper[3],
 	quern_real reach, quern_spot *out, uint32_t cap) {
 	uint32_t n = 0;
-	int32_t count[3] = { 1, 1, 1 };
+	int32_t count[3] = { 1, 1, 1 }, first[3] = { 0 };
 	for (uint32_t k = 0; k < p->dim; k++) {
-		count[k] = (int32_t)ceil((upper[k] - lower[k] + 2 * reach) / p->cell[k]) + 1;
+		first[k] = cell_at(p, k, lower[k] - reach);
+		count[k] = cell_at(p, k, upper[k] + reach) - first[k] + 1;
 		if (p->periodic[k] && count[k] > p->wrap[k]) count[k] = p->wrap[k];
 	}
 	for (int32_t z = 0; z < count[2]; z++)
@@ -124,8 +132,7 @@ uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const que
 			for (int32_t x = 0; x < count[0]; x++) {
 				const int32_t offset[3] = { x, y, z };
 				int32_t c[3] = { 0 };
-				for (uint32_t k = 0; k < p->dim; k++)
-					c[k] = cell_of(p, k, lower[k] - reach + offset[k] * p->cell[k]);
+				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, first[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i]) {
 					quern_spot s = p->spot[i];
 					bool near = true;

@@ -1,32 +1,13 @@
-/* rotation - symmetric tensors by value, and a stress carried along with the material: what the materials share. In 2-D
- * the components zz, yz and xz stay zero, and `dim` is a constant in every caller. docs/theory/materials.md, 1 and 2 */
+/* rotation - what is done with symmetric tensors, and a stress carried along with the material: what the materials share.
+ * `dim` is a constant in every caller. docs/theory/materials.md, 1 and 2 */
 #pragma once
-#include <quern/abi.h>
-
-typedef struct symmetric {
-	quern_real xx, yy, zz, xy, yz, xz;
-} symmetric;
+#include "symmetric.h"
 
 typedef struct tensor {
 	quern_real xx, xy, xz, yx, yy, yz, zx, zy, zz;
 } tensor;
 
-/* Entry i of SYMMETRIC and TENSOR columns; macros for the reason given in quern/vec.h. */
-#define SYMMETRIC_AT(columns, i, dim)                                                                        \
-	((symmetric) { (columns)[0][i], (columns)[1][i], (dim) == 3 ? (columns)[2][i] : 0,                       \
-		(columns)[(dim) == 3 ? 3 : 2][i], (dim) == 3 ? (columns)[4][i] : 0,                                  \
-		(dim) == 3 ? (columns)[5][i] : 0 })
-#define SYMMETRIC_PUT(columns, i, s, dim)                                                                    \
-	do {                                                                                                     \
-		(columns)[0][i] = (s).xx;                                                                            \
-		(columns)[1][i] = (s).yy;                                                                            \
-		(columns)[(dim) == 3 ? 3 : 2][i] = (s).xy;                                                           \
-		if ((dim) == 3) {                                                                                    \
-			(columns)[2][i] = (s).zz;                                                                        \
-			(columns)[4][i] = (s).yz;                                                                        \
-			(columns)[5][i] = (s).xz;                                                                        \
-		}                                                                                                    \
-	} while (0)
+/* Entry i of TENSOR columns; a macro for the reason given in quern/vec.h. */
 #define TENSOR_AT(columns, i, dim)                                                                           \
 	((tensor) { (columns)[0][i], (columns)[1][i], (dim) == 3 ? (columns)[2][i] : 0, (columns)[dim][i],       \
 		(columns)[(dim) + 1][i], (dim) == 3 ? (columns)[5][i] : 0, (dim) == 3 ? (columns)[6][i] : 0,         \

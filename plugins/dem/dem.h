@@ -10,7 +10,8 @@ typedef struct dem {
 	quern_list fill, place;
 	const char *file;
 	int32_t settle_most;
-	bool fixed; /* some grains do not move */
+	bool fixed;    /* some grains do not move */
+	bool features; /* some bodies have several */
 	bool settles;
 	quern_real reach; /* m, of the laws beyond touching */
 	uint32_t dim;
@@ -54,7 +55,8 @@ enum {
 	NEAR_FIRST,
 	NEAR_SECOND,
 	NEAR_GRAIN,
-	NEAR_BODY
+	NEAR_BODY,
+	NEAR_FEATURE
 };
 /* rows of dem.forces */
 enum {
@@ -88,7 +90,10 @@ enum {
 	FORCE_DAMPED,
 	FORCE_RUBBED,
 	FORCE_ID,
-	FORCE_TREMBLING
+	FORCE_TREMBLING,
+	FORCE_CONTACT_COUPLE,
+	FORCE_TOUCH_COUPLE,
+	FORCE_FEATURE
 };
 
 /* The integrator of this step. */

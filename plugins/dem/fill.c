@@ -243,7 +243,7 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 /* The hybrid books an impulse for each force; an integrator that acts in two steps gives half of it later. */
 static quern_status refuse_two_steps(const quern_step *s) {
 	const quern_bound *integrator = &s->slot[SLOT_INTEGRATOR][0];
-	if (!s->use[FILL_WEIGHT].real[0] || !((const quern_integrator_ops *)integrator->ops)->open[s->dim - 2])
+	if (!s->host->has(s->run, "hybrid") || !((const quern_integrator_ops *)integrator->ops)->open[s->dim - 2])
 		return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_PARAM, "integrator", -1,
 		"%s acts in two steps, and the books of a hybrid take one: use symplectic_euler", integrator->id);

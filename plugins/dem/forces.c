@@ -21,6 +21,24 @@ static void carve_columns(carver *c, quern_real **column, uint32_t n, uint32_t c
 	for (uint32_t k = 0; k < n; k++) column[k] = carve(c, cap * sizeof(quern_real));
 }
 
+/* A law's rows need a number each, of whatever kind; those of grains one for the second grain too. */
+static void carve_rows(const forces_shared *sh, forces_work *w, carver *c) {
+	const uint32_t dim = sh->s->dim;
+	uint32_t n = 0, at = 0;
+	for (uint32_t l = 0; l < sh->n_laws; l++) n += sh->s->slot[SLOT_CONTACT][l].n_uses;
+	law_row *rows = w->rows = carve(c, n * sizeof *rows);
+	for (uint32_t l = 0; l < sh->n_laws; l++) {
+		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
+		for (uint32_t r = 0; r < law->n_uses; r++, at++)
+			for (uint32_t k = 0; k < quern_shape_size(law->uses[r].shape, dim); k++) {
+				void *mine = carve(c, sh->cap * sizeof(quern_real));
+				void *other =
+					quern_dem_is_history(&law->uses[r]) ? NULL : carve(c, sh->cap * sizeof(quern_real));
+				if (rows) rows[at].mine[k] = mine, rows[at].other[k] = other;
+			}
+	}
+}
+
 /* Lays the columns out from `base`; with base NULL it only measures. Returns the bytes. */
 static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	carver c = { base, 0 };
@@ -39,74 +57,27 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 		carve_columns(&c, w->torque, dim == 3 ? 3 : 1, cap);
 		if (dim == 3) carve_columns(&c, w->turn, 3, cap);
 	}
+	if (sh->couple) carve_columns(&c, w->couple, dim == 3 ? 3 : 1, cap);
 	if (sh->energy) {
+		if (sh->couple) carve_columns(&c, w->drag_couple, dim == 3 ? 3 : 1, cap);
 		carve_columns(&c, w->dashpot, dim, cap);
 		carve_columns(&c, &w->stored, 1, cap);
 		carve_columns(&c, &w->sheared, 1, cap);
 		carve_columns(&c, &w->rubbed, 1, cap);
 		if (sh->spin) carve_columns(&c, w->drag_torque, dim == 3 ? 3 : 1, cap);
 	}
-	for (uint32_t l = 0; l < sh->n_laws; l++) {
-		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
-		for (uint32_t r = 0; r < law->n_uses; r++) {
-			const uint32_t n = quern_shape_size(law->uses[r].shape, dim);
-			const bool own = !strncmp(law->uses[r].field, "contact.", 8);
-			carve_columns(&c, w->history[l][r], n, cap);
-			if (!own) carve_columns(&c, w->other[l][r], n, cap);
-		}
-	}
+	carve_rows(sh, w, &c);
 	w->first = carve(&c, cap * sizeof(int32_t));
 	w->second = carve(&c, cap * sizeof(int32_t));
 	w->slot = carve(&c, cap * sizeof(int32_t));
+	if (sh->d->features) w->feature = carve(&c, cap * sizeof(int32_t));
 	carve_columns(&c, w->grains, 34, GRAINS);
 	w->row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	if (sh->energy) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	return c.used + 64;
 }
 
-/* ---- forces_shared by pairs and touches ---- */
-
-void quern_dem_clear(const forces_shared *sh, const forces_work *w, uint32_t n) {
-	for (uint32_t k = 0; k < sh->s->dim; k++) {
-		memset(w->force[k], 0, n * sizeof(quern_real));
-		if (sh->energy) memset(w->dashpot[k], 0, n * sizeof(quern_real));
-	}
-	if (!sh->energy) return;
-	memset(w->stored, 0, n * sizeof(quern_real));
-	memset(w->sheared, 0, n * sizeof(quern_real));
-	memset(w->rubbed, 0, n * sizeof(quern_real));
-}
-
-bool quern_dem_is_history(const quern_use *row) { return !strncmp(row->field, "contact.", 8); }
-
-quern_contact_batch quern_dem_batch(const forces_shared *sh, const forces_work *w, uint32_t n) {
-	quern_contact_batch b = { .n = n,
-		.cap = sh->cap,
-		.dt = sh->s->dt,
-		.overlap = w->overlap,
-		.radius = w->radius,
-		.mass = w->mass,
-		.stored = w->stored,
-		.sheared = w->sheared,
-		.rubbed = w->rubbed };
-	for (uint32_t k = 0; k < 3; k++) {
-		b.normal[k] = w->normal[k];
-		b.velocity[k] = w->velocity[k];
-		b.spin[k] = w->spin[k];
-		b.turn[k] = w->turn[k];
-		b.force[k] = w->force[k];
-		b.dashpot[k] = w->dashpot[k];
-	}
-	return b;
-}
-
-void quern_dem_keep_force(const forces_shared *sh, const forces_work *w, quern_column out, uint32_t begin,
-	uint32_t n_slots, uint32_t n) {
-	for (uint32_t k = 0; k < sh->s->dim && out.real[0]; k++) {
-		memset(out.real[k] + begin, 0, n_slots * sizeof(quern_real));
-		for (uint32_t q = 0; q < n; q++) out.real[k][begin + (uint32_t)w->slot[q]] = w->force[k][q];
-	}
-}
+/* ---- energy ---- */
 
 /* A spring that opens gives up what it held in the tangential direction: that is lost to sliding. Of a pair across
  * blocks the first grain's block keeps the books. */
@@ -153,13 +124,21 @@ static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	quern_dem_integrate(sh, &w, b, sums);
 }
 
+static bool any_couples(const quern_step *s) {
+	for (uint32_t l = 0; l < s->n_slot[SLOT_CONTACT]; l++)
+		for (uint32_t r = 0; r < s->slot[SLOT_CONTACT][l].n_uses; r++)
+			if (!strcmp(s->slot[SLOT_CONTACT][l].uses[r].field, "contact.couple")) return true;
+	return false;
+}
+
 static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	const quern_step *s = sh->s;
 	const quern_set_view contacts = s->host->set(s->run, "contact"), touches = s->host->set(s->run, "touch");
 	sh->use = s->use;
 	sh->cap = s->batch;
 	sh->n_bodies = s->n_slot[SLOT_BODIES];
-	sh->n_laws = s->n_slot[SLOT_CONTACT] < MOST_LAWS ? s->n_slot[SLOT_CONTACT] : MOST_LAWS;
+	sh->n_laws = s->n_slot[SLOT_CONTACT];
+	sh->couple = any_couples(s);
 	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
 	sh->energy = s->use[FORCE_STORED].real[0] != NULL && !s->settling;
 	sh->grain = grains.block;

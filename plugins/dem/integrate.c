@@ -131,7 +131,7 @@ void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, qu
 	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
 	for (uint32_t begin = sh->grain[b], end = sh->grain[b + 1]; begin < end; begin += GRAINS) {
 		const uint32_t n = end - begin < GRAINS ? end - begin : GRAINS;
-		quern_column own[MOST_ROWS];
+		quern_column own[QUERN_MOST_USES];
 		quern_integrator_batch batch = { .n = n,
 			.cap = GRAINS,
 			.dt = sh->s->dt,
@@ -139,7 +139,7 @@ void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, qu
 			.inertia = w->grains[G_INERTIA],
 			.use = own };
 		load_grains(sh, w, begin, begin - sh->grain[b], n);
-		for (uint32_t r = 0; r < bound->n_uses && r < MOST_ROWS; r++)
+		for (uint32_t r = 0; r < bound->n_uses; r++)
 			own[r] = quern_column_from(bound->column[r], bound->uses[r].shape, begin);
 		for (uint32_t k = 0; k < dim; k++) {
 			batch.gravity[k] = sh->s->gravity[k];

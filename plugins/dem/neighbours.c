@@ -18,10 +18,11 @@ typedef struct {
 	uint32_t *found;  /* by block */
 	uint32_t *start;  /* by block: of the final list */
 	quern_pair *list;
-	int32_t *list_from;
+	int32_t *list_from, *list_feature;
 	const uint32_t *bucket; /* by grain: its old entries in `entry` */
 	const int32_t *entry;
 	const int32_t *old_first, *old_second;
+	const int32_t *old_feature; /* of touches; NULL: entries of one pair are one */
 } listing;
 
 /* ---- sorting ---- */
@@ -137,9 +138,11 @@ static quern_status index_old(listing *l, const char *set, const int32_t *first,
 	return QUERN_OK;
 }
 
-static int32_t old_entry(const listing *l, int32_t first, int32_t second) {
-	for (uint32_t k = l->bucket[first]; k < l->bucket[first + 1]; k++)
-		if (l->old_second[l->entry[k]] == second) return l->entry[k];
+static int32_t old_entry(const listing *l, int32_t first, int32_t second, int32_t feature) {
+	for (uint32_t k = l->bucket[first]; k < l->bucket[first + 1]; k++) {
+		const int32_t e = l->entry[k];
+		if (l->old_second[e] == second && (!l->old_feature || l->old_feature[e] == feature)) return e;
+	}
 	return -1;
 }
 
@@ -150,7 +153,7 @@ static void gather_pairs(void *arg, uint32_t b, uint32_t worker) {
 	for (uint32_t i = 0; i < l->found[b]; i++) {
 		const uint32_t to = l->start[b] + i;
 		l->list[to] = in[i];
-		l->list_from[to] = old_entry(l, in[i].first, in[i].second);
+		l->list_from[to] = old_entry(l, in[i].first, in[i].second, 0);
 	}
 }
 
@@ -186,6 +189,7 @@ static quern_status list_contacts(listing *l) {
 	status = index_old(l, "contact", s->use[NEAR_FIRST].index, l->job.n);
 	if (status != QUERN_OK) return status;
 	l->old_second = s->use[NEAR_SECOND].index;
+	l->old_feature = NULL;
 	s->host->parallel(s->run, l->job.n_blocks, gather_pairs, l);
 	status = s->host->remap(s->run, "contact", n, l->list_from, l->job.n_blocks, l->start);
 	if (status != QUERN_OK) return status;
@@ -196,38 +200,57 @@ static quern_status list_contacts(listing *l) {
 
 /* ---- grains near bodies ---- */
 
-enum { CHUNK = 256 };
+enum { CHUNK = 256, MOST_FEATURES = 64 };
 
 typedef struct {
 	_Alignas(64) quern_real gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
+	int32_t feature[MOST_FEATURES];
 } near_body;
 
-static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, quern_pair *out) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+
+/* Gaps of m grains from `first` on to the body's nearest place. */
+static void find_gaps(const listing *l, const quern_bound *body, uint32_t first, uint32_t m, near_body *w) {
+	quern_body_batch batch = {
+		.n = m, .cap = CHUNK, .dim = l->s->dim, .pose = &still, .radius = l->job.radius + first, .gap = w->gap
+	};
+	for (uint32_t k = 0; k < l->s->dim; k++) {
+		batch.position[k] = l->job.position[k] + first;
+		batch.normal[k] = w->normal[k];
+		batch.velocity[k] = w->velocity[k];
+	}
+	((const quern_body_ops *)body->ops)->closest(body->self, &batch);
+}
+
+/* The features of a body that a grain is near; a body without any is feature 0. */
+static uint32_t find_features(const listing *l, const quern_bound *body, uint32_t i, near_body *w) {
+	const quern_body_ops *ops = body->ops;
+	quern_real x[3] = { 0 };
+	w->feature[0] = 0;
+	if (!ops->features) return 1;
+	for (uint32_t k = 0; k < l->s->dim; k++) x[k] = l->job.position[k][i];
+	return ops->features(body->self, &still, x, l->job.radius[i] + l->job.reach, MOST_FEATURES, w->feature);
+}
+
+/* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too many. */
+static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, const uint32_t *to) {
 	const quern_step *s = l->s;
-	const quern_real reach = l->job.reach;
 	uint32_t n = 0;
 	for (uint32_t body = 0; body < s->n_slot[SLOT_BODIES]; body++) {
 		const quern_bound *bound = &s->slot[SLOT_BODIES][body];
 		if (!quern_body_is_there(bound, s->settling)) continue;
 		for (uint32_t i = l->job.block[b]; i < l->job.block[b + 1]; i += CHUNK) {
 			const uint32_t m = l->job.block[b + 1] - i < CHUNK ? l->job.block[b + 1] - i : CHUNK;
-			quern_body_batch batch = { .n = m,
-				.cap = CHUNK,
-				.dim = s->dim,
-				.pose = &still,
-				.radius = l->job.radius + i,
-				.gap = w->gap };
-			for (uint32_t k = 0; k < s->dim; k++) {
-				batch.position[k] = l->job.position[k] + i;
-				batch.normal[k] = w->normal[k];
-				batch.velocity[k] = w->velocity[k];
-			}
-			((const quern_body_ops *)bound->ops)->closest(bound->self, &batch);
+			find_gaps(l, bound, i, m, w);
 			for (uint32_t k = 0; k < m; k++) {
-				if (!(w->gap[k] < reach) || (l->fixed && l->fixed[i + k])) continue;
-				if (out) out[n] = (quern_pair) { (int32_t)(i + k), (int32_t)body };
-				n++;
+				if (!(w->gap[k] < l->job.reach) || (l->fixed && l->fixed[i + k])) continue;
+				const uint32_t features = find_features(l, bound, i + k, w);
+				if (features > MOST_FEATURES) return UINT32_MAX;
+				for (uint32_t f = 0; f < features; f++, n++) {
+					if (!to) continue;
+					l->list[*to + n] = (quern_pair) { (int32_t)(i + k), (int32_t)body };
+					if (l->list_feature) l->list_feature[*to + n] = w->feature[f];
+				}
 			}
 		}
 	}
@@ -244,28 +267,41 @@ static void gather_touches(void *arg, uint32_t b, uint32_t worker) {
 	listing *l = arg;
 	near_body *w = l->s->host->scratch(l->s->run, worker, sizeof *w);
 	if (!w) return;
-	touches_of_block(l, b, w, l->list + l->start[b]);
+	touches_of_block(l, b, w, &l->start[b]);
 	for (uint32_t k = l->start[b]; k < l->start[b + 1]; k++)
-		l->list_from[k] = old_entry(l, l->list[k].first, l->list[k].second);
+		l->list_from[k] =
+			old_entry(l, l->list[k].first, l->list[k].second, l->list_feature ? l->list_feature[k] : 0);
 }
 
 static quern_status list_touches(listing *l) {
 	const quern_step *s = l->s;
 	s->host->parallel(s->run, l->job.n_blocks, count_touches, l);
 	l->start[0] = 0;
-	for (uint32_t b = 0; b < l->job.n_blocks; b++) l->start[b + 1] = l->start[b] + l->found[b];
+	for (uint32_t b = 0; b < l->job.n_blocks; b++) {
+		if (l->found[b] == UINT32_MAX)
+			return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+				"a grain is near more than %d features of a body: make the skin or the grains smaller, or "
+				"the "
+				"body coarser",
+				MOST_FEATURES);
+		l->start[b + 1] = l->start[b] + l->found[b];
+	}
 	const uint32_t n = l->start[l->job.n_blocks];
 	l->list = s->host->memory(s->run, ((size_t)n + 1) * sizeof(quern_pair));
 	l->list_from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
-	if (!l->list || !l->list_from) return QUERN_E_MEMORY;
+	if (l->d->features) l->list_feature = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
+	if (!l->list || !l->list_from || (l->d->features && !l->list_feature)) return QUERN_E_MEMORY;
 	quern_status status = index_old(l, "touch", s->use[NEAR_GRAIN].index, l->job.n);
 	if (status != QUERN_OK) return status;
 	l->old_second = s->use[NEAR_BODY].index;
+	l->old_feature = s->use[NEAR_FEATURE].index;
 	s->host->parallel(s->run, l->job.n_blocks, gather_touches, l);
 	status = s->host->remap(s->run, "touch", n, l->list_from, l->job.n_blocks, l->start);
 	if (status != QUERN_OK) return status;
-	int32_t *grain = s->use[NEAR_GRAIN].index, *body = s->use[NEAR_BODY].index;
+	int32_t *grain = s->use[NEAR_GRAIN].index, *body = s->use[NEAR_BODY].index,
+			*feature = s->use[NEAR_FEATURE].index;
 	for (uint32_t k = 0; k < n; k++) grain[k] = l->list[k].first, body[k] = l->list[k].second;
+	for (uint32_t k = 0; k < n && feature; k++) feature[k] = l->list_feature[k];
 	return QUERN_OK;
 }
 
@@ -291,12 +327,10 @@ static quern_status keep_inside(const listing *l) {
 	const int32_t *fixed = s->use[NEAR_FIXED].index;
 	for (uint32_t k = 0; k < s->dim; k++) {
 		quern_real *x = s->use[NEAR_POSITION].real[k];
-		const quern_real lower = s->lower[k], upper = s->upper[k], length = upper - lower;
+		const quern_real lower = s->lower[k], upper = s->upper[k];
 		for (uint32_t i = 0; i < n; i++) {
-			if (s->periodic[k]) {
-				x[i] = x[i] >= upper ? x[i] - length : x[i];
-				x[i] = x[i] < lower ? x[i] + length : x[i];
-			} else if (!(x[i] >= lower && x[i] <= upper) && !(fixed && fixed[i]))
+			if (s->periodic[k]) x[i] = quern_brought_back(x[i], lower, upper);
+			else if (!(x[i] >= lower && x[i] <= upper) && !(fixed && fixed[i]))
 				return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", s->use[NEAR_ID].id[i],
 					"left the domain along axis %u, at %.4g m: put a body there or make the domain larger", k,
 					x[i]);

@@ -22,13 +22,13 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 	const quern_column *u = o->s->use;
 	const uint32_t begin = chunk * CHUNK, n = o->n - begin < CHUNK ? o->n - begin : CHUNK, dim = o->s->dim;
 	opened *w = o->s->host->scratch(o->s->run, worker, sizeof *w);
-	quern_column own[8];
+	quern_column own[QUERN_MOST_USES];
 	if (!w) {
 		o->farthest[chunk] = INFINITY;
 		return;
 	}
 	quern_integrator_batch b = { .n = n, .cap = CHUNK, .dt = o->s->dt, .use = own };
-	for (uint32_t r = 0; r < o->bound->n_uses && r < 8; r++)
+	for (uint32_t r = 0; r < o->bound->n_uses; r++)
 		own[r] = quern_column_from(o->bound->column[r], o->bound->uses[r].shape, begin);
 	for (uint32_t k = 0; k < dim; k++) {
 		b.gravity[k] = o->s->gravity[k];

@@ -1,6 +1,5 @@
 /* pairs - contacts between grains of one block: distance test, laws, sums in list order */
 #include "forces.h"
-#include <string.h>
 
 /* Half a periodic domain's length and the length; infinity and zero where it is not periodic. */
 typedef struct {
@@ -143,57 +142,6 @@ static void masses(const forces_shared *sh, const forces_work *w, uint32_t n) {
 		}
 }
 
-/* ---- laws ---- */
-/* Own columns of the pairs kept, or of both grains. */
-static void gather_rows(const forces_shared *sh, forces_work *w, const quern_bound *law, uint32_t l,
-	uint32_t begin, uint32_t n, quern_column *use, quern_column *use_second) {
-	for (uint32_t r = 0; r < law->n_uses; r++) {
-		const quern_use *row = &law->uses[r];
-		use[r] = use_second[r] = (quern_column) { .real = { NULL } };
-		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
-			const quern_real *restrict whole = law->column[r].real[k];
-			if (!whole || row->shape == QUERN_INDEX || row->shape == QUERN_ID) continue;
-			quern_real *restrict mine = w->history[l][r][k], *restrict other = w->other[l][r][k];
-			if (quern_dem_is_history(row))
-				for (uint32_t q = 0; q < n; q++) mine[q] = whole[begin + (uint32_t)w->slot[q]];
-			else
-				for (uint32_t q = 0; q < n; q++) mine[q] = whole[w->first[q]], other[q] = whole[w->second[q]];
-			use[r].real[k] = mine;
-			use_second[r].real[k] = other;
-		}
-	}
-}
-
-/* Pairs that were left out forget, pairs that were kept remember. */
-static void scatter_rows(const forces_shared *sh, const forces_work *w, const quern_bound *law,
-	uint32_t begin, uint32_t n_slots, uint32_t n, quern_column *use) {
-	for (uint32_t r = 0; r < law->n_uses; r++) {
-		const quern_use *row = &law->uses[r];
-		if (!quern_dem_is_history(row) || row->access == QUERN_READ) continue;
-		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
-			quern_real *restrict whole = law->column[r].real[k];
-			const quern_real *restrict mine = use[r].real[k];
-			if (!mine) continue;
-			for (uint32_t q = 0; q < n_slots; q++) whole[begin + q] = row->initial;
-			for (uint32_t q = 0; q < n; q++) whole[begin + (uint32_t)w->slot[q]] = mine[q];
-		}
-	}
-}
-
-static void call_laws(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n_slots, uint32_t n) {
-	quern_column use[MOST_ROWS], use_second[MOST_ROWS];
-	quern_contact_batch b = quern_dem_batch(sh, w, n);
-	b.use = use;
-	b.use_second = use_second;
-	quern_dem_clear(sh, w, n);
-	for (uint32_t l = 0; l < sh->n_laws; l++) {
-		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
-		gather_rows(sh, w, law, l, begin, n, use, use_second);
-		if (n) ((const quern_contact_ops *)law->ops)->force[sh->s->dim - 2](law->self, &b);
-		scatter_rows(sh, w, law, begin, n_slots, n, use);
-	}
-}
-
 /* ---- sums ---- */
 typedef quern_real lanes8 __attribute__((vector_size(64)));
 
@@ -235,13 +183,16 @@ QUERN_INLINE void block(
 		geometry(sh, w, n, dim);
 		motion(sh, w, n, dim, spin);
 		masses(sh, w, n);
-		call_laws(sh, w, begin, n_slots, n);
+		quern_dem_call_laws(sh, w, -1, begin, n_slots, n);
 		if (spin) dem_torques(w, w->force, w->torque, n, dim);
 		add_pairs(sh, w, w->row, w->force, w->torque, first, last, n, dim, spin);
-		quern_dem_keep_force(sh, w, sh->use[FORCE_CONTACT], begin, n_slots, n);
+		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->row, w->couple, -1, first, last, n);
+		quern_dem_keep(w, w->force, sh->use[FORCE_CONTACT], (uint32_t)dim, begin, n_slots, n);
+		quern_dem_keep(w, w->couple, sh->use[FORCE_CONTACT_COUPLE], dim == 3 ? 3 : 1, begin, n_slots, n);
 		if (!sh->energy) continue;
 		if (spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
 		add_pairs(sh, w, w->drag_row, w->dashpot, w->drag_torque, first, last, n, dim, spin);
+		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->drag_row, w->drag_couple, -1, first, last, n);
 		quern_dem_book(sh, w, sh->use[FORCE_CONTACT_SHEARED], begin, n_slots, n, first, last,
 			sh->use[FORCE_FIRST].index + begin, sums);
 	}

@@ -49,6 +49,9 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 	QUERN_PARAM(dem, fixed, NULL,
 		"Keep a flag for grains that do not move; set by itself where one is needed.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, features, NULL,
+		"Keep with every touch which feature of the body it is on; set by itself where bodies have several.",
+		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -119,7 +122,10 @@ static const quern_use near_uses[] = { F("grain.position", "m", QUERN_READ, QUER
 	F("contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of lower id."),
 	F("contact.second", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of higher id."),
 	F("touch.grain", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain."),
-	F("touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body."), QUERN_END_USES };
+	F("touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body."),
+	F("touch.feature", "1", QUERN_WRITE, QUERN_INDEX, .when = "features",
+		.doc = "The body's face, edge or vertex."),
+	QUERN_END_USES };
 #define ENERGY(name, access, text)                                                                           \
 	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = text)
 static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
@@ -158,7 +164,11 @@ static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUE
 	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."), F("grain.id", "1", QUERN_READ, QUERN_ID),
 	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
 		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
-	QUERN_END_USES };
+	F("contact.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
+		.doc = "On the first, unweighted."),
+	F("touch.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
+		.doc = "On the grain, unweighted."),
+	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"), QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "dem.fill",
 										  .doc = "Places the first grains.",
@@ -216,6 +226,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
+	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
+	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->density);
 	setup->host->publish(setup, "grain.radius_spread", "1", d->radii.spread);
 	setup->host->publish(setup, "grain.radius_law", "1", d->radii.law);
@@ -232,6 +244,9 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	dem *d = self;
 	quern_real kn = 0, g2 = 0;
 	(void)err;
+	d->features = false;
+	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
+		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
 	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
 	quern_real height = setup->upper[d->dim - 1] - setup->lower[d->dim - 1];

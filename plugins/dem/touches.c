@@ -1,6 +1,5 @@
 /* touches - grains of one block on bodies: the same laws, with the body for a second grain that never moves */
 #include "forces.h"
-#include <string.h>
 
 /* One body's grains of this block: the same laws, with the body for a second grain that never moves. */
 QUERN_INLINE void touch_body(const forces_shared *sh, forces_work *w, uint32_t body, uint32_t begin,
@@ -20,16 +19,19 @@ QUERN_INLINE void touch_body(const forces_shared *sh, forces_work *w, uint32_t b
 		if (weight) w->weight[q] = weight[i];
 		for (int k = 0; k < dim; k++) x[k][q] = u[FORCE_OLD_POSITION].real[k][i];
 	}
+	const quern_body_ops *ops = bound->ops;
+	for (uint32_t q = 0; q < n && ops->features; q++) w->feature[q] = u[FORCE_FEATURE].index[begin + q];
 	const quern_body_batch batch = { .n = n,
 		.cap = sh->cap,
 		.dim = (uint32_t)dim,
 		.pose = &still,
 		.radius = w->radius,
+		.feature = ops->features ? w->feature : NULL,
 		.position = { x[0], x[1], x[2] },
 		.gap = w->overlap,
 		.normal = { w->normal[0], w->normal[1], w->normal[2] },
 		.velocity = { w->velocity[0], w->velocity[1], w->velocity[2] } };
-	((const quern_body_ops *)bound->ops)->closest(bound->self, &batch);
+	ops->closest(bound->self, &batch);
 	for (uint32_t q = 0; q < n; q++) {
 		const int32_t i = grain[q];
 		w->overlap[q] = -w->overlap[q];
@@ -55,37 +57,6 @@ QUERN_INLINE void touch_body(const forces_shared *sh, forces_work *w, uint32_t b
 	}
 }
 
-/* History of touches is in place: few of them are open. */
-static void call_body_laws(
-	const forces_shared *sh, forces_work *w, uint32_t body, uint32_t begin, uint32_t n) {
-	quern_column use[MOST_ROWS], use_second[MOST_ROWS];
-	quern_contact_batch b = quern_dem_batch(sh, w, n);
-	b.use = use;
-	b.use_second = use_second;
-	quern_dem_clear(sh, w, n);
-	for (uint32_t l = 0; l < sh->n_laws; l++) {
-		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
-		const void *self = law->n_variant ? law->variant[body] : law->self;
-		for (uint32_t r = 0; r < law->n_uses; r++) {
-			use[r] = use_second[r] = (quern_column) { .real = { NULL } };
-			for (uint32_t k = 0; k < quern_shape_size(law->uses[r].shape, sh->s->dim); k++) {
-				const quern_real *whole = law->again[r].real[k];
-				if (!whole) continue;
-				use[r].real[k] = use_second[r].real[k] = w->history[l][r][k];
-				for (uint32_t q = 0; q < n; q++)
-					w->history[l][r][k][q] =
-						quern_dem_is_history(&law->uses[r]) ? whole[begin + q] : whole[w->first[q]];
-			}
-		}
-		((const quern_contact_ops *)law->ops)->force[sh->s->dim - 2](self, &b);
-		for (uint32_t r = 0; r < law->n_uses; r++)
-			for (uint32_t k = 0;
-				 k < 9 && quern_dem_is_history(&law->uses[r]) && law->uses[r].access != QUERN_READ; k++)
-				if (use[r].real[k])
-					memcpy(law->again[r].real[k] + begin, use[r].real[k], n * sizeof(quern_real));
-	}
-}
-
 QUERN_INLINE void add_touches(const forces_shared *sh, const forces_work *w, quern_real (*row)[8],
 	quern_real *const force[3], quern_real *const torque[3], uint32_t first, uint32_t n, const int dim,
 	const bool spin) {
@@ -102,14 +73,16 @@ QUERN_INLINE void add_touches(const forces_shared *sh, const forces_work *w, que
 QUERN_INLINE void block(
 	const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums, const int dim, const bool spin) {
 	const int32_t *body = sh->use[FORCE_BODY].index;
-	const uint32_t first = sh->grain[b];
+	const uint32_t first = sh->grain[b], last = sh->grain[b + 1];
 	for (uint32_t begin = sh->touch[b], end = sh->touch[b + 1], n; begin < end; begin += n) {
 		for (n = 1; begin + n < end && n < sh->cap && body[begin + n] == body[begin]; n++) {}
 		touch_body(sh, w, (uint32_t)body[begin], begin, n, dim, spin);
-		call_body_laws(sh, w, (uint32_t)body[begin], begin, n);
+		quern_dem_call_laws(sh, w, body[begin], begin, n, n);
 		if (spin) dem_torques(w, w->force, w->torque, n, dim);
 		add_touches(sh, w, w->row, w->force, w->torque, first, n, dim, spin);
-		quern_dem_keep_force(sh, w, sh->use[FORCE_TOUCH], begin, n, n);
+		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->row, w->couple, body[begin], first, last, n);
+		quern_dem_keep(w, w->force, sh->use[FORCE_TOUCH], (uint32_t)dim, begin, n, n);
+		quern_dem_keep(w, w->couple, sh->use[FORCE_TOUCH_COUPLE], dim == 3 ? 3 : 1, begin, n, n);
 		quern_real *impulse = sh->impulse + ((size_t)b * (sh->n_bodies + 1) + (uint32_t)body[begin]) * 3;
 		for (uint32_t q = 0; q < n; q++)
 			for (int k = 0; k < dim; k++)
@@ -117,6 +90,8 @@ QUERN_INLINE void block(
 		if (!sh->energy) continue;
 		if (spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
 		add_touches(sh, w, w->drag_row, w->dashpot, w->drag_torque, first, n, dim, spin);
+		if (spin && sh->couple)
+			quern_dem_add_couples(sh, w, w->drag_row, w->drag_couple, body[begin], first, last, n);
 		quern_dem_book(sh, w, sh->use[FORCE_TOUCH_SHEARED], begin, n, n, 0, UINT32_MAX, w->first, sums);
 	}
 }

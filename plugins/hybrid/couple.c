@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { N = QUERN_BLOCK_CELLS, MOST_ROWS = 8 };
+enum { N = QUERN_BLOCK_CELLS };
 
 /* ---- which grains belong to which block ---- */
 
@@ -249,7 +249,7 @@ typedef struct {
 	stencil stencil;
 	_Alignas(64) quern_real pic[3][STENCIL], change[3][STENCIL], echo[3][STENCIL], send[3][STENCIL],
 		velocity[3][STENCIL];
-	quern_real rows[MOST_ROWS][9][STENCIL];
+	quern_real rows[QUERN_MOST_USES][9][STENCIL];
 	int32_t grain[STENCIL];
 } back_memory;
 
@@ -285,14 +285,16 @@ QUERN_INLINE uint32_t load_coupled(
 static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool last) {
 	const quern_bound *transfer = &w->s->slot[SLOT_TRANSFER][0];
 	const uint32_t dim = w->s->dim;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_transfer_batch t = { .n = n, .cap = STENCIL, .pass = w->pass, .dt = w->s->dt, .use = own };
-	for (uint32_t r = 0; r < transfer->n_uses && r < MOST_ROWS; r++) {
+	for (uint32_t r = 0; r < transfer->n_uses; r++) {
+		const uint8_t shape = transfer->uses[r].shape;
 		own[r] = (quern_column) { .real = { NULL } };
-		for (uint32_t k = 0; k < quern_shape_size(transfer->uses[r].shape, dim); k++) {
-			const quern_real *whole = transfer->column[r].real[k];
-			for (uint32_t q = 0; q < n && whole; q++) m->rows[r][k][q] = whole[m->grain[q]];
-			if (whole) own[r].real[k] = m->rows[r][k];
+		for (uint32_t k = 0; k < quern_shape_size(shape, dim); k++) {
+			const void *whole = quern_component(&transfer->column[r], shape, k);
+			if (!whole) continue;
+			quern_gather(shape, m->rows[r][k], whole, 0, m->grain, n);
+			quern_set_component(&own[r], shape, k, m->rows[r][k]);
 		}
 	}
 	for (uint32_t a = 0; a < dim; a++) {
@@ -303,6 +305,14 @@ static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool l
 		t.velocity[a] = m->velocity[a];
 	}
 	((const quern_transfer_ops *)transfer->ops)->gather[dim - 2](transfer->self, &t);
+	for (uint32_t r = 0; r < transfer->n_uses; r++) {
+		const uint8_t shape = transfer->uses[r].shape;
+		for (uint32_t k = 0; k < quern_shape_size(shape, dim) && transfer->uses[r].access != QUERN_READ;
+			 k++) {
+			void *whole = quern_component(&transfer->column[r], shape, k);
+			if (whole) quern_scatter(shape, whole, m->rows[r][k], 0, m->grain, n);
+		}
+	}
 }
 
 /* The impulse is spread over the substeps: the path of a grain is moved by (n + 1)/(2 n) dt dv. With the whole dt dv

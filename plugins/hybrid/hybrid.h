@@ -66,7 +66,8 @@ enum {
 	S_RADIUS,
 	S_FIXED,
 	S_STRESS,
-	S_SAMPLES
+	S_SAMPLES,
+	S_TOUCH_FEATURE
 };
 /* rows of hybrid.raster, hybrid.couple and hybrid.back */
 enum { R_POSITION, R_VELOCITY, R_MASS, R_WEIGHT, R_FIXED, R_NODE, R_MOTION, R_MIXTURE };

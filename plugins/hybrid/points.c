@@ -67,7 +67,9 @@ static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]
 		for (uint32_t p = 0; p < parts; p++)
 			if (!taken[p] && (best == parts || held[p] > held[best])) best = p;
 		taken[best] = true;
-		new_point point = { .mass = mass / count, .weight = point_share(d->zone[c]), .cell = (int32_t)c };
+		new_point point = {
+			.mass = mass / count, .weight = point_share(d->zone[c]), .cell = (int32_t)c, .parent = -1
+		};
 		part_centre(d, cell, best, point.position);
 		memcpy(point.velocity, v, sizeof point.velocity);
 		quern_hybrid_contact_stress(d, c, point.stress);
@@ -134,7 +136,23 @@ static void settle(update *d, uint32_t c) {
 	} else if (owed < 0 && held > 0) shrink(d, c, mass, held);
 }
 
-/* ---- few and many ---- */
+/* ---- few and many: what parts and joins keeps mass, momentum and volume, and with them the density: an open point stays
+ *      open. Stress is the mean by volume, so that the sum of V sigma stays; history that goes with the stress is the mean by
+ *      mass. Whatever else a point remembers is that of the heavier one. ---- */
+
+/* What the material's state-from-stress writes. Entry `to` gets the share of what entry i has. */
+static void mix_history(const update *d, uint32_t to, uint32_t i, quern_real share) {
+	const quern_bound *material = &d->s->slot[SLOT_MATERIAL][0];
+	for (uint32_t r = 0; r < material->n_uses; r++) {
+		const quern_use *row = &material->uses[r];
+		if (row->hook != QUERN_MATERIAL_ASSIGN || row->shape == QUERN_INDEX || row->shape == QUERN_ID)
+			continue;
+		for (uint32_t k = 0; k < quern_shape_size(row->shape, d->s->dim); k++) {
+			quern_real *x = material->column[r].real[k];
+			if (x) x[to] += share * (x[i] - x[to]);
+		}
+	}
+}
 
 /* An empty quadrant of a thinly populated cell gets a point that takes an equal share from each of the others. */
 static void split(update *d, uint32_t c) {
@@ -151,55 +169,77 @@ static void split(update *d, uint32_t c) {
 	for (uint32_t p = parts; p-- > 0;)
 		if (!taken[p]) free_part = p;
 	if (free_part == parts) return;
-	new_point point = { .mass = held * share, .weight = point_share(d->zone[c]), .cell = (int32_t)c };
+	new_point point = { .weight = point_share(d->zone[c]), .cell = (int32_t)c, .parent = -1 };
 	part_centre(d, cell, free_part, point.position);
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
-		const quern_real given = u[U_POINT_MASS].real[0][i] * share;
-		for (uint32_t k = 0; k < d->s->dim; k++)
-			point.velocity[k] += given * u[U_POINT_VELOCITY].real[k][i] / point.mass;
+		quern_real *mass = &u[U_POINT_MASS].real[0][i], *volume = &u[U_POINT_VOLUME].real[0][i];
+		const quern_real given = share * *mass, room = share * *volume;
+		if (point.parent < 0 || *mass > u[U_POINT_MASS].real[0][point.parent]) point.parent = i;
+		for (uint32_t k = 0; k < d->s->dim; k++) point.velocity[k] += given * u[U_POINT_VELOCITY].real[k][i];
 		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
-			point.stress[k] += given * u[U_POINT_STRESS].real[k][i] / point.mass;
-		u[U_POINT_MASS].real[0][i] -= given;
-		u[U_POINT_VOLUME].real[0][i] *= 1 - share;
+			point.stress[k] += room * u[U_POINT_STRESS].real[k][i];
+		point.mass += given;
+		point.volume += room;
+		*mass -= given;
+		*volume -= room;
 	}
+	for (uint32_t k = 0; k < d->s->dim; k++) point.velocity[k] /= point.mass;
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
+		point.stress[k] /= point.volume;
 	add_point(d, &point);
 }
 
-/* In a crowded cell the lightest point joins its nearest neighbour; mass, momentum and volume are kept. */
+static bool presses(const update *d, int32_t i) {
+	quern_real trace = 0;
+	for (uint32_t k = 0; k < d->s->dim; k++) trace += d->u[U_POINT_STRESS].real[k][i];
+	return trace < 0;
+}
+
+/* The nearest point of the cell, if there is one then of those that are open or closed like it. */
+static int32_t partner_of(const update *d, uint32_t c, int32_t light) {
+	const quern_column *x = &d->u[U_POINT_POSITION];
+	const bool closed = presses(d, light);
+	int32_t near = -1;
+	quern_real least = INFINITY;
+	bool unlike = true;
+	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
+		const int32_t i = d->point[q];
+		const bool other = presses(d, i) != closed;
+		quern_real d2 = 0;
+		if (i == light) continue;
+		for (uint32_t k = 0; k < d->s->dim; k++)
+			d2 += (x->real[k][i] - x->real[k][light]) * (x->real[k][i] - x->real[k][light]);
+		if (other > unlike || (other == unlike && d2 >= least)) continue;
+		least = d2, near = i, unlike = other;
+	}
+	return near;
+}
+
+/* In a crowded cell the lightest point joins its nearest neighbour. */
 static void merge(update *d, uint32_t c) {
 	const quern_column *u = d->u;
 	const uint32_t begin = d->point_begin[c], end = d->point_begin[c + 1], dim = d->s->dim;
-	int32_t light = -1, near = -1;
-	quern_real least = INFINITY;
+	int32_t light = -1;
 	if (end - begin <= 3 * parts_of(d)) return;
 	for (uint32_t q = begin; q < end; q++)
 		if (light < 0 || u[U_POINT_MASS].real[0][d->point[q]] < u[U_POINT_MASS].real[0][light])
 			light = d->point[q];
-	for (uint32_t q = begin; q < end; q++) {
-		quern_real d2 = 0;
-		if (d->point[q] == light) continue;
-		for (uint32_t k = 0; k < dim; k++) {
-			const quern_real x =
-				u[U_POINT_POSITION].real[k][d->point[q]] - u[U_POINT_POSITION].real[k][light];
-			d2 += x * x;
-		}
-		if (d2 < least) least = d2, near = d->point[q];
-	}
+	const int32_t near = partner_of(d, c, light);
 	const quern_real a = u[U_POINT_MASS].real[0][near], b = u[U_POINT_MASS].real[0][light];
 	const quern_real va = u[U_POINT_VOLUME].real[0][near], vb = u[U_POINT_VOLUME].real[0][light];
 	for (uint32_t k = 0; k < dim; k++) {
-		u[U_POINT_VELOCITY].real[k][near] =
-			(a * u[U_POINT_VELOCITY].real[k][near] + b * u[U_POINT_VELOCITY].real[k][light]) / (a + b);
-		u[U_POINT_POSITION].real[k][near] =
-			(a * u[U_POINT_POSITION].real[k][near] + b * u[U_POINT_POSITION].real[k][light]) / (a + b);
+		quern_real *v = u[U_POINT_VELOCITY].real[k], *x = u[U_POINT_POSITION].real[k];
+		v[near] = (a * v[near] + b * v[light]) / (a + b);
+		x[near] = (a * x[near] + b * x[light]) / (a + b);
 	}
-	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
-		u[U_POINT_STRESS].real[k][near] =
-			(va * u[U_POINT_STRESS].real[k][near] + vb * u[U_POINT_STRESS].real[k][light]) / (va + vb);
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++) {
+		quern_real *stress = u[U_POINT_STRESS].real[k];
+		stress[near] = (va * stress[near] + vb * stress[light]) / (va + vb);
+	}
+	mix_history(d, (uint32_t)near, (uint32_t)light, b / (a + b));
 	u[U_POINT_MASS].real[0][near] = a + b;
 	u[U_POINT_VOLUME].real[0][near] = va + vb;
-	quern_hybrid_assign(d, (uint32_t)near, 1);
 	d->drop_point[light] = true;
 }
 
@@ -215,15 +255,29 @@ void quern_hybrid_points(update *d) {
 
 /* ---- the set itself ---- */
 
+/* The history of a part: by mass that of those it was taken from, which all lie in its cell. `now`: by old entry. */
+static void take_part(const update *d, const new_point *p, uint32_t to, const int32_t *now) {
+	quern_real mass = 0;
+	for (uint32_t q = d->point_begin[p->cell]; q < d->point_begin[p->cell + 1]; q++) {
+		const uint32_t i = (uint32_t)now[d->point[q]];
+		mass += d->u[U_POINT_MASS].real[0][i];
+		mix_history(d, to, i, d->u[U_POINT_MASS].real[0][i] / mass);
+	}
+}
+
 quern_status quern_hybrid_apply_points(update *d) {
 	const quern_step *s = d->s;
 	const uint32_t dim = s->dim;
 	uint32_t kept = 0;
 	int32_t *from = s->host->memory(s->run, ((size_t)d->n_points + d->n_new_points + 1) * sizeof(int32_t));
-	if (!from) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < d->n_points; i++)
+	int32_t *now = s->host->memory(s->run, ((size_t)d->n_points + 1) * sizeof(int32_t));
+	if (!from || !now) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < d->n_points; i++) {
+		now[i] = (int32_t)kept;
 		if (!d->drop_point[i]) from[kept++] = (int32_t)i;
-	for (uint32_t i = 0; i < d->n_new_points; i++) from[kept + i] = -1;
+	}
+	for (uint32_t i = 0; i < d->n_new_points; i++)
+		from[kept + i] = d->points[i].parent < 0 ? -1 : -2 - d->points[i].parent;
 	const quern_status status = s->host->remap(s->run, "point", kept + d->n_new_points, from, 0, NULL);
 	if (status != QUERN_OK) return status;
 	const quern_column *u = d->u;
@@ -237,10 +291,11 @@ quern_status quern_hybrid_apply_points(update *d) {
 		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
 			u[U_POINT_STRESS].real[k][to] = p->stress[k];
 		u[U_POINT_MASS].real[0][to] = p->mass;
-		u[U_POINT_VOLUME].real[0][to] = p->mass / d->h->packed;
+		u[U_POINT_VOLUME].real[0][to] = p->parent < 0 ? p->mass / d->h->packed : p->volume;
 		u[U_POINT_WEIGHT].real[0][to] = p->weight;
+		if (p->parent < 0) quern_hybrid_assign(d, to, 1);
+		else take_part(d, p, to, now);
 	}
-	quern_hybrid_assign(d, kept, d->n_new_points);
 	u[U_UNSORTED].index[0] = 1;
 	return QUERN_OK;
 }

@@ -1,4 +1,5 @@
 /* sample - contact stress by cell, for points that are made there: docs/theory/hybrid.md, section 4 */
+#include "../common/symmetric.h"
 #include "hybrid.h"
 #include <math.h>
 #include <string.h>
@@ -46,22 +47,15 @@ static void add(sampling *p, const quern_real x[3], const quern_real f[3], const
 	}
 	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
 		int32_t cell[3] = { 0 };
-		quern_real w = -0.5 * p->one_over_volume;
+		quern_real w = -p->one_over_volume;
 		for (uint32_t k = 0; k < dim; k++) {
 			cell[k] = low[k] + (int32_t)(corner >> k & 1);
 			w *= corner >> k & 1 ? part[k] : 1 - part[k];
 		}
 		const int32_t c = entry_of(p, cell);
 		if (c < 0) continue;
-		stress->real[0][c] += w * 2 * f[0] * b[0];
-		stress->real[1][c] += w * 2 * f[1] * b[1];
-		if (dim == 2) stress->real[2][c] += w * (f[0] * b[1] + f[1] * b[0]);
-		else {
-			stress->real[2][c] += w * 2 * f[2] * b[2];
-			stress->real[3][c] += w * (f[0] * b[1] + f[1] * b[0]);
-			stress->real[4][c] += w * (f[0] * b[2] + f[2] * b[0]);
-			stress->real[5][c] += w * (f[1] * b[2] + f[2] * b[1]);
-		}
+		const symmetric share = symmetric_dyad(w, QUERN_VEC_OF(f), QUERN_VEC_OF(b));
+		SYMMETRIC_ADD(stress->real, c, share, dim);
 	}
 }
 
@@ -111,7 +105,9 @@ static void sample_touches(sampling *p) {
 			force2 += f[k] * f[k];
 		}
 		if (!(force2 > 0)) continue;
-		const quern_real gap = quern_body_gap(body, s->dim, x, radius, branch);
+		const bool several = ((const quern_body_ops *)body->ops)->features;
+		const int32_t *feature = several ? u[S_TOUCH_FEATURE].index + q : NULL;
+		const quern_real gap = quern_body_gap_of(body, feature, s->dim, x, radius, branch);
 		for (uint32_t k = 0; k < s->dim; k++) {
 			branch[k] *= radius + gap;
 			x[k] -= branch[k];

@@ -110,7 +110,8 @@ static const quern_use sample_uses[] = { F("contact.force", "N", QUERN_READ, QUE
 	F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body", .flags = QUERN_OPTIONAL),
 	F("grain.position", "m", QUERN_READ, QUERN_VECTOR), F("grain.radius", "m", QUERN_READ, QUERN_SCALAR),
 	FIXED, F("cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC),
-	F("total.samples", "1", QUERN_UPDATE, QUERN_SCALAR), QUERN_END_USES };
+	F("total.samples", "1", QUERN_UPDATE, QUERN_SCALAR),
+	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL), QUERN_END_USES };
 
 static const quern_use raster_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR),
 	F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR),

@@ -4,7 +4,9 @@
 
 typedef struct new_point {
 	quern_real position[3], velocity[3], stress[6], mass, weight;
+	quern_real volume; /* of a part of others; else the one that goes with the stress is taken */
 	int32_t cell;
+	int32_t parent; /* old entry that it is a part of, -1: none */
 } new_point;
 
 typedef struct new_grain {

@@ -228,9 +228,8 @@ typedef struct {
 
 static void ask(const update *d, const quern_bound *oracle, uint32_t b, const quern_real *distance,
 	quern_real shift, oracle_memory *m, quern_real *level, int32_t *wish) {
-	enum { MOST_ROWS = 16 };
 	const quern_oracle_ops *ops = oracle->ops;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_cell_batch batch = { .n = N,
 		.cap = N,
 		.dim = d->s->dim,
@@ -249,7 +248,7 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 	}
 	for (uint32_t k = 0; k < d->s->dim; k++) batch.centre[k] = m->centre[k];
 	if (distance) batch.distance = m->shifted;
-	for (uint32_t r = 0; r < oracle->n_uses && r < MOST_ROWS; r++)
+	for (uint32_t r = 0; r < oracle->n_uses; r++)
 		own[r] = quern_column_from(oracle->column[r], oracle->uses[r].shape, b * N);
 	if (distance) ops->decide(oracle->self, &batch);
 	else ops->mark(oracle->self, &batch);

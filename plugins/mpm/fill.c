@@ -65,7 +65,12 @@ quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 	quern_real wanted = 0;
 	uint32_t total = 0;
 	s->use[FILL_UNSORTED].index[0] = 1;
-	if (s->use[FILL_WEIGHT].real[0]) return QUERN_OK;
+	if (p->rasterise == RASTERISE_PLAIN && s->use[FILL_AFFINE].real[0])
+		return s->host->stop(s->run, QUERN_E_PARAM, "rasterise", -1,
+			"is plain, and the hybrid's coupling compares velocities at one place, for which points must "
+			"send "
+			"their gradient: take affine, or hybrid.coupling: lumped");
+	if (s->host->has(s->run, "hybrid")) return QUERN_OK;
 	for (uint32_t f = 0; f < p->fill.n; f++) {
 		quern_real g = 0;
 		const lattice l = lattice_of(p, &item[f]);

@@ -4,8 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-enum { MOST_ROWS = 8 };
-
 typedef struct {
 	const quern_step *s;
 	const quern_grid_view *g;
@@ -21,7 +19,7 @@ typedef struct {
 	quern_row tile[QUERN_TILE_MOST], other[QUERN_TILE_MOST], trip[QUERN_TILE_MOST];
 	stencil stencil;
 	_Alignas(64) quern_real pic[3][STENCIL], change[3][STENCIL], gradient[9][STENCIL], grid_density[STENCIL],
-		density[STENCIL], echo[3][STENCIL], send[3][STENCIL], wave[STENCIL], energy[STENCIL];
+		density[STENCIL], moved[STENCIL], echo[3][STENCIL], send[3][STENCIL], wave[STENCIL], energy[STENCIL];
 } gather_memory;
 
 /* What the nodes say at the points of a chunk. */
@@ -47,9 +45,9 @@ QUERN_INLINE void collect_chunk(
 static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n, bool last) {
 	const quern_bound *transfer = &w->s->slot[SLOT_TRANSFER][0];
 	const uint32_t dim = w->s->dim;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_transfer_batch b = { .n = n, .cap = STENCIL, .pass = w->pass, .dt = w->s->dt, .use = own };
-	for (uint32_t r = 0; r < transfer->n_uses && r < MOST_ROWS; r++)
+	for (uint32_t r = 0; r < transfer->n_uses; r++)
 		own[r] = quern_column_from(transfer->column[r], transfer->uses[r].shape, begin);
 	for (uint32_t k = 0; k < dim; k++) {
 		b.pic[k] = m->pic[k];
@@ -67,7 +65,8 @@ QUERN_INLINE void move_chunk(
 	const quern_column *u = w->s->use;
 	const quern_real dt = w->s->dt;
 	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin;
-	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin, *restrict density = m->density;
+	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin, *restrict density = m->density,
+						 *restrict moved = m->moved;
 	const quern_real *restrict l0 = m->gradient[0], *restrict l1 = m->gradient[1],
 							   *restrict l2 = m->gradient[2];
 	const quern_real *restrict l3 = m->gradient[3], *restrict l4 = m->gradient[4],
@@ -93,6 +92,7 @@ QUERN_INLINE void move_chunk(
 				  dt * l2[i] * (dt * l3[i] * dt * l7[i] - e * dt * l6[i]);
 		}
 		volume[i] *= det;
+		moved[i] = volume[i];
 		density[i] = mass[i] / volume[i];
 	}
 }
@@ -101,7 +101,7 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 	const quern_bound *material = &w->s->slot[SLOT_MATERIAL][0];
 	const quern_column *u = w->s->use;
 	const uint32_t dim = w->s->dim;
-	quern_column own[MOST_ROWS];
+	quern_column own[QUERN_MOST_USES];
 	quern_material_batch b = { .n = n,
 		.cap = STENCIL,
 		.dt = w->s->dt,
@@ -113,7 +113,7 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 		b.stress[k] = u[GATHER_STRESS].real[k] + begin;
 	if (u[GATHER_WAVE].real[0]) b.wave_speed = u[GATHER_WAVE].real[0] + begin;
 	if (u[GATHER_ENERGY].real[0]) b.energy = u[GATHER_ENERGY].real[0] + begin;
-	for (uint32_t r = 0; r < material->n_uses && r < MOST_ROWS; r++)
+	for (uint32_t r = 0; r < material->n_uses; r++)
 		own[r] = quern_column_from(material->column[r], material->uses[r].shape, begin);
 	((const quern_material_ops *)material->ops)->update[dim - 2](material->self, &b);
 }
@@ -125,7 +125,8 @@ static void finish_chunk(
 	const uint32_t dim = w->s->dim;
 	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, most = w->g->cell / w->s->dt;
 	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin;
-	for (uint32_t i = 0; i < n; i++) volume[i] = mass[i] / m->density[i];
+	/* whatever a material makes of a negative density, a point that was turned inside out stays so */
+	for (uint32_t i = 0; i < n; i++) volume[i] = m->moved[i] > 0 ? mass[i] / m->density[i] : m->moved[i];
 	for (int row = GATHER_GRADIENT; row <= GATHER_AFFINE; row++)
 		for (uint32_t k = 0; k < dim * dim && u[row].real[0]; k++)
 			memcpy(u[row].real[k] + begin, m->gradient[k], n * sizeof(quern_real));
@@ -232,16 +233,16 @@ static quern_status lost(const gather_work *w, int32_t i) {
 	if (!isfinite(v2))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 			"point.velocity is not a number after %s: is the step of %.3g s too long?", material, s->dt);
-	if (!isfinite(stress))
-		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
-			"point.stress at (%.4g, %.4g) m is not a number after %s: is the step of %.3g s too long?", x, y,
-			material, s->dt);
 	if (!(volume > 0 && volume < INFINITY))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 			"point.volume at (%.4g, %.4g) m is turned inside out by one step of %.3g s (%s): unstable, or "
 			"the step is "
 			"too long",
 			x, y, s->dt, material);
+	if (!isfinite(stress))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
+			"point.stress at (%.4g, %.4g) m is not a number after %s: is the step of %.3g s too long?", x, y,
+			material, s->dt);
 	return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 		"at (%.4g, %.4g) m, point.velocity %.3g m/s, goes farther than a cell in one step of %.3g s (%s): "
 		"unstable, or "

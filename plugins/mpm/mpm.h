@@ -6,14 +6,16 @@
 
 typedef struct mpm {
 	quern_real cell, cut; /* from the scene */
-	int32_t points;
+	int32_t points, rasterise;
 	quern_list fill;
+	bool affine;                                /* points send their gradient, hybrid or not */
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
 	quern_real share_wall, share_next;          /* of a wall's nodes */
 	uint32_t dim;
 } mpm;
 
 enum { STRESS_NONE, STRESS_AT_REST };
+enum { RASTERISE_AUTO, RASTERISE_PLAIN, RASTERISE_AFFINE };
 
 typedef struct mpm_fill {
 	quern_real lower[3], upper[3], velocity[3], lateral;
@@ -30,7 +32,8 @@ enum {
 	FILL_STRESS,
 	FILL_WEIGHT,
 	FILL_ENERGY,
-	FILL_UNSORTED
+	FILL_UNSORTED,
+	FILL_AFFINE
 };
 enum { SORT_POSITION, SORT_UNSORTED };
 enum {

@@ -206,7 +206,7 @@ quern_status quern_mpm_nodes(const void *self, const quern_step *s) {
 /* Without a coupling in between, the conditions still hold. */
 quern_status quern_mpm_walls(const void *self, const quern_step *s) {
 	grid_work w = { .p = self, .s = s };
-	if (!s->host->set(s->run, "mixture").n) return QUERN_OK;
+	if (!s->host->has(s->run, "hybrid")) return QUERN_OK;
 	if (!prepare(&w, s->use[WALLS_NODE], s->use[WALLS_MOTION])) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, meet_walls, &w);
 	collect(&w, s->use[WALLS_IMPULSE], s->use[WALLS_FACES]);

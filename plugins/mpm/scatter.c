@@ -1,5 +1,6 @@
 /* scatter - points to nodes: mass, momentum and internal force in one row, block by block in coloured order */
 #include "../common/stencil.h"
+#include "../common/symmetric.h"
 #include "mpm.h"
 #include <string.h>
 
@@ -19,17 +20,18 @@ typedef struct {
 QUERN_INLINE sent send_point(const quern_column *u, uint32_t i, const int dim) {
 	const quern_real weight = u[SCATTER_WEIGHT].real[0] ? u[SCATTER_WEIGHT].real[0][i] : 1;
 	const quern_real m = weight * u[SCATTER_MASS].real[0][i], volume = -weight * u[SCATTER_VOLUME].real[0][i];
-	quern_real *const *v = u[SCATTER_VELOCITY].real, *const *t = u[SCATTER_STRESS].real;
+	quern_real *const *v = u[SCATTER_VELOCITY].real;
+	const symmetric t = SYMMETRIC_AT(u[SCATTER_STRESS].real, i, dim);
 	sent p = { .base = { 0 } };
 	if (dim == 2) {
 		p.base = (quern_row) { m, m * v[0][i], m * v[1][i], 0, 0, 0, 0, 0 };
-		p.slope[0] = (quern_row) { 0, 0, 0, volume * t[0][i], volume * t[2][i], 0, 0, 0 };
-		p.slope[1] = (quern_row) { 0, 0, 0, volume * t[2][i], volume * t[1][i], 0, 0, 0 };
+		p.slope[0] = (quern_row) { 0, 0, 0, volume * t.xx, volume * t.xy, 0, 0, 0 };
+		p.slope[1] = (quern_row) { 0, 0, 0, volume * t.xy, volume * t.yy, 0, 0, 0 };
 	} else {
 		p.base = (quern_row) { m, m * v[0][i], m * v[1][i], m * v[2][i], 0, 0, 0, 0 };
-		p.slope[0] = (quern_row) { 0, 0, 0, 0, volume * t[0][i], volume * t[3][i], volume * t[5][i], 0 };
-		p.slope[1] = (quern_row) { 0, 0, 0, 0, volume * t[3][i], volume * t[1][i], volume * t[4][i], 0 };
-		p.slope[2] = (quern_row) { 0, 0, 0, 0, volume * t[5][i], volume * t[4][i], volume * t[2][i], 0 };
+		p.slope[0] = (quern_row) { 0, 0, 0, 0, volume * t.xx, volume * t.xy, volume * t.xz, 0 };
+		p.slope[1] = (quern_row) { 0, 0, 0, 0, volume * t.xy, volume * t.yy, volume * t.yz, 0 };
+		p.slope[2] = (quern_row) { 0, 0, 0, 0, volume * t.xz, volume * t.yz, volume * t.zz, 0 };
 	}
 	quern_real *const *l = u[SCATTER_AFFINE].real; /* m (v + L (x_i - x)) */
 	if (l[0])

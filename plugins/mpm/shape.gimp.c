@@ -5,12 +5,13 @@
 typedef struct {
 	quern_real half_width;
 } gimp;
-static const quern_param params[] = {
-	QUERN_PARAM(gimp, half_width, "1",
-		"Half-width of a particle over the cell; 1/4 for two points per cell and axis.", .def = 0.25,
-		.min = 0.05, .max = 0.5),
-	QUERN_END_PARAMS
-};
+static const quern_param params[] = { QUERN_PARAM(gimp, half_width, "1",
+										  "Half-width of a particle over the cell; default: half the way "
+										  "between points at the start, 1/4 for two "
+										  "per cell and axis, so that the particles fill space.",
+										  .from = "continuum.half_width", .def = 0.25, .min = 0.05,
+										  .max = 0.5),
+	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
 /* With f in [l, 1 + l) the way from the lowest node, in cells, and l < 1/2, that node is seen from beyond l. The

@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 static const char *const stresses[] = { "none", "at_rest", NULL };
+static const char *const rasters[] = { "auto", "plain", "affine", NULL };
 static const quern_param fill_rows[] = { QUERN_PARAM_AS(mpm_fill, lower, "region.box.lower", "m",
 											 "Lower corner of the material.", .flags = QUERN_REQUIRED),
 	QUERN_PARAM_AS(
@@ -19,6 +20,12 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, points, "1", "Points per cell and axis at the start.", .def = 2, .min = 1, .max = 8),
 	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill)),
+	QUERN_PARAM(mpm, rasterise, "1",
+		"What points send to the nodes: their velocity (plain), or with it the velocity gradient of the last "
+		"step (affine); auto: affine where a hybrid's coupling asks for it.",
+		.choices = rasters),
+	QUERN_PARAM(mpm, affine, NULL, "Keep the gradient that points send; set by itself where one is needed.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
 		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
@@ -65,7 +72,7 @@ static const quern_use fill_uses[] = { F("point.position", "m", QUERN_WRITE, QUE
 		.doc = "Share of its mass that the point carries."),
 	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
 		.doc = "Stored elastic energy."),
-	UNSORTED, QUERN_END_USES };
+	UNSORTED, F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
 static const quern_use sort_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR), UNSORTED,
 	QUERN_END_USES };
 static const quern_use scatter_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR),
@@ -75,7 +82,8 @@ static const quern_use scatter_uses[] = { F("point.position", "m", QUERN_READ, Q
 	F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL),
 	F("node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass."),
 	F("node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum."),
-	F("node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force."), QUERN_END_USES };
+	F("node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force."),
+	F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .when = "affine"), QUERN_END_USES };
 static const quern_use nodes_uses[] = { F("node.mass", "kg", QUERN_READ, QUERN_SCALAR),
 	F("motion.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."), IMPULSES,
 	F("motion.change", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity gained in this step."),
@@ -93,7 +101,8 @@ static const quern_use gather_uses[] = { F("motion.velocity", "m/s", QUERN_READ,
 	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
 	F("point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL,
 		.doc = "Velocity gradient of the last step."),
-	F("point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL,
+	/* it is there if somebody wants it sent; that it shall be written out does not make it */
+	F("point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, .with = "point.affine",
 		.doc = "The same, sent to the nodes with the velocity."),
 	F("point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
 		.doc = "Minus the mean normal stress."),
@@ -141,6 +150,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mpm *p = self;
 	quern_real g2 = 0, height = 0;
 	p->dim = setup->dim;
+	p->affine = p->rasterise == RASTERISE_AFFINE;
 	for (uint32_t k = 0; k < p->dim; k++) {
 		const quern_real cells = (setup->upper[k] - setup->lower[k]) / p->cell, whole = floor(cells + 0.5);
 		g2 += setup->gravity[k] * setup->gravity[k];
@@ -164,6 +174,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			height = extent > height ? extent : height;
 		}
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
+	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
 	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(sqrt(g2) / height) : 0);
 	return QUERN_OK;
 }

@@ -13,9 +13,9 @@ quern_status quern_mpm_sort(const void *self, const quern_step *s) {
 	(void)self;
 	if (!*unsorted) return QUERN_OK;
 	*unsorted = 0;
-	const bool cells = s->host->set(s->run, "cell").n > 0;
+	const bool hybrid = s->host->has(s->run, "hybrid");
 	const cover c = {
-		.point = s->use[SORT_POSITION], .grain = { .real = { NULL } }, .holds = cells ? always : NULL
+		.point = s->use[SORT_POSITION], .grain = { .real = { NULL } }, .holds = hybrid ? always : NULL
 	};
 	return quern_cover_sort(s, &c);
 }

@@ -10,6 +10,7 @@
 #include "harness.h"
 #include "table.h"
 #include <stdlib.h>
+#include <string.h>
 
 static const double pi = 3.14159265358979312, gravity = 9.81, density = 1500;
 
@@ -213,8 +214,124 @@ static void thrown_and_fallen(void **unused) {
 	assert_true(good);
 }
 
+/* ==== a lattice of points as the grid sees it ==== */
+
+/* Particles as wide as their points are apart fill space: for any number of points per cell and axis every node that is
+ * wholly within them has the density of the points. */
+static void lattice_is_uniform(void **state) {
+	(void)state;
+	bool good = true;
+	table_head("density on the grid over that of the points, less 1: worst node inside");
+	for (int dim = 2; dim <= 3; dim++)
+		for (int points = 1; points <= 4; points++) {
+			char name[40];
+			quern_run *run = harness_open(1,
+				"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
+				"time: {end: 1e-6, step: 1e-9}, output: {fields: [motion.density]},\n"
+				"continuum: {cell: 0.1, points: %d, material: {elastic: {bulk_modulus: 1, density: 1000}},\n"
+				"  fill: [{region: {box: {lower: %s, upper: %s}}}]}}\n",
+				dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
+				dim == 2 ? "[1, 1]" : "[1, 1, 1]", points, dim == 2 ? "[0.2, 0.2]" : "[0.2, 0.2, 0.2]",
+				dim == 2 ? "[0.8, 0.8]" : "[0.8, 0.8, 0.8]");
+			harness_steps(run, 1);
+			const quern_column row = harness_field(run, "motion.density");
+			const quern_grid_view *g = quern_host_table.grid(run);
+			const int edge = (int)g->edge;
+			double worst = 0;
+			for (uint32_t i = 0; i < g->n_blocks * 64; i++) {
+				const int k = (int)i % 64, at[3] = { g->at[i / 64][0] * edge + k % edge,
+					g->at[i / 64][1] * edge + k / edge % edge, g->at[i / 64][2] * edge + k / (edge * edge) };
+				bool inside = true;
+				for (int a = 0; a < dim; a++) inside = inside && at[a] >= 3 && at[a] <= 7;
+				if (inside) worst = fmax(worst, fabs(row.real[0][8 * i] / 1000 - 1));
+			}
+			snprintf(name, sizeof name, "%d-D, %d per cell and axis", dim, points);
+			good &= table_row(name, worst, 0, 1e-12);
+			harness_close(run);
+		}
+	assert_true(good);
+}
+
+/* ==== what ends a run ==== */
+
+/* A point that one step turns inside out, det(1 + dt L) = -1/2, ends the run, whatever its material makes of it. */
+static void inside_out_ends_the_run(void **state) {
+	static const char *const laws[] = { "elastic: {bulk_modulus: 1, density: 1000}",
+		"drucker_prager: {bulk_modulus: 1, density: 1000}",
+		"mu_i: {bulk_modulus: 1, diameter: 2 mm, grain_density: 2500, critical_density: 1000}" };
+	const double dt = 1e-3;
+	(void)state;
+	for (int dim = 2; dim <= 3; dim++)
+		for (int m = 0; m < 3; m++) {
+			quern_run *run = harness_open(1,
+				"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
+				"time: {end: 1, step: %g, force: true}, output: {every: 0.1},\n"
+				"continuum: {cell: 0.1, rasterise: affine, material: {%s},\n"
+				"  fill: [{region: {box: {lower: %s, upper: %s}}}]}}\n",
+				dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
+				dim == 2 ? "[1, 1]" : "[1, 1, 1]", dt, laws[m], dim == 2 ? "[0.4, 0.4]" : "[0.4, 0.4, 0.4]",
+				dim == 2 ? "[0.5, 0.5]" : "[0.5, 0.5, 0.5]");
+			const quern_column x = harness_field(run, "point.position"),
+							   v = harness_field(run, "point.velocity"),
+							   l = harness_field(run, "point.affine");
+			for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+				l.real[0][i] = -1.5 / dt, v.real[0][i] = l.real[0][i] * (x.real[0][i] - 0.45);
+			assert_int_equal(harness_try(run, 1), QUERN_E_NUMERIC);
+			assert_non_null(strstr(run->message, "inside out"));
+			harness_close(run);
+		}
+}
+
+/* ==== a grid that goes with its material ==== */
+
+/* A block that crosses a domain of 700 cells has no more blocks of the grid than it needs, wherever it has been: a step
+ * costs the same at the end as at the start. */
+static void grid_follows_the_block(void **state) {
+	(void)state;
+	bool good = true;
+	table_head("blocks of the grid that a block of 16 cells has");
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [14, 0.4]},\n"
+		"time: {end: 10}, output: {every: 1}, observe: [mass],\n"
+		"continuum: {cell: 0.02, material: {elastic: {bulk_modulus: 100, density: 1000}},\n"
+		"  fill: [{region: {box: {lower: [0.14, 0.14], upper: [0.22, 0.22]}}, velocity: [5, 0]}]}}\n");
+	uint32_t most = 0, at_last = 0;
+	assert_int_equal(harness_count(run, "point"), 64);
+	while (quern_run_time(run) < 2.7) {
+		harness_steps(run, 20);
+		at_last = harness_count(run, "cell") / 64;
+		most = at_last > most ? at_last : most;
+	}
+	good &= table_row("at most", most, 8, 8); /* it lies in four at most, which have twelve neighbours */
+	good &= table_row("after 13.5 m", at_last, 12, 4);
+	harness_close(run);
+	assert_true(good);
+}
+
+/* A point less than half an ulp below a periodic face is brought back to the lower face, not to the upper one, which is
+ * beyond the last cell. */
+static void seams_keep_points_inside(void **state) {
+	(void)state;
+	quern_run *run =
+		harness_open(1, "{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [0.8, "
+						"0.8], periodic: [true, "
+						"true]},\n"
+						"time: {end: 1, step: 1e-4}, output: {every: 0.1},\n"
+						"continuum: {cell: 0.1, material: {elastic: {bulk_modulus: 1, density: 1000}},\n"
+						"  fill: [{region: {box: {lower: [0, 0], upper: [0.8, 0.8]}}}]}}\n");
+	const quern_column x = harness_field(run, "point.position");
+	x.real[0][0] = -1e-30, x.real[1][5] = -1e-18, x.real[0][9] = 0.8;
+	harness_steps(run, 1);
+	const quern_column now = harness_field(run, "point.position");
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		for (int k = 0; k < 2; k++) assert_true(now.real[k][i] >= 0 && now.real[k][i] < 0.8);
+	harness_close(run);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(weight_at_rest),
-		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen) };
+		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen),
+		cmocka_unit_test(lattice_is_uniform), cmocka_unit_test(inside_out_ends_the_run),
+		cmocka_unit_test(grid_follows_the_block), cmocka_unit_test(seams_keep_points_inside) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,7 +12,7 @@
 #include "table.h"
 #include <stdlib.h>
 
-enum { CELLS = 6, BATCH = 512 };
+enum { CELLS = 6, BATCH = 1024 };
 static const double cell = 0.1;
 
 typedef struct batch {
@@ -93,6 +93,7 @@ static const struct {
 	const char *id, *name;
 	double half_width; /* 0: the plugin has none */
 } shapes[] = { { "shape.gimp", "gimp, l = h/4", 0.25 }, { "shape.gimp", "gimp, l = h/2", 0.5 },
+	{ "shape.gimp", "gimp, l = h/6", 1.0 / 6 }, { "shape.gimp", "gimp, l = h/8", 0.125 },
 	{ "shape.gimp", "gimp, l = h/10", 0.1 }, { "shape.linear", "linear", 0 } };
 enum { SHAPES = sizeof shapes / sizeof *shapes };
 
@@ -113,7 +114,7 @@ static void completeness(void **unused) {
 				const alone shape = make_shape(k);
 				misses worst = { 0 };
 				char title[80];
-				for (uint32_t round = 0; round < 40; round++) {
+				for (uint32_t round = 0; round < 20; round++) {
 					for (uint32_t i = 0; i < BATCH; i++)
 						for (uint32_t a = 0; a < dim; a++)
 							m->position[a][i] =
@@ -155,7 +156,7 @@ static void formula(void **unused) {
 		const alone shape = make_shape(k);
 		const double l = shapes[k].half_width;
 		double value = 0, slope = 0;
-		for (uint32_t round = 0; round < 40; round++) {
+		for (uint32_t round = 0; round < 20; round++) {
 			for (uint32_t i = 0; i < BATCH; i++)
 				for (uint32_t a = 0; a < 2; a++)
 					m->position[a][i] = a ? CELLS * cell * uniform() : place(i + BATCH * round, l);
@@ -189,7 +190,7 @@ static void formula(void **unused) {
  * denser or thinner at a wall. Simpson's rule between the places where the pieces meet is exact. */
 static void shares(void **unused) {
 	(void)unused;
-	enum { PARTS = 20 * CELLS };
+	enum { PARTS = 60 * CELLS };
 	batch *m = calloc(1, sizeof *m);
 	bool good = m != NULL;
 	for (int k = 0; k < SHAPES; k++) {
@@ -197,12 +198,12 @@ static void shares(void **unused) {
 		double integral[CELLS + 1] = { 0 }, wall, next;
 		table_head(shapes[k].name);
 		for (uint32_t i = 0; i < 2 * PARTS + 1; i++)
-			m->position[0][i] = m->position[1][i] = fmin(i * cell / 40, CELLS * cell);
+			m->position[0][i] = m->position[1][i] = fmin(i * cell / 120, CELLS * cell);
 		weigh(&shape, m, 2 * PARTS + 1, 2, true);
 		for (uint32_t i = 0; i < 2 * PARTS + 1; i++)
 			for (int n = 0; n < 3; n++) {
 				const int32_t at = m->first[0][i] + n;
-				const double simpson = (i == 0 || i == 2 * PARTS ? 1 : i % 2 ? 4 : 2) / 120.0;
+				const double simpson = (i == 0 || i == 2 * PARTS ? 1 : i % 2 ? 4 : 2) / 360.0;
 				if (at >= 0 && at <= CELLS) integral[at] += simpson * m->value[0][n][i];
 			}
 		((const quern_shape_ops *)shape.plugin->ops)->shares(shape.self, &wall, &next);

@@ -209,7 +209,25 @@ static void same_motion(void **unused) {
 	assert_true(good);
 }
 
+/* A grain less than half an ulp below a periodic face is brought back to the lower face, not to the upper one. */
+static void seams_keep_grains_inside(void **unused) {
+	(void)unused;
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [0.8, 0.8], periodic: "
+		"[true, "
+		"true]},\n"
+		"time: {end: 1, step: 1e-4}, output: {every: 0.1},\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.01}}, contact: {linear: {stiffness: 1}},\n"
+		"  place: [{position: [-1e-30, 0.1]}, {position: [0.2, -1e-18]}, {position: [0.8, 0.4]}]}}\n");
+	harness_steps(run, 1);
+	const quern_column now = harness_field(run, "grain.position");
+	for (uint32_t i = 0; i < harness_count(run, "grain"); i++)
+		for (int k = 0; k < 2; k++) assert_true(now.real[k][i] >= 0 && now.real[k][i] < 0.8);
+	harness_close(run);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(same_pairs), cmocka_unit_test(same_motion) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(same_pairs), cmocka_unit_test(same_motion),
+		cmocka_unit_test(seams_keep_grains_inside) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

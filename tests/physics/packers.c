@@ -458,11 +458,41 @@ static void respects_walls(void **state) {
 	}
 }
 
+/* Grains on whole multiples of the cell's width, where the places beside round to either side: what overlaps one of them is
+ * never free, and each is found by who looks for it. */
+static void finds_what_lies_on_faces(void **state) {
+	static const quern_real radii[] = { 1.2e-3, 1e-3, 0.7e-3, 1.0 / 3 };
+	(void)state;
+	for (uint32_t dim = 2; dim <= 3; dim++)
+		for (size_t r = 0; r < sizeof radii / sizeof *radii; r++)
+			for (int periodic = 0; periodic <= 1; periodic++)
+				for (int k = 1; k < 40; k++) {
+					const quern_real radius = radii[r], width = 2 * radius;
+					const quern_real lower[3] = { 0 }, upper[3] = { 50 * width, 50 * width, 50 * width };
+					const bool around[3] = { periodic, periodic, periodic };
+					placer p;
+					assert_int_equal(quern_placer_init(&p, dim, lower, upper, around, radius), QUERN_OK);
+					const quern_spot there = { .x = { k * width, k * width, dim == 3 ? k * width : 0 },
+						.radius = radius };
+					quern_placer_add(&p, &there);
+					for (uint32_t a = 0; a < dim; a++)
+						for (int side = -1; side <= 1; side += 2) {
+							quern_spot beside = there, found[4];
+							beside.x[a] += side * 0.999 * width;
+							assert_false(quern_placer_free(&p, &beside));
+							assert_int_equal(quern_placer_near(&p, beside.x, beside.x, width, found, 4), 1);
+							beside.x[a] = there.x[a] + side * 1.001 * width;
+							assert_true(quern_placer_free(&p, &beside));
+						}
+					quern_placer_finish(&p);
+				}
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(reaches_its_fraction), cmocka_unit_test(no_overlap),
 		cmocka_unit_test(centres_inside), cmocka_unit_test(radii_follow_the_law), cmocka_unit_test(repeats),
 		cmocka_unit_test(tangent_grains_touch), cmocka_unit_test(stops_when_told),
 		cmocka_unit_test(keeps_the_counter), cmocka_unit_test(starts_from_anything),
-		cmocka_unit_test(respects_walls) };
+		cmocka_unit_test(respects_walls), cmocka_unit_test(finds_what_lies_on_faces) };
 	return cmocka_run_group_tests_name("packers", tests, fill_all, drop_all);
 }

@@ -166,9 +166,25 @@ static void grows(void **state) {
 	assert_int_equal(s->sets[CONTACT].n, 0);
 }
 
+/* A copy has all that its model has but the id; who points at the model still does. */
+static void copies(void **state) {
+	static const int32_t from[] = { 0, 1, 2, 3, 4, -2 - 3, -1 };
+	quern_store *s = *state;
+	fill(s);
+	column(s, STRESS).real[2][3] = 7;
+	assert_int_equal(quern_store_remap(s, GRAIN, 7, from, 0, NULL), QUERN_OK);
+	assert_true(column(s, POSITION).real[0][5] == 3 && column(s, STRESS).real[2][5] == 7);
+	assert_true(column(s, POSITION).real[0][6] == 0.5 && column(s, STRESS).real[2][6] == 0);
+	assert_int_equal(column(s, ID).id[3], 3);
+	assert_int_equal(column(s, ID).id[5], 5);
+	assert_int_equal(column(s, ID).id[6], 6);
+	assert_int_equal(column(s, FIRST).index[3], 3);
+	assert_int_equal(column(s, SECOND).index[2], 3);
+}
+
 int main(void) {
 #define STORE(test) cmocka_unit_test_setup_teardown(test, open_store, close_store)
-	const struct CMUnitTest tests[] = { STORE(starts_as_new), STORE(reorders), STORE(drops_orphans),
-		STORE(keeps_two_copies), STORE(grows) };
+	const struct CMUnitTest tests[] = { STORE(starts_as_new), STORE(reorders), STORE(copies),
+		STORE(drops_orphans), STORE(keeps_two_copies), STORE(grows) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

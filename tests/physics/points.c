@@ -1,0 +1,178 @@
+/* What a zone update makes of points that are too many in a cell, or too few: mass, momentum and volume are kept to
+ * round-off, so is the sum of volume times stress, and a point that was open is open afterwards, as loose as before. The
+ * stage itself is called, between two steps, on points that the test has crowded. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double cell = 4e-3, density = 1900;
+static const char *const materials[] = { "mu_i: {bulk_modulus: 1e5, critical_density: 1900}",
+	"drucker_prager: {bulk_modulus: 1e5, density: 1900}" };
+
+static double uniform(void) {
+	return (double)rand() / RAND_MAX;
+} /* only how points are crowded hangs on it */
+
+/* A block of grains that do not feel each other; after a few updates its inside is continuum. */
+static quern_run *block(int dim, const char *material) {
+	quern_run *run = harness_open(1,
+		"quern: 1\ndimension: %d\ngravity: %s\ndomain: {lower: %s, upper: %s}\n"
+		"time: {end: 1e-6, step: 1e-9}\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
+		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
+		"  fill: {region: {box: {lower: %s, upper: %s}}}}\n"
+		"continuum: {cell: %g, material: {%s}}\n"
+		"hybrid: {oracle: [{packing_fraction: {depth: 7 mm, half_width: 4 mm}}], substeps: 1, update: 1, "
+		"guard: 10}\n",
+		dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
+		dim == 2 ? "[0.2, 0.12]" : "[0.08, 0.06, 0.06]", dim == 2 ? "[0.02, 0.02]" : "[0.012, 0.012, 0.012]",
+		dim == 2 ? "[0.1, 0.08]" : "[0.052, 0.048, 0.048]", cell, material);
+	harness_steps(run, 6);
+	return run;
+}
+
+static void update(quern_run *run) {
+	for (size_t k = 0; k < run->plan->n_stages; k++) {
+		const quern_plan_stage *stage = &run->plan->stages[k];
+		if (strcmp(stage->name, "hybrid.update") != 0) continue;
+		const quern_step step = quern_run_record(run, stage->section);
+		if (stage->stage->run(stage->section->solver->self, &step) != QUERN_OK) fail_msg("%s", run->message);
+	}
+	quern_plan_refresh(run->plan);
+}
+
+/* Three of four points of a cell that holds continuum alone go to every fourth cell, whose points become many; those that stay
+ * become few. Every point gets a mass, a volume, a velocity and a stress of its own; `open`: none. */
+static void crowd(quern_run *run, int dim, bool hyper, bool open) {
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity"),
+					   m = harness_field(run, "point.mass"), volume = harness_field(run, "point.volume"),
+					   s = harness_field(run, "point.stress"), w = harness_field(run, "point.weight");
+	const quern_column j = hyper ? harness_field(run, "point.volume_strain") : m;
+	const quern_column b = hyper ? harness_field(run, "point.deviator") : m;
+	const char *const owed[] = { "cell.grain_owed", "cell.point_owed", "cell.grain_owed_momentum",
+		"cell.point_owed_momentum" };
+	int first = 1 << 20;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		if (w.real[0][i] == 1) first = (int)fmin(first, floor(x.real[0][i] / cell));
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		const int column = (int)floor(x.real[0][i] / cell) - first;
+		if (w.real[0][i] == 1 && i % 4) x.real[0][i] -= (column % 4) * cell;
+		m.real[0][i] *= 0.8 + 0.4 * uniform();
+		const double p = open ? 0 : 100 * uniform(), strain = open ? 0.3 * uniform() : -p / 1e5;
+		volume.real[0][i] = m.real[0][i] / density * (1 + strain);
+		for (int k = 0; k < (dim == 2 ? 3 : 6); k++) {
+			s.real[k][i] = k < dim ? -p : 0.1 * p * (uniform() - 0.5);
+			if (hyper) b.real[k][i] = k < dim || open ? 0 : 1e-4 * (uniform() - 0.5);
+		}
+		if (hyper) j.real[0][i] = strain;
+		for (int k = 0; k < dim; k++) v.real[k][i] = uniform() - 0.5;
+	}
+	for (int f = 0; f < 4; f++) { /* nobody owes anything: no mass comes or goes */
+		const quern_column c = harness_field(run, owed[f]);
+		for (int k = 0; k < (f < 2 ? 1 : dim); k++)
+			memset(c.real[k], 0, harness_count(run, "cell") * sizeof(double));
+	}
+}
+
+typedef struct sums {
+	double mass, volume, momentum[3], stress[6], strain, size; /* size: of the momentum's parts */
+} sums;
+
+static sums sum(quern_run *run, int dim, bool hyper) {
+	const quern_column v = harness_field(run, "point.velocity"), m = harness_field(run, "point.mass"),
+					   volume = harness_field(run, "point.volume"), s = harness_field(run, "point.stress"),
+					   w = harness_field(run, "point.weight");
+	const quern_column j = hyper ? harness_field(run, "point.volume_strain") : m;
+	sums out = { 0 };
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		const double mass = w.real[0][i] * m.real[0][i], room = w.real[0][i] * volume.real[0][i];
+		out.mass += mass;
+		out.volume += room;
+		if (hyper) out.strain += mass * j.real[0][i];
+		for (int k = 0; k < dim; k++) {
+			out.momentum[k] += mass * v.real[k][i];
+			out.size += fabs(mass * v.real[k][i]);
+		}
+		for (int k = 0; k < (dim == 2 ? 3 : 6); k++) out.stress[k] += room * s.real[k][i];
+	}
+	return out;
+}
+
+/* Looseness of the loosest and the densest point, and the largest stress. */
+static void look(quern_run *run, int dim, double *loose, double *dense, double *stress) {
+	const quern_column m = harness_field(run, "point.mass"), volume = harness_field(run, "point.volume"),
+					   s = harness_field(run, "point.stress");
+	*loose = *stress = 0, *dense = INFINITY;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		const double room = volume.real[0][i] * density / m.real[0][i];
+		*loose = fmax(*loose, room), *dense = fmin(*dense, room);
+		for (int k = 0; k < (dim == 2 ? 3 : 6); k++) *stress = fmax(*stress, fabs(s.real[k][i]));
+	}
+}
+
+static bool try_crowd(int dim, int which, bool open) {
+	const bool hyper = which == 1;
+	char name[80];
+	bool good = true;
+	srand(7);
+	quern_run *run = block(dim, materials[which]);
+	crowd(run, dim, hyper, open);
+	double loose, dense, stress;
+	look(run, dim, &loose, &dense, &stress);
+	const sums before = sum(run, dim, hyper);
+	const uint32_t n = harness_count(run, "point");
+	uint32_t most = n, least = n;
+	for (int k = 0; k < 6; k++) {
+		update(run);
+		const uint32_t now = harness_count(run, "point");
+		most = now > most ? now : most, least = now < least ? now : least;
+	}
+	const sums after = sum(run, dim, hyper);
+	snprintf(name, sizeof name, "%d-D %.*s, %s: mass", dim, (int)strcspn(materials[which], ":"),
+		materials[which], open ? "open" : "closed");
+	good &= table_row(name, after.mass / before.mass, 1, 1e-13);
+	good &= table_row("  volume", after.volume / before.volume, 1, 1e-13);
+	for (int k = 0; k < dim; k++)
+		good &=
+			table_row("  momentum gained", (after.momentum[k] - before.momentum[k]) / before.size, 0, 1e-13);
+	if (hyper) good &= table_row("  mean volume strain", after.strain / before.strain, 1, 1e-12);
+	for (int k = 0; k < (dim == 2 ? 3 : 6) && !open; k++)
+		good &= table_row("  volume times stress, gained over that of xx",
+			(after.stress[k] - before.stress[k]) / before.stress[0], 0, 1e-13);
+	if (open) { /* as loose as before, every one of them, and without stress */
+		double loose_now, dense_now, stress_now;
+		look(run, dim, &loose_now, &dense_now, &stress_now);
+		good &= loose_now <= loose * (1 + 1e-14) && dense_now >= dense * (1 - 1e-14);
+		good &= table_row("  stress of open points, Pa", stress_now, 0, 0);
+		const quern_column j = hyper ? harness_field(run, "point.volume_strain") : (quern_column) { 0 };
+		for (uint32_t i = 0; hyper && i < harness_count(run, "point"); i++) good &= j.real[0][i] > 0;
+	}
+	printf("  %u points, at least %u, at most %u in six updates\n", n, least, most);
+	assert_true(least < n || most > n); /* or the test would not see a thing */
+	harness_close(run);
+	return good;
+}
+
+static void many_and_few(void **state) {
+	bool good = true;
+	(void)state;
+	table_head("splitting and merging, six updates: after over before");
+	for (int dim = 2; dim <= 3; dim++)
+		for (int which = 0; which < 2; which++)
+			for (int open = 0; open <= 1; open++) good &= try_crowd(dim, which, open);
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(many_and_few) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
