@@ -182,6 +182,7 @@ static quern_status output(session *s) {
 	quern_run *run = s->run;
 	run->clock.frame++;
 	run->clock.at = run->clock.steps_in = 0;
+	if (quern_run_look(run) != QUERN_OK) return run->status;
 	if (quern_series_add(&s->series, run) != QUERN_OK) return run->status;
 	return quern_frame_write(run, run->clock.frame);
 }

@@ -355,6 +355,8 @@ quern_status quern_run_step(quern_run *run) {
 	return status;
 }
 
+quern_status quern_run_look(quern_run *run) { return run_phase(run, QUERN_OUTPUT, run->clock.dt); }
+
 quern_account quern_run_account(quern_run *run) {
 	quern_account account = { 0 };
 	quern_plan_refresh(run->plan);

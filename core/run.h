@@ -56,6 +56,8 @@ bool quern_run_settle(quern_run *);
 quern_status quern_run_check_step(quern_run *, double hard, const char *hard_reason, double recommended);
 /* Chooses the steps of the interval that begins now, from the state as it is. */
 quern_status quern_run_interval(quern_run *);
+/* Runs the stages that make what is only wanted when somebody looks: before observers and frames. */
+quern_status quern_run_look(quern_run *);
 /* One long step. */
 quern_status quern_run_step(quern_run *);
 

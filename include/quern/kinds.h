@@ -304,6 +304,7 @@ typedef enum {
 	QUERN_COUPLE,
 	QUERN_FROM_GRID,
 	QUERN_OBSERVE,
+	QUERN_OUTPUT, /* when the state is about to be observed and written: changes no state; dt 0 before the first step */
 	QUERN_PHASES
 } quern_phase;
 

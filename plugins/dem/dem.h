@@ -58,7 +58,7 @@ enum {
 	NEAR_BODY,
 	NEAR_FEATURE
 };
-/* rows of dem.forces */
+/* rows of dem.forces and dem.observe */
 enum {
 	FORCE_OLD_POSITION,
 	FORCE_OLD_VELOCITY,
@@ -70,31 +70,31 @@ enum {
 	FORCE_MASS,
 	FORCE_WEIGHT,
 	FORCE_FIXED,
-	FORCE_ANCHOR,
-	FORCE_DISPLACEMENT,
 	FORCE_FIRST,
 	FORCE_SECOND,
 	FORCE_GRAIN,
 	FORCE_BODY,
+	FORCE_FEATURE,
 	FORCE_CONTACT,
 	FORCE_TOUCH,
-	FORCE_SUM,
-	FORCE_IMPULSE,
-	FORCE_SUPPORT,
-	FORCE_CONTACT_SHEARED,
-	FORCE_TOUCH_SHEARED,
-	FORCE_KINETIC,
-	FORCE_POTENTIAL,
-	FORCE_STORED,
-	FORCE_SHEARED,
-	FORCE_DAMPED,
-	FORCE_RUBBED,
-	FORCE_ID,
-	FORCE_TREMBLING,
 	FORCE_CONTACT_COUPLE,
 	FORCE_TOUCH_COUPLE,
-	FORCE_FEATURE
+	FORCE_SUM,
+	FORCE_CONTACT_SHEARED,
+	FORCE_TOUCH_SHEARED,
+	N_COMMON_FORCE_ROWS
 };
+enum {
+	FORCE_ID = N_COMMON_FORCE_ROWS,
+	FORCE_ANCHOR,
+	FORCE_DISPLACEMENT,
+	FORCE_IMPULSE,
+	FORCE_SUPPORT,
+	FORCE_DAMPED,
+	FORCE_RUBBED,
+	FORCE_TREMBLING
+};
+enum { OBSERVE_KINETIC = N_COMMON_FORCE_ROWS, OBSERVE_POTENTIAL, OBSERVE_STORED, OBSERVE_SHEARED };
 
 /* The integrator of this step. */
 QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
@@ -108,6 +108,8 @@ quern_status quern_dem_fill(const void *self, const quern_step *);
 quern_status quern_dem_open(const void *self, const quern_step *);
 quern_status quern_dem_neighbours(const void *self, const quern_step *);
 quern_status quern_dem_forces(const void *self, const quern_step *);
+quern_status quern_dem_list(const void *self, const quern_step *);
+quern_status quern_dem_observe(const void *self, const quern_step *);
 bool quern_dem_settled(const void *self, const quern_step *);
 
 /* ---- grain_file.c ---- */

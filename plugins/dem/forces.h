@@ -4,6 +4,24 @@
 #include <quern/vec.h>
 
 enum { GRAINS = 128 }; /* integrated at once */
+enum { N_GRAIN_COLUMNS = 42 };
+enum {
+	G_FORCE,
+	G_TORQUE = 3,
+	G_MASS = 6,
+	G_INERTIA,
+	G_POSITION,
+	G_MEAN = 17,
+	G_MEAN_SPIN = 20,
+	G_WAY = 23,
+	G_LOST = 25,
+	G_NEW_POSITION = 27,
+	G_NEW_VELOCITY = 30,
+	G_NEW_SPIN = 33
+};
+/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both, which in 3-D has a row of its own; and
+ * what sliding has taken. */
+enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
 /* What all blocks share. */
@@ -12,7 +30,10 @@ typedef struct forces_shared {
 	const quern_step *s;
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
-	bool spin, energy, couple;
+	bool spin, couple;
+	bool books;  /* losses of this step are booked */
+	bool looks;  /* nothing moves: forces and energies of the state as it is */
+	bool starts; /* losses will be booked from now on: what springs hold is noted */
 	quern_real half[3],
 		length[3]; /* periodic: half the domain's length and the length; infinite and 0 otherwise */
 	const uint32_t *grain, *contact, *touch; /* partitions */
@@ -36,7 +57,8 @@ typedef struct forces_work {
 	law_row *rows; /* of all laws, one after the other */
 	int32_t *first, *second, *slot, *feature;
 	quern_real (*row)[8], (*drag_row)[8]; /* per grain of the block, one more for partners outside */
-	quern_real *grains[34];
+	quern_real *grains[N_GRAIN_COLUMNS];
+	quern_real *own[QUERN_MOST_USES][9]; /* of the integrator, while nothing moves */
 } forces_work;
 
 /* Adds what the contacts of block b do to its rows, and to its energies. */
@@ -51,15 +73,34 @@ bool quern_dem_is_history(const quern_use *);
  * was left out of the n_slots forgets, what was kept remembers. */
 void quern_dem_call_laws(
 	const forces_shared *, forces_work *, int32_t body, uint32_t begin, uint32_t n_slots, uint32_t n);
-/* Adds couples to the rows of the grains first .. last; a partner outside goes to the spare row. */
-void quern_dem_add_couples(const forces_shared *, const forces_work *, quern_real (*row)[8],
+/* Adds couples to the rows of the grains first .. last, from `lane` on; a partner outside goes to the spare row. */
+void quern_dem_add_couples(const forces_shared *, const forces_work *, quern_real (*row)[8], uint32_t lane,
 	quern_real *const couple[3], int32_t body, uint32_t first, uint32_t last, uint32_t n);
 /* Stores what the pairs kept were given, such as their force; the others get zero. */
 void quern_dem_keep(const forces_work *, quern_real *const given[3], quern_column out, uint32_t components,
 	uint32_t begin, uint32_t n_slots, uint32_t n);
-/* Books energies of the pairs whose first grain is in [first, last), and what springs that opened still held. */
-void quern_dem_book(const forces_shared *, const forces_work *, quern_column held, uint32_t begin,
-	uint32_t n_slots, uint32_t n, uint32_t first, uint32_t last, const int32_t *first_of, quern_real *sums);
+
+/* ---- energy.c: `begin` and `end` are the block's grains; of a pair across blocks the first grain's block keeps the books ---- */
+/* What n contacts hold; by slot in `held`, if that is not NULL. */
+void quern_dem_look(const forces_shared *, const forces_work *, quern_real *held, uint32_t n, uint32_t begin,
+	uint32_t end, quern_real *sums);
+/* What dashpots and sliding have taken from n grains. */
+void quern_dem_lose(
+	const forces_shared *, const forces_work *, uint32_t begin, uint32_t row, uint32_t n, quern_real *sums);
+/* What n grains have. */
+void quern_dem_have(const forces_shared *, const forces_work *, uint32_t begin, uint32_t n, quern_real *sums);
+
+/* What sliding takes of contact q, and what a spring gives up that has opened since the last step: no law sees that. The
+ * spring's energy is kept in `held`, by slot, which may be NULL. */
+QUERN_INLINE quern_real dem_rubbed(const forces_work *w, uint32_t q, quern_real share, quern_real *held) {
+	const bool touching = w->overlap[q] > 0;
+	quern_real rubbed = share * w->rubbed[q];
+	if (!held) return rubbed;
+	quern_real *mine = held + w->slot[q];
+	rubbed += touching ? 0 : *mine;
+	*mine = touching ? share * w->sheared[q] : 0;
+	return rubbed;
+}
 
 /* Torque over lever: -(n x f), for the first and the second alike. */
 QUERN_INLINE void dem_torques(

@@ -128,47 +128,50 @@ static const quern_use near_uses[] = { F("grain.position", "m", QUERN_READ, QUER
 	QUERN_END_USES };
 #define ENERGY(name, access, text)                                                                           \
 	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = text)
-static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
-											.flags = QUERN_OTHERS),
-	F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),
-	F("grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL),
-	F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
-	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
-	F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
-	F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL),
-	FIXED(QUERN_READ), F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), DISPLACEMENT,
-	F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
-	F("contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
-	F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
-	F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body"),
-	F("contact.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
-		.doc = "On the first, unweighted."),
-	F("touch.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
-		.doc = "On the grain, unweighted."),
-	F("grain.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
-		.doc = "Of all contacts, weighted; without gravity."),
+/* What a look at the forces takes too, without moving anything. */
+#define FORCE_USES(moves, gives)                                                                             \
+	F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                               \
+		F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                         \
+		F("grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL),           \
+		F("grain.position", "m", moves, QUERN_VECTOR), F("grain.velocity", "m/s", moves, QUERN_VECTOR),      \
+		F("grain.spin", "rad/s", moves, QUERN_AXIAL, .flags = QUERN_OPTIONAL),                               \
+		F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                             \
+		F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                              \
+		F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL),            \
+		FIXED(QUERN_READ), F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),              \
+		F("contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                \
+		F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                   \
+		F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body"),                                     \
+		F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"),                                \
+		F("contact.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                \
+			.doc = "On the first, unweighted."),                                                             \
+		F("touch.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
+			.doc = "On the grain, unweighted."),                                                             \
+		F("contact.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                              \
+			.doc = "On the first, unweighted."),                                                             \
+		F("touch.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                                \
+			.doc = "On the grain, unweighted."),                                                             \
+		F("grain.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
+			.doc = "Of all contacts, weighted; without gravity."),                                           \
+		F("contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .with = "total.rubbed",                        \
+			.doc = "In the tangential spring, weighted, at the last step."),                                 \
+		F("touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .with = "total.rubbed",                          \
+			.doc = "In the tangential spring, weighted, at the last step.")
+static const quern_use force_uses[] = { FORCE_USES(QUERN_UPDATE, QUERN_WRITE),
+	F("grain.id", "1", QUERN_READ, QUERN_ID), F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), DISPLACEMENT,
 	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
 	F("total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
 		.doc = "Impulse that fixed grains have given to moving ones."),
-	F("contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "In the tangential spring."),
-	F("touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "In the tangential spring."),
-	ENERGY("kinetic", QUERN_WRITE, "Of the grains."),
-	ENERGY("potential", QUERN_WRITE, "Of the grains, -m g x."),
-	ENERGY("stored", QUERN_WRITE, "In normal springs."),
-	ENERGY("sheared", QUERN_WRITE, "In tangential springs."),
 	ENERGY("damped", QUERN_UPDATE, "Lost in dashpots so far."),
-	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."), F("grain.id", "1", QUERN_READ, QUERN_ID),
+	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."),
 	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
 		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
-	F("contact.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
-		.doc = "On the first, unweighted."),
-	F("touch.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
-		.doc = "On the grain, unweighted."),
-	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"), QUERN_END_USES };
+	QUERN_END_USES };
+static const quern_use observe_uses[] = { FORCE_USES(QUERN_READ, QUERN_UPDATE),
+	ENERGY("kinetic", QUERN_WRITE, "Of the grains, with the velocity in the middle of a kick."),
+	ENERGY("potential", QUERN_WRITE, "Of the grains, -m g x."),
+	ENERGY("stored", QUERN_WRITE, "In normal springs."),
+	ENERGY("sheared", QUERN_WRITE, "In tangential springs."), QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "dem.fill",
 										  .doc = "Places the first grains.",
@@ -191,6 +194,17 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 		.phase = QUERN_GRAINS,
 		.uses = force_uses,
 		.run = quern_dem_forces },
+	{ .name = "dem.list",
+		.doc = "The first list, if nothing has moved yet.",
+		.phase = QUERN_OUTPUT,
+		.sometimes = 1,
+		.uses = near_uses,
+		.run = quern_dem_list },
+	{ .name = "dem.observe",
+		.doc = "Forces and energies of the state as it is.",
+		.phase = QUERN_OUTPUT,
+		.uses = observe_uses,
+		.run = quern_dem_observe },
 	{ .name = NULL } };
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {

@@ -273,6 +273,7 @@ static const char *const kinds[] = { "kinetic", "potential", "stored", "sheared"
 enum { POTENTIAL = 1, KINDS = 6 };
 
 static void read_books(quern_run *run, double out[KINDS + 1]) {
+	harness_look(run);
 	out[KINDS] = 0;
 	for (int k = 0; k < KINDS; k++) {
 		char name[32];
