@@ -162,8 +162,8 @@ static quern_status check_log(quern_run *run) {
 static quern_status output(session *s) {
 	quern_run *run = s->run;
 	quern_run_frame(run);
-	if (quern_series_add(&s->series, run) != QUERN_OK || quern_run_check_account(run) != QUERN_OK ||
-		quern_frame_write(run, run->clock.frame) != QUERN_OK)
+	if (quern_run_look(run) != QUERN_OK || quern_series_add(&s->series, run) != QUERN_OK ||
+		quern_run_check_account(run) != QUERN_OK || quern_frame_write(run, run->clock.frame) != QUERN_OK)
 		return run->status;
 	tell_what_stays(s);
 	return check_log(run);

@@ -4,7 +4,7 @@
 #include <string.h>
 
 const char *const quern_phase_names[] = { "setup", "convert", "grains", "to grid", "couple", "from grid",
-	"observe" };
+	"observe", "output" };
 
 static bool mandatory(const quern_plan_use *u) {
 	return u->counts && !(u->row->flags & (QUERN_OPTIONAL | QUERN_WANTED));
@@ -190,7 +190,7 @@ static void gather_slots(quern_plan *p) {
 	for (size_t e = 0; e < observe->n; e++) {
 		add_stage(p, (quern_plan_stage) { .name = observe->filling[e].instance->file->plugin.id,
 						 .observer = &observe->filling[e],
-						 .phase = QUERN_OBSERVE,
+						 .phase = QUERN_OUTPUT,
 						 .solver = 100 + (int)e });
 		p->observers[e] = add_bound(p, quern_take(1, sizeof(quern_bound)), NULL, &observe->filling[e],
 			"observe", (int)p->n_stages - 1, NULL);
@@ -223,57 +223,87 @@ static bool section_left_out(const quern_plan *p, const char *field) {
 	return false;
 }
 
-static void make_fields(quern_plan *p) {
-	const quern_scene *s = p->scene;
+/* A row that goes with another field counts only where that one exists. */
+static bool in_force(const quern_plan *p, const quern_plan_use *u) {
+	return u->counts && (!u->row->with || quern_store_field(&p->store, u->row->with) >= 0);
+}
+
+static void leave_out_sets(quern_plan *p) {
 	for (size_t i = 0; i < p->n_uses; i++) {
 		quern_plan_use *u = &p->uses[i];
 		const bool here = set_of(p, u->field) >= 0;
-		if (!here && mandatory(u) && !set_left_out(p, u->field))
-			quern_report_add(s->report, u->mark,
+		if (!here && mandatory(u) && !u->row->with && !set_left_out(p, u->field))
+			quern_report_add(p->scene->report, u->mark,
 				"%s needs %s, and nothing in the scene has a set of that name", u->owner, u->field);
 		u->counts = u->counts && here;
-		if (mandatory(u) && !u->row->with && quern_store_field(&p->store, u->field) < 0) add_field(p, u);
 	}
-	for (size_t i = 0; i < p->n_uses; i++) /* a row that goes with another field counts only now */
-		if (p->uses[i].row->with) {
-			quern_plan_use *u = &p->uses[i];
-			u->counts = u->counts && quern_store_field(&p->store, u->row->with) >= 0;
-			if (mandatory(u) && quern_store_field(&p->store, u->field) < 0) add_field(p, u);
-		}
-	for (size_t i = 0; i < p->n_uses; i++) { /* or somebody would like it and somebody else can make it */
+}
+
+static bool add_mandatory(quern_plan *p, bool with_others) {
+	bool any = false;
+	for (size_t i = 0; i < p->n_uses; i++) {
 		const quern_plan_use *u = &p->uses[i];
-		if (!u->counts || !(u->row->flags & QUERN_WANTED) || quern_store_field(&p->store, u->field) >= 0)
-			continue;
-		for (size_t k = 0; k < p->n_uses; k++) {
-			const quern_plan_use *maker = &p->uses[k];
-			if (k == i || !maker->counts || !changes(maker->row) || strcmp(maker->field, u->field) != 0)
-				continue;
-			add_field(p, u);
-			break;
-		}
+		if (!mandatory(u) || (u->row->with != NULL) != with_others || !in_force(p, u)) continue;
+		if (quern_store_field(&p->store, u->field) < 0) any = add_field(p, u);
 	}
-	for (size_t k = 0; k < s->n_fields; k++) { /* or the scene writes it out */
-		bool made = quern_store_field(&p->store, s->fields[k]) >= 0;
-		const char **known = quern_take(p->n_uses + 1, sizeof(char *));
+	return any;
+}
+
+/* Somebody would like it and somebody else can make it. */
+static bool add_wanted(quern_plan *p) {
+	bool any = false;
+	for (size_t i = 0; i < p->n_uses; i++) {
+		const quern_plan_use *u = &p->uses[i];
+		bool makable = false;
+		if (!(u->row->flags & QUERN_WANTED) || !in_force(p, u) || quern_store_field(&p->store, u->field) >= 0)
+			continue;
+		for (size_t k = 0; k < p->n_uses && !makable; k++)
+			makable = k != i && in_force(p, &p->uses[k]) && changes(p->uses[k].row) &&
+					  !strcmp(p->uses[k].field, u->field);
+		if (makable) any = add_field(p, u);
+	}
+	return any;
+}
+
+/* The scene writes it out. */
+static bool add_asked(quern_plan *p) {
+	const quern_scene *s = p->scene;
+	bool any = false;
+	for (size_t k = 0; k < s->n_fields; k++)
 		for (size_t i = 0; i < p->n_uses; i++) {
 			const quern_plan_use *u = &p->uses[i];
-			known[i] = u->field;
-			if (!made && u->counts && changes(u->row) && !strcmp(u->field, s->fields[k]))
-				made = add_field(p, u);
+			if (quern_store_field(&p->store, s->fields[k]) >= 0) break;
+			if (in_force(p, u) && changes(u->row) && !strcmp(u->field, s->fields[k])) any = add_field(p, u);
 		}
-		if (!made && section_left_out(p, s->fields[k])) {
-			if (s->general.model == 0)
-				quern_report_warn(s->report, s->field_marks[k],
-					"scene: output.fields: '%s' is left out: the section that makes it is not in this scene",
-					s->fields[k]);
-		} else if (!made) {
-			const char *near = quern_nearest(s->fields[k], known);
-			quern_report_add(s->report, s->field_marks[k],
-				"scene: output.fields: nothing in this scene makes '%s'%s%s%s", s->fields[k],
-				near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
-		}
-		free(known);
+	return any;
+}
+
+static void miss_asked(quern_plan *p, size_t k) {
+	const quern_scene *s = p->scene;
+	if (section_left_out(p, s->fields[k])) {
+		if (s->general.model == 0)
+			quern_report_warn(s->report, s->field_marks[k],
+				"scene: output.fields: '%s' is left out: the section that makes it is not in this scene",
+				s->fields[k]);
+		return;
 	}
+	const char **known = quern_take(p->n_uses + 1, sizeof(char *));
+	for (size_t i = 0; i < p->n_uses; i++) known[i] = p->uses[i].field;
+	const char *near = quern_nearest(s->fields[k], known);
+	quern_report_add(s->report, s->field_marks[k],
+		"scene: output.fields: nothing in this scene makes '%s'%s%s%s", s->fields[k],
+		near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+	free(known);
+}
+
+/* A field that is made may bring others along: rows that go with it. */
+static void make_fields(quern_plan *p) {
+	leave_out_sets(p);
+	add_mandatory(p, false);
+	while (add_mandatory(p, true) || add_wanted(p) || add_asked(p)) {}
+	for (size_t i = 0; i < p->n_uses; i++) p->uses[i].counts = in_force(p, &p->uses[i]);
+	for (size_t k = 0; k < p->scene->n_fields; k++)
+		if (quern_store_field(&p->store, p->scene->fields[k]) < 0) miss_asked(p, k);
 }
 
 /* Who else takes a field, and how: "solver.dem: an index". The first one has made it. */

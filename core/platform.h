@@ -1,5 +1,6 @@
-/* platform - what a build is for */
+/* platform - what differs between operating systems, processors and builds */
 #pragma once
+#include <stdint.h>
 
 /* A sanitizer has handlers of its own, needs more memory than any limit allows, and starts processes to report. */
 #if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
@@ -9,3 +10,8 @@
 #define QUERN_SANITIZED 1
 #endif
 #endif
+
+/* Processors that this process may use: those it is bound to, and no more than a container's quota pays for. At least 1. */
+uint32_t quern_platform_processors(void);
+/* Tells the processor that this thread waits in a loop. */
+void quern_platform_pause(void);

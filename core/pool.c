@@ -1,48 +1,184 @@
+/* pool - threads that wait for work a short while, then sleep. docs/decisions/0018-threads.md */
 #include "pool.h"
+#include "platform.h"
 #include "text.h"
-#include <omp.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdatomic.h>
 #include <stdlib.h>
+
+enum { PAUSES = 2000, YIELDS = 200 }; /* some 50 us of each */
 
 typedef struct {
 	_Alignas(64) void *memory;
 	size_t bytes;
 } scratch;
 
+typedef struct {
+	quern_pool *pool;
+	pthread_t thread;
+	uint32_t number;
+} helper;
+
+/* A round is one call of quern_pool_each. The ticket holds its number in the high 32 bits and how many indices are left in
+ * the low ones. Who takes one by compare-and-swap has read body, arg and n of this round: the caller changes them only
+ * while none is left and all are done. So nobody waits for a thread that has taken nothing: the caller does the work of a
+ * thread that sleeps, or that has to wait for a processor. */
 struct quern_pool {
-	uint32_t workers;
+	_Alignas(64) _Atomic uint64_t ticket;
+	_Alignas(64) _Atomic uint32_t done;
+	_Alignas(64) _Atomic uint32_t n;
+	void (*_Atomic body)(void *, uint32_t, uint32_t);
+	void *_Atomic arg;
+	_Atomic bool stop, caller_waits;
+	_Atomic uint32_t asleep;
+	pthread_mutex_t lock;
+	pthread_cond_t work, end;
+	uint32_t workers, started;
+	helper *helpers;
 	scratch *scratch;
 };
 
+static uint32_t round_of(uint64_t ticket) { return (uint32_t)(ticket >> 32); }
+
+/* Takes indices of one round until there is none left. */
+static void take_part(quern_pool *p, uint32_t round, uint32_t worker) {
+	uint64_t ticket = atomic_load(&p->ticket);
+	while (round_of(ticket) == round) {
+		const uint32_t left = (uint32_t)ticket, n = atomic_load(&p->n);
+		void (*body)(void *, uint32_t, uint32_t) = atomic_load(&p->body);
+		void *arg = atomic_load(&p->arg);
+		if (!left) return;
+		if (!atomic_compare_exchange_weak(&p->ticket, &ticket, ticket - 1)) continue;
+		body(arg, n - left, worker);
+		if (atomic_fetch_add(&p->done, 1) + 1 == n && atomic_load(&p->caller_waits)) {
+			pthread_mutex_lock(&p->lock);
+			pthread_cond_signal(&p->end);
+			pthread_mutex_unlock(&p->lock);
+		}
+		ticket = atomic_load(&p->ticket);
+	}
+}
+
+/* Looks for a change of `word` for a while: awake first, then giving way to whoever wants the processor. */
+#define WAIT_WHILE(condition)                                                                                \
+	for (int k = 0; (condition) && k < PAUSES + YIELDS; k++) {                                               \
+		if (k < PAUSES) quern_platform_pause();                                                              \
+		else sched_yield();                                                                                  \
+	}
+
+static void *help(void *arg) {
+	const helper *h = arg;
+	quern_pool *p = h->pool;
+	uint32_t round = 0;
+	for (;;) {
+		WAIT_WHILE(round_of(atomic_load(&p->ticket)) == round && !atomic_load(&p->stop))
+		if (round_of(atomic_load(&p->ticket)) == round) {
+			pthread_mutex_lock(&p->lock);
+			atomic_fetch_add(&p->asleep, 1);
+			while (round_of(atomic_load(&p->ticket)) == round && !atomic_load(&p->stop))
+				pthread_cond_wait(&p->work, &p->lock);
+			atomic_fetch_sub(&p->asleep, 1);
+			pthread_mutex_unlock(&p->lock);
+		}
+		if (atomic_load(&p->stop)) return NULL;
+		round = round_of(atomic_load(&p->ticket));
+		take_part(p, round, h->number);
+	}
+}
+
+static void wake(quern_pool *p) {
+	if (!atomic_load(&p->asleep)) return;
+	pthread_mutex_lock(&p->lock);
+	pthread_cond_broadcast(&p->work);
+	pthread_mutex_unlock(&p->lock);
+}
+
+/* Signals are the main thread's. */
+static void start(quern_pool *p) {
+	sigset_t all, before;
+	sigfillset(&all);
+	pthread_sigmask(SIG_SETMASK, &all, &before);
+	for (uint32_t i = 1; i < p->workers; i++) {
+		helper *h = &p->helpers[p->started];
+		*h = (helper) { .pool = p, .number = i };
+		if (pthread_create(&h->thread, NULL, help, h)) break;
+		p->started++;
+	}
+	pthread_sigmask(SIG_SETMASK, &before, NULL);
+	p->workers = p->started + 1;
+}
+
+static uint32_t wished(uint32_t workers) {
+	const char *text = getenv("OMP_NUM_THREADS");
+	char *end = NULL;
+	const long asked = text ? strtol(text, &end, 10) : 0;
+	if (!workers && asked > 0 && (!*end || *end == ',')) workers = asked < 256 ? (uint32_t)asked : 256;
+	if (!workers) workers = quern_platform_processors();
+	return workers < 256 ? workers : 256;
+}
+
 quern_pool *quern_pool_create(uint32_t workers) {
-	quern_pool *pool = quern_take(1, sizeof *pool);
-	pool->workers = workers ? workers : (uint32_t)omp_get_num_procs();
-	if (pool->workers > 256) pool->workers = 256;
-	pool->scratch = aligned_alloc(64, pool->workers * sizeof(scratch));
-	if (!pool->scratch) abort();
-	for (uint32_t i = 0; i < pool->workers; i++) pool->scratch[i] = (scratch) { 0 };
-	return pool;
+	quern_pool *p = aligned_alloc(64, sizeof *p);
+	if (!p) return NULL;
+	*p = (quern_pool) { .workers = wished(workers) };
+	p->scratch = aligned_alloc(64, p->workers * sizeof(scratch));
+	p->helpers = calloc(p->workers, sizeof(helper));
+	if (!p->scratch || !p->helpers) return free(p->scratch), free(p->helpers), free(p), NULL;
+	for (uint32_t i = 0; i < p->workers; i++) p->scratch[i] = (scratch) { 0 };
+	pthread_mutex_init(&p->lock, NULL);
+	pthread_cond_init(&p->work, NULL);
+	pthread_cond_init(&p->end, NULL);
+	start(p);
+	return p;
 }
 
-void quern_pool_destroy(quern_pool *pool) {
-	if (!pool) return;
-	for (uint32_t i = 0; i < pool->workers; i++) free(pool->scratch[i].memory);
-	free(pool->scratch);
-	free(pool);
+void quern_pool_destroy(quern_pool *p) {
+	if (!p) return;
+	atomic_store(&p->stop, true);
+	wake(p);
+	for (uint32_t i = 0; i < p->started; i++) pthread_join(p->helpers[i].thread, NULL);
+	for (uint32_t i = 0; i < p->workers; i++) free(p->scratch[i].memory);
+	pthread_mutex_destroy(&p->lock);
+	pthread_cond_destroy(&p->work);
+	pthread_cond_destroy(&p->end);
+	free(p->scratch);
+	free(p->helpers);
+	free(p);
 }
 
-uint32_t quern_pool_workers(const quern_pool *pool) { return pool->workers; }
+uint32_t quern_pool_workers(const quern_pool *p) { return p->workers; }
 
-void quern_pool_each(quern_pool *pool, uint32_t n, void (*body)(void *, uint32_t, uint32_t), void *arg) {
-	if (pool->workers == 1 || n < 2) {
+/* The last index may be with a thread that has lost its processor: then the caller gives up its own. */
+static void wait_for_all(quern_pool *p, uint32_t n) {
+	WAIT_WHILE(atomic_load(&p->done) < n)
+	if (atomic_load(&p->done) == n) return;
+	pthread_mutex_lock(&p->lock);
+	atomic_store(&p->caller_waits, true);
+	while (atomic_load(&p->done) < n) pthread_cond_wait(&p->end, &p->lock);
+	atomic_store(&p->caller_waits, false);
+	pthread_mutex_unlock(&p->lock);
+}
+
+void quern_pool_each(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, uint32_t), void *arg) {
+	if (p->workers == 1 || n < 2) {
 		for (uint32_t i = 0; i < n; i++) body(arg, i, 0);
 		return;
 	}
-#pragma omp parallel for schedule(dynamic, 1) num_threads(pool->workers)
-	for (uint32_t i = 0; i < n; i++) body(arg, i, (uint32_t)omp_get_thread_num());
+	const uint32_t round = round_of(atomic_load(&p->ticket)) + 1;
+	atomic_store(&p->done, 0);
+	atomic_store(&p->body, body);
+	atomic_store(&p->arg, arg);
+	atomic_store(&p->n, n);
+	atomic_store(&p->ticket, (uint64_t)round << 32 | n);
+	wake(p);
+	take_part(p, round, 0);
+	wait_for_all(p, n);
 }
 
-void *quern_pool_scratch(quern_pool *pool, uint32_t worker, size_t bytes) {
-	scratch *own = &pool->scratch[worker];
+void *quern_pool_scratch(quern_pool *p, uint32_t worker, size_t bytes) {
+	scratch *own = &p->scratch[worker];
 	if (own->bytes >= bytes) return own->memory;
 	free(own->memory);
 	own->bytes = (bytes + bytes / 4 + 4095) & ~(size_t)4095;

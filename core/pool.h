@@ -1,17 +1,18 @@
-/* pool - the only place that knows about threads (OpenMP) */
+/* pool - the only place that knows about threads */
 #pragma once
 #include <stddef.h>
 #include <stdint.h>
 
 typedef struct quern_pool quern_pool;
 
-/* workers: 0 takes as many as the process may run on. */
+/* `workers` counts the calling thread, 256 at most; 0: OMP_NUM_THREADS if that is a number, else as many as the process may
+ * use. Threads that cannot be started are done without. NULL if there is no memory. */
 quern_pool *quern_pool_create(uint32_t workers);
 void quern_pool_destroy(quern_pool *);
 uint32_t quern_pool_workers(const quern_pool *);
 
 /* Calls body(arg, i, worker) once for every i < n. Which worker gets which i is not determined, so a body writes
- * nothing that another i reads or writes. */
+ * nothing that another i reads or writes. Only one thread may call it, and no body. */
 void quern_pool_each(
 	quern_pool *, uint32_t n, void (*body)(void *arg, uint32_t i, uint32_t worker), void *arg);
 

@@ -75,6 +75,13 @@ static bool needs_grid(const quern_store *store) {
 	return false;
 }
 
+/* What could not be made whole goes; the scene stays the caller's. */
+static quern_run *give_up(quern_run *run) {
+	run->scene = NULL;
+	quern_run_destroy(run);
+	return NULL;
+}
+
 quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	quern_run *run = quern_take(1, sizeof *run);
 	run->scene = scene;
@@ -82,6 +89,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	run->mass_initial = NAN;
 	run->plugins = quern_plugin_hashes(scene->loader);
 	run->pool = quern_pool_create(workers);
+	if (!run->pool) return give_up(run);
 	run->plan = quern_plan_create(scene, run->pool);
 	run->has_grid = needs_grid(&run->plan->store);
 	if (run->has_grid && !quern_report_errors(scene->report)) {
@@ -102,10 +110,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 		 i++) /* from now on a NULL column says: there is no such field */
 		if (i != total && !run->plan->store.sets[i].rows)
 			reserved = reserved && quern_store_fill(&run->plan->store, i, 0) == QUERN_OK;
-	if (!reserved) {
-		quern_run_destroy(run);
-		return NULL;
-	}
+	if (!reserved) return give_up(run);
 	quern_plan_refresh(run->plan);
 	return run;
 }
@@ -203,8 +208,7 @@ quern_step quern_run_record(quern_run *run, const quern_section *section) {
 		.slot = section ? (const quern_bound *const *)run->plan->slots[i] : NULL,
 		.n_slot = section ? run->plan->n_slot[i] : NULL,
 		.host = &quern_host_table,
-		.run = run,
-		.before_output = run->clock.settled && run->clock.at + 1 == run->clock.steps_in };
+		.run = run };
 	memcpy(step.gravity, g->gravity, sizeof step.gravity);
 	memcpy(step.lower, g->lower, sizeof step.lower);
 	memcpy(step.upper, g->upper, sizeof step.upper);
@@ -239,7 +243,8 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
 		if (!s->ops->limit) continue;
-		const quern_step step = quern_run_record(run, s);
+		quern_step step = quern_run_record(run, s);
+		step.settling = false; /* the steps after the release are meant, whenever this is asked */
 		const uint32_t times = steps_grains(run, s) ? n : 1;
 		char why[160] = "";
 		double beyond = INFINITY;
@@ -396,6 +401,8 @@ quern_status quern_run_step(quern_run *run) {
 	c->at++;
 	return status;
 }
+
+quern_status quern_run_look(quern_run *run) { return run_phase(run, QUERN_OUTPUT, run->clock.dt); }
 
 quern_account quern_run_account(quern_run *run) {
 	quern_account account = { 0 };

@@ -47,7 +47,7 @@ struct quern_run {
 };
 
 /* Everything short of running: allocates, but no stage has run. Faults go to the scene's report; NULL if memory is
- * gone. Takes the scene over. `workers` 0: all. */
+ * gone. Takes the scene over unless it fails. `workers`: quern_pool_create. */
 quern_run *quern_run_create(quern_scene *, uint32_t workers);
 void quern_run_destroy(quern_run *);
 
@@ -59,6 +59,8 @@ bool quern_run_settle(quern_run *);
 quern_status quern_run_check_step(quern_run *, double hard, const char *hard_reason, double recommended);
 /* Begins the interval to the next frame that is due, and chooses its steps from the state as it is. */
 quern_status quern_run_interval(quern_run *);
+/* Runs the stages that make what is only wanted when somebody looks: before observers and frames. */
+quern_status quern_run_look(quern_run *);
 /* One long step. */
 quern_status quern_run_step(quern_run *);
 /* Ends the interval, or the time before the first one, with a frame. */

@@ -64,6 +64,11 @@ quern_status harness_try(quern_run *run, int64_t n) {
 	return run->status;
 }
 
+void harness_look(quern_run *run) {
+	if (quern_run_look(run) != QUERN_OK) fail_msg("%s", run->message);
+	quern_plan_refresh(run->plan);
+}
+
 void harness_steps(quern_run *run, int64_t n) {
 	if (harness_try(run, n) != QUERN_OK) fail_msg("%s", run->message);
 }

@@ -13,6 +13,8 @@ void harness_close(quern_run *);
 void harness_settle(quern_run *);
 /* Long steps of the current interval's length, choosing a new interval when one ends; fails the test if the run does. */
 void harness_steps(quern_run *, int64_t n);
+/* What is made only when somebody looks, such as total.kinetic, from the state as it is. */
+void harness_look(quern_run *);
 /* The same, but gives the status back. */
 quern_status harness_try(quern_run *, int64_t n);
 /* Steps until at least this time in seconds has passed since the release. */

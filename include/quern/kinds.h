@@ -100,7 +100,8 @@ typedef struct quern_integrator_batch {
 } quern_integrator_batch;
 
 typedef struct quern_integrator_ops {
-	uint32_t size, pad;
+	uint32_t size;
+	uint32_t damps; /* 1: takes energy away on purpose, for settling; what it takes stands in no budget */
 	void (*close[2])(const void *self, const quern_integrator_batch *); /* [batch] */
 	void (*open[2])(const void *self, const quern_integrator_batch *);  /* [batch] may be NULL */
 } quern_integrator_ops;
@@ -309,6 +310,7 @@ typedef enum {
 	QUERN_COUPLE,
 	QUERN_FROM_GRID,
 	QUERN_OBSERVE,
+	QUERN_OUTPUT, /* when the state is about to be observed and written: changes no state; dt 0 before the first step */
 	QUERN_PHASES
 } quern_phase;
 
@@ -349,7 +351,6 @@ typedef struct quern_step {
 	const uint32_t *n_slot;
 	const quern_host *host;
 	quern_run *run;
-	bool before_output; /* after this long step frames and observers look at the state */
 } quern_step;
 
 typedef struct quern_stage {

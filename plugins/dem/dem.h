@@ -5,7 +5,7 @@
 #include "../common/tools.h"
 
 typedef struct dem {
-	quern_real density, skin, drag, rest; /* from the scene */
+	quern_real density, skin, rest, settle_step; /* from the scene */
 	radius_law radii;
 	quern_list fill, place;
 	const char *file;
@@ -30,7 +30,7 @@ typedef struct dem_place {
 } dem_place;
 
 /* slots, in the order of the solver's table */
-enum { SLOT_CONTACT, SLOT_NEIGHBOURS, SLOT_INTEGRATOR, SLOT_BODIES, SLOT_PACKER };
+enum { SLOT_CONTACT, SLOT_NEIGHBOURS, SLOT_INTEGRATOR, SLOT_BODIES, SLOT_PACKER, SLOT_SETTLING };
 
 /* rows of dem.fill */
 enum {
@@ -60,7 +60,7 @@ enum {
 	NEAR_BODY,
 	NEAR_FEATURE
 };
-/* rows of dem.forces */
+/* rows of dem.forces and dem.observe */
 enum {
 	FORCE_OLD_POSITION,
 	FORCE_OLD_VELOCITY,
@@ -72,34 +72,39 @@ enum {
 	FORCE_MASS,
 	FORCE_WEIGHT,
 	FORCE_FIXED,
-	FORCE_ANCHOR,
-	FORCE_DISPLACEMENT,
 	FORCE_FIRST,
 	FORCE_SECOND,
 	FORCE_GRAIN,
 	FORCE_BODY,
+	FORCE_FEATURE,
 	FORCE_CONTACT,
 	FORCE_TOUCH,
-	FORCE_SUM,
-	FORCE_IMPULSE,
-	FORCE_SUPPORT,
-	FORCE_CONTACT_SHEARED,
-	FORCE_TOUCH_SHEARED,
-	FORCE_KINETIC,
-	FORCE_POTENTIAL,
-	FORCE_STORED,
-	FORCE_SHEARED,
-	FORCE_DAMPED,
-	FORCE_RUBBED,
-	FORCE_ID,
-	FORCE_TREMBLING,
 	FORCE_CONTACT_COUPLE,
 	FORCE_TOUCH_COUPLE,
-	FORCE_FEATURE,
+	FORCE_SUM,
+	FORCE_CONTACT_SHEARED,
+	FORCE_TOUCH_SHEARED,
+	FORCE_ID,
+	N_COMMON_FORCE_ROWS
+};
+enum {
+	FORCE_ANCHOR = N_COMMON_FORCE_ROWS,
+	FORCE_DISPLACEMENT,
+	FORCE_IMPULSE,
+	FORCE_SUPPORT,
+	FORCE_DAMPED,
+	FORCE_RUBBED,
+	FORCE_TREMBLING,
 	FORCE_DEEP_FIRST,
 	FORCE_DEEP_SECOND,
 	FORCE_DEEP_TIME
 };
+enum { OBSERVE_KINETIC = N_COMMON_FORCE_ROWS, OBSERVE_POTENTIAL, OBSERVE_STORED, OBSERVE_SHEARED };
+
+/* The integrator of this step. */
+QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
+	return &s->slot[s->settling ? SLOT_SETTLING : SLOT_INTEGRATOR][0];
+}
 
 /* moment of inertia over mass times radius squared */
 QUERN_INLINE quern_real dem_inertia(uint32_t dim) { return dim == 2 ? 0.5 : 0.4; }
@@ -110,6 +115,8 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *);
 quern_status quern_dem_forces(const void *self, const quern_step *);
 /* Ends the run for a grain that is out of the domain along an axis. */
 quern_status quern_dem_left(const quern_step *, int64_t id, uint32_t axis, quern_real x);
+quern_status quern_dem_list(const void *self, const quern_step *);
+quern_status quern_dem_observe(const void *self, const quern_step *);
 bool quern_dem_settled(const void *self, const quern_step *);
 
 /* ---- grain_file.c ---- */

@@ -58,7 +58,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 		if (dim == 3) carve_columns(&c, w->turn, 3, cap);
 	}
 	if (sh->couple) carve_columns(&c, w->couple, dim == 3 ? 3 : 1, cap);
-	if (sh->energy) {
+	if (sh->books || sh->looks) {
 		if (sh->couple) carve_columns(&c, w->drag_couple, dim == 3 ? 3 : 1, cap);
 		carve_columns(&c, w->dashpot, dim, cap);
 		carve_columns(&c, &w->stored, 1, cap);
@@ -71,38 +71,13 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	w->second = carve(&c, cap * sizeof(int32_t));
 	w->slot = carve(&c, cap * sizeof(int32_t));
 	if (sh->d->features) w->feature = carve(&c, cap * sizeof(int32_t));
-	carve_columns(&c, w->grains, 34, GRAINS);
+	carve_columns(&c, w->grains, N_GRAIN_COLUMNS, GRAINS);
+	const quern_bound *integrator = dem_integrator(sh->s);
+	for (uint32_t r = 0; r < integrator->n_uses && sh->looks; r++)
+		carve_columns(&c, w->own[r], quern_shape_size(integrator->uses[r].shape, dim), GRAINS);
 	w->row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
-	if (sh->energy) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
+	if (sh->books && dim == 3) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	return c.used + 64;
-}
-
-/* ---- energy ---- */
-
-/* A spring that opens gives up what it held in the tangential direction: that is lost to sliding. Of a pair across
- * blocks the first grain's block keeps the books. */
-void quern_dem_book(const forces_shared *sh, const forces_work *w, quern_column held, uint32_t begin,
-	uint32_t n_slots, uint32_t n, uint32_t first_grain, uint32_t last_grain, const int32_t *first,
-	quern_real *sums) {
-	quern_real *restrict old = held.real[0] + begin;
-	for (uint32_t q = 0; q < n; q++) {
-		const uint32_t i = (uint32_t)w->first[q];
-		const quern_real share = sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1;
-		if (w->overlap[q] > 0) old[w->slot[q]] = 0; /* the law has accounted for it */
-		if (i < first_grain || i >= last_grain) continue;
-		sums[E_STORED] += share * w->stored[q];
-		sums[E_SHEARED] += share * w->sheared[q];
-		sums[E_RUBBED] += share * w->rubbed[q];
-	}
-	for (uint32_t k = 0; k < n_slots; k++) {
-		const uint32_t i = (uint32_t)first[k];
-		if (i >= first_grain && i < last_grain) sums[E_RUBBED] += old[k];
-		old[k] = 0;
-	}
-	for (uint32_t q = 0; q < n; q++) {
-		const quern_real share = sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1;
-		old[w->slot[q]] = w->overlap[q] > 0 ? share * w->sheared[q] : 0;
-	}
 }
 
 /* ---- the stage ---- */
@@ -118,11 +93,11 @@ static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	const uint32_t n = sh->grain[b + 1] - sh->grain[b];
 	quern_real *sums = sh->sums + (size_t)b * N_ENERGIES;
 	memset(w.row, 0, ((size_t)n + 1) * sizeof *w.row);
-	if (sh->energy) memset(w.drag_row, 0, ((size_t)n + 1) * sizeof *w.row);
+	if (w.drag_row) memset(w.drag_row, 0, ((size_t)n + 1) * sizeof *w.row);
 	if (sh->contact) quern_dem_pairs(sh, &w, b, sums);
 	if (sh->touch) quern_dem_touches(sh, &w, b, sums);
 	quern_dem_integrate(sh, &w, b, sums);
-	if (sh->looks) quern_dem_look_at_grains(sh, b);
+	if (sh->checks) quern_dem_check_grains(sh, b);
 }
 
 static bool any_couples(const quern_step *s) {
@@ -141,8 +116,8 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->n_laws = s->n_slot[SLOT_CONTACT];
 	sh->couple = any_couples(s);
 	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
-	sh->energy = s->use[FORCE_STORED].real[0] != NULL;
-	sh->drag = s->settling ? sh->d->drag : 0;
+	sh->books = !sh->looks && !s->settling && (s->use[FORCE_DAMPED].real[0] || s->use[FORCE_RUBBED].real[0]);
+	sh->starts = sh->looks && s->step == 0;
 	sh->grain = grains.block;
 	sh->contact = contacts.block;
 	sh->touch = touches.n ? touches.block : NULL;
@@ -161,7 +136,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->farthest = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(quern_real));
 	sh->turned = s->host->memory(s->run, (size_t)grains.n_blocks * 2 * sizeof(quern_real));
 	sh->bad = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(int32_t));
-	quern_dem_decide_looks(sh);
+	quern_dem_decide_checks(sh);
 	sh->outside = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(int32_t));
 	if (sh->deep) {
 		sh->worst = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(deep_contact));
@@ -191,11 +166,8 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 		for (int e = 0; e < N_ENERGIES; e++) energy[e] += sh->sums[(size_t)b * N_ENERGIES + (uint32_t)e];
 	}
 	u[FORCE_DISPLACEMENT].real[0][0] = farthest;
-	if (!sh->energy) return;
-	for (int e = E_KINETIC; e <= E_SHEARED; e++)
-		if (u[FORCE_KINETIC + e].real[0]) u[FORCE_KINETIC + e].real[0][0] = energy[e];
-	if (!s->settling && u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
-	if (!s->settling && u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
+	if (u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
+	if (u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
 }
 
 static quern_status lost(const forces_shared *sh, int32_t i) {
@@ -250,7 +222,32 @@ quern_status quern_dem_forces(const void *self, const quern_step *s) {
 	for (uint32_t b = 0; b < grains.n_blocks; b++)
 		if (sh.bad[b] >= 0) return lost(&sh, sh.bad[b]);
 	collect(&sh, grains.n_blocks);
-	quern_status status = sh.looks ? quern_dem_judge_grains(&sh, grains.n_blocks) : QUERN_OK;
+	quern_status status = sh.checks ? quern_dem_judge_grains(&sh, grains.n_blocks) : QUERN_OK;
 	if (status == QUERN_OK && sh.deep) status = quern_dem_judge_contacts(&sh, grains.n_blocks);
 	return status == QUERN_OK ? look_for_trembling(&sh, grains.n_blocks) : status;
+}
+
+/* ---- when somebody looks ---- */
+
+/* The forces of the state as it is, and the kick that they would give: nothing moves, nothing is remembered. Before the
+ * first step there is no step's length, and no kick. */
+quern_status quern_dem_observe(const void *self, const quern_step *s) {
+	quern_step now = *s;
+	now.dt = s->dt > 0 ? s->dt / s->n_substeps : 1e-300;
+	forces_shared sh = { .d = self, .s = &now, .looks = true };
+	const quern_set_view grains = s->host->set(s->run, "grain");
+	if (!grains.n) return QUERN_OK;
+	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);
+	const quern_status status = quern_dem_judge_grains(&sh, grains.n_blocks);
+	if (status != QUERN_OK) return status;
+	quern_real energy[N_ENERGIES] = { 0 };
+	for (uint32_t b = 0; b < grains.n_blocks; b++) {
+		if (sh.bad[b] >= 0) return lost(&sh, sh.bad[b]);
+		for (int e = E_KINETIC; e <= E_SHEARED; e++)
+			energy[e] += sh.sums[(size_t)b * N_ENERGIES + (uint32_t)e];
+	}
+	for (int e = E_KINETIC; e <= E_SHEARED; e++)
+		if (s->use[OBSERVE_KINETIC + e].real[0]) s->use[OBSERVE_KINETIC + e].real[0][0] = energy[e];
+	return QUERN_OK;
 }

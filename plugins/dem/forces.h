@@ -4,6 +4,24 @@
 #include <quern/vec.h>
 
 enum { GRAINS = 128 }; /* integrated at once */
+enum { N_GRAIN_COLUMNS = 42 };
+enum {
+	G_FORCE,
+	G_TORQUE = 3,
+	G_MASS = 6,
+	G_INERTIA,
+	G_POSITION,
+	G_MEAN = 17,
+	G_MEAN_SPIN = 20,
+	G_WAY = 23,
+	G_LOST = 25,
+	G_NEW_POSITION = 27,
+	G_NEW_VELOCITY = 30,
+	G_NEW_SPIN = 33
+};
+/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both, which in 3-D has a row of its own; and
+ * what sliding has taken. */
+enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
 /* A contact deeper than is allowed. */
@@ -19,8 +37,11 @@ typedef struct forces_shared {
 	const quern_step *s;
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
-	bool spin, energy, couple;
-	quern_real drag, half[3],
+	bool spin, couple;
+	bool books;  /* losses of this step are booked */
+	bool looks;  /* nothing moves: forces and energies of the state as it is */
+	bool starts; /* losses will be booked from now on: what springs hold is noted */
+	quern_real half[3],
 		length[3]; /* periodic: half the domain's length and the length; infinite and 0 otherwise */
 	const uint32_t *grain, *contact, *touch; /* partitions */
 	quern_real *impulse;  /* [block][body + 1][dim]: on the material, by bodies and by fixed grains */
@@ -28,7 +49,7 @@ typedef struct forces_shared {
 	quern_real *farthest; /* [block] square of the way since the last list */
 	quern_real *turned;   /* [block][2] sums of m v.v', of old and new velocity, and of m */
 	int32_t *bad;         /* [block] first grain that is lost, or -1 */
-	bool looks, deep;     /* grains are looked at in this step; contacts are */
+	bool checks, deep;    /* grains are checked in this step; contacts are */
 	int32_t *outside;     /* [block] first grain out of the domain, or -1 */
 	deep_contact *worst, *watched; /* [block] */
 } forces_shared;
@@ -46,7 +67,8 @@ typedef struct forces_work {
 	law_row *rows; /* of all laws, one after the other */
 	int32_t *first, *second, *slot, *feature;
 	quern_real (*row)[8], (*drag_row)[8]; /* per grain of the block, one more for partners outside */
-	quern_real *grains[34];
+	quern_real *grains[N_GRAIN_COLUMNS];
+	quern_real *own[QUERN_MOST_USES][9]; /* of the integrator, while nothing moves */
 } forces_work;
 
 /* Adds what the contacts of block b do to its rows, and to its energies. */
@@ -61,24 +83,41 @@ bool quern_dem_is_history(const quern_use *);
  * was left out of the n_slots forgets, what was kept remembers. */
 void quern_dem_call_laws(
 	const forces_shared *, forces_work *, int32_t body, uint32_t begin, uint32_t n_slots, uint32_t n);
-/* Adds couples to the rows of the grains first .. last; a partner outside goes to the spare row. */
-void quern_dem_add_couples(const forces_shared *, const forces_work *, quern_real (*row)[8],
+/* Adds couples to the rows of the grains first .. last, from `lane` on; a partner outside goes to the spare row. */
+void quern_dem_add_couples(const forces_shared *, const forces_work *, quern_real (*row)[8], uint32_t lane,
 	quern_real *const couple[3], int32_t body, uint32_t first, uint32_t last, uint32_t n);
 /* Stores what the pairs kept were given, such as their force; the others get zero. */
 void quern_dem_keep(const forces_work *, quern_real *const given[3], quern_column out, uint32_t components,
 	uint32_t begin, uint32_t n_slots, uint32_t n);
-/* ---- look.c ---- */
-void quern_dem_decide_looks(forces_shared *);
-void quern_dem_look_at_contacts(
+/* ---- checks.c ---- */
+void quern_dem_decide_checks(forces_shared *);
+void quern_dem_check_contacts(
 	const forces_shared *, const forces_work *, uint32_t b, int32_t body, uint32_t n);
-void quern_dem_look_at_grains(const forces_shared *, uint32_t b);
+void quern_dem_check_grains(const forces_shared *, uint32_t b);
 quern_status quern_dem_judge_contacts(const forces_shared *, uint32_t n_blocks);
 quern_status quern_dem_judge_grains(const forces_shared *, uint32_t n_blocks);
 
-/* ---- forces.c ---- */
-/* Books energies of the pairs whose first grain is in [first, last), and what springs that opened still held. */
-void quern_dem_book(const forces_shared *, const forces_work *, quern_column held, uint32_t begin,
-	uint32_t n_slots, uint32_t n, uint32_t first, uint32_t last, const int32_t *first_of, quern_real *sums);
+/* ---- energy.c: `begin` and `end` are the block's grains; of a pair across blocks the first grain's block keeps the books ---- */
+/* What n contacts hold; by slot in `held`, if that is not NULL. */
+void quern_dem_look(const forces_shared *, const forces_work *, quern_real *held, uint32_t n, uint32_t begin,
+	uint32_t end, quern_real *sums);
+/* What dashpots and sliding have taken from n grains. */
+void quern_dem_lose(
+	const forces_shared *, const forces_work *, uint32_t begin, uint32_t row, uint32_t n, quern_real *sums);
+/* What n grains have. */
+void quern_dem_have(const forces_shared *, const forces_work *, uint32_t begin, uint32_t n, quern_real *sums);
+
+/* What sliding takes of contact q, and what a spring gives up that has opened since the last step: no law sees that. The
+ * spring's energy is kept in `held`, by slot, which may be NULL. */
+QUERN_INLINE quern_real dem_rubbed(const forces_work *w, uint32_t q, quern_real share, quern_real *held) {
+	const bool touching = w->overlap[q] > 0;
+	quern_real rubbed = share * w->rubbed[q];
+	if (!held) return rubbed;
+	quern_real *mine = held + w->slot[q];
+	rubbed += touching ? 0 : *mine;
+	*mine = touching ? share * w->sheared[q] : 0;
+	return rubbed;
+}
 
 /* Torque over lever: -(n x f), for the first and the second alike. */
 QUERN_INLINE void dem_torques(

@@ -3,20 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-enum {
-	G_FORCE,
-	G_TORQUE = 3,
-	G_MASS = 6,
-	G_INERTIA,
-	G_POSITION,
-	G_VELOCITY = 11,
-	G_SPIN = 14,
-	G_MEAN = 17,
-	G_MEAN_SPIN = 20,
-	G_DRAG = 23,
-	G_DRAG_TORQUE = 26
-};
-
 /* How much of the old velocity the new one keeps. */
 static void compare_velocities(const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n) {
 	const quern_column *u = sh->use;
@@ -39,7 +25,7 @@ static void check_grains(
 	const quern_real *restrict radius = u[FORCE_RADIUS].real[0] + begin;
 	const quern_real dt = sh->s->dt;
 	quern_real farthest = sh->farthest[b], worst = 0;
-	quern_real *restrict way = w->grains[G_DRAG], *restrict fast = w->grains[G_DRAG + 1];
+	quern_real *restrict way = w->grains[G_WAY], *restrict fast = w->grains[G_WAY + 1];
 	memset(way, 0, n * sizeof(quern_real));
 	memset(fast, 0, n * sizeof(quern_real));
 	for (uint32_t k = 0; k < sh->s->dim; k++) {
@@ -63,30 +49,6 @@ static void check_grains(
 	sh->farthest[b] = farthest;
 }
 
-static void energies(
-	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n, quern_real *sums) {
-	const quern_column *u = sh->use;
-	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
-	for (uint32_t i = 0; i < n; i++) {
-		quern_real v2 = 0, s2 = 0, height = 0, lost = 0;
-		if (u[FORCE_FIXED].index && u[FORCE_FIXED].index[begin + i]) continue;
-		for (uint32_t k = 0; k < dim; k++) {
-			const quern_real v = w->grains[G_MEAN + k][i];
-			v2 += v * v;
-			height -= sh->s->gravity[k] * u[FORCE_OLD_POSITION].real[k][begin + i];
-			lost -= w->grains[G_DRAG + k][i] * v;
-		}
-		for (uint32_t k = 0; k < n_spin; k++) {
-			const quern_real s = w->grains[G_MEAN_SPIN + k][i];
-			s2 += s * s;
-			lost -= w->grains[G_DRAG_TORQUE + k][i] * s;
-		}
-		sums[E_KINETIC] += 0.5 * (w->grains[G_MASS][i] * v2 + w->grains[G_INERTIA][i] * s2);
-		sums[E_POTENTIAL] += w->grains[G_MASS][i] * height;
-		sums[E_DAMPED] += lost * sh->s->dt;
-	}
-}
-
 static void load_grains(
 	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t row, uint32_t n) {
 	const quern_column *u = sh->use;
@@ -100,19 +62,6 @@ static void load_grains(
 		for (uint32_t k = 0; k < dim; k++) w->grains[G_FORCE + k][i] = w->row[row + i][k];
 		for (uint32_t k = 0; k < n_spin; k++) w->grains[G_TORQUE + k][i] = w->row[row + i][dim + k];
 	}
-	for (uint32_t i = 0; i < n && sh->energy; i++) {
-		for (uint32_t k = 0; k < dim; k++) w->grains[G_DRAG + k][i] = w->drag_row[row + i][k];
-		for (uint32_t k = 0; k < n_spin; k++) w->grains[G_DRAG_TORQUE + k][i] = w->drag_row[row + i][dim + k];
-	}
-	if (sh->drag > 0)
-		for (uint32_t i = 0; i < n; i++) {
-			for (uint32_t k = 0; k < dim; k++)
-				w->grains[G_FORCE + k][i] -=
-					sh->drag * w->grains[G_MASS][i] * u[FORCE_OLD_VELOCITY].real[k][begin + i];
-			for (uint32_t k = 0; k < n_spin; k++)
-				w->grains[G_TORQUE + k][i] -=
-					sh->drag * w->grains[G_INERTIA][i] * u[FORCE_OLD_SPIN].real[k][begin + i];
-		}
 }
 
 /* Fixed grains stay; what they take up is an impulse on the others. */
@@ -133,43 +82,66 @@ static void hold_fixed(
 	}
 }
 
-void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums) {
-	const quern_bound *bound = &sh->s->slot[SLOT_INTEGRATOR][0];
-	const quern_integrator_ops *ops = bound->ops;
+/* The integrator's own columns: in place, or copies while nothing moves. */
+static void own_columns(const forces_shared *sh, const forces_work *w, const quern_bound *bound,
+	uint32_t begin, uint32_t n, quern_column *own) {
+	for (uint32_t r = 0; r < bound->n_uses; r++) {
+		const uint8_t shape = bound->uses[r].shape;
+		own[r] = quern_column_from(bound->column[r], shape, begin);
+		for (uint32_t k = 0; k < quern_shape_size(shape, sh->s->dim) && sh->looks; k++) {
+			const void *whole = quern_component(&own[r], shape, k);
+			if (!whole) continue;
+			memcpy(w->own[r][k], whole, n * (shape == QUERN_INDEX ? sizeof(int32_t) : sizeof(quern_real)));
+			quern_set_component(&own[r], shape, k, w->own[r][k]);
+		}
+	}
+}
+
+static void integrate(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n) {
+	const quern_bound *bound = dem_integrator(sh->s);
 	const quern_column *u = sh->use;
 	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
+	const bool means = sh->books || sh->looks;
+	quern_column own[QUERN_MOST_USES];
+	quern_integrator_batch batch = { .n = n,
+		.cap = GRAINS,
+		.dt = sh->s->dt,
+		.mass = w->grains[G_MASS],
+		.inertia = w->grains[G_INERTIA],
+		.use = own };
+	own_columns(sh, w, bound, begin, n, own);
+	for (uint32_t k = 0; k < dim; k++) {
+		batch.gravity[k] = sh->s->gravity[k];
+		batch.force[k] = w->grains[G_FORCE + k];
+		batch.position[k] = u[FORCE_OLD_POSITION].real[k] + begin;
+		batch.velocity[k] = u[FORCE_OLD_VELOCITY].real[k] + begin;
+		batch.new_position[k] = sh->looks ? w->grains[G_NEW_POSITION + k] : u[FORCE_POSITION].real[k] + begin;
+		batch.new_velocity[k] = sh->looks ? w->grains[G_NEW_VELOCITY + k] : u[FORCE_VELOCITY].real[k] + begin;
+		if (means) batch.mean_velocity[k] = w->grains[G_MEAN + k];
+	}
+	for (uint32_t k = 0; k < n_spin; k++) {
+		batch.torque[k] = w->grains[G_TORQUE + k];
+		batch.spin[k] = u[FORCE_OLD_SPIN].real[k] + begin;
+		batch.new_spin[k] = sh->looks ? w->grains[G_NEW_SPIN + k] : u[FORCE_SPIN].real[k] + begin;
+		if (means) batch.mean_spin[k] = w->grains[G_MEAN_SPIN + k];
+	}
+	((const quern_integrator_ops *)bound->ops)->close[dim - 2](bound->self, &batch);
+}
+
+void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums) {
+	const quern_column *sum = &sh->use[FORCE_SUM];
 	for (uint32_t begin = sh->grain[b], end = sh->grain[b + 1]; begin < end; begin += GRAINS) {
-		const uint32_t n = end - begin < GRAINS ? end - begin : GRAINS;
-		quern_column own[QUERN_MOST_USES];
-		quern_integrator_batch batch = { .n = n,
-			.cap = GRAINS,
-			.dt = sh->s->dt,
-			.mass = w->grains[G_MASS],
-			.inertia = w->grains[G_INERTIA],
-			.use = own };
-		load_grains(sh, w, begin, begin - sh->grain[b], n);
-		for (uint32_t r = 0; r < bound->n_uses; r++)
-			own[r] = quern_column_from(bound->column[r], bound->uses[r].shape, begin);
-		for (uint32_t k = 0; k < dim; k++) {
-			batch.gravity[k] = sh->s->gravity[k];
-			batch.force[k] = w->grains[G_FORCE + k];
-			batch.position[k] = u[FORCE_OLD_POSITION].real[k] + begin;
-			batch.velocity[k] = u[FORCE_OLD_VELOCITY].real[k] + begin;
-			batch.new_position[k] = u[FORCE_POSITION].real[k] + begin;
-			batch.new_velocity[k] = u[FORCE_VELOCITY].real[k] + begin;
-			if (sh->energy) batch.mean_velocity[k] = w->grains[G_MEAN + k];
-			if (u[FORCE_SUM].real[0])
-				memcpy(u[FORCE_SUM].real[k] + begin, batch.force[k], n * sizeof(quern_real));
+		const uint32_t n = end - begin < GRAINS ? end - begin : GRAINS, row = begin - sh->grain[b];
+		load_grains(sh, w, begin, row, n);
+		for (uint32_t k = 0; k < sh->s->dim && sum->real[0]; k++)
+			memcpy(sum->real[k] + begin, w->grains[G_FORCE + k], n * sizeof(quern_real));
+		integrate(sh, w, begin, n);
+		if (sh->looks) {
+			quern_dem_have(sh, w, begin, n, sums);
+			continue;
 		}
-		for (uint32_t k = 0; k < n_spin; k++) {
-			batch.torque[k] = w->grains[G_TORQUE + k];
-			batch.spin[k] = u[FORCE_OLD_SPIN].real[k] + begin;
-			batch.new_spin[k] = u[FORCE_SPIN].real[k] + begin;
-			if (sh->energy) batch.mean_spin[k] = w->grains[G_MEAN_SPIN + k];
-		}
-		ops->close[dim - 2](bound->self, &batch);
 		hold_fixed(sh, w, b, begin, n);
-		if (sh->energy) energies(sh, w, begin, n, sums);
+		if (sh->books) quern_dem_lose(sh, w, begin, row, n, sums);
 		check_grains(sh, b, begin, n, w);
 		compare_velocities(sh, b, begin, n);
 	}

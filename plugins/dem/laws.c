@@ -101,12 +101,12 @@ void quern_dem_call_laws(
 		const void *self = body >= 0 && law->n_variant ? law->variant[body] : law->self;
 		gather_rows(sh, w, law, rows, body >= 0, begin, n, use, use_second);
 		if (n) ((const quern_contact_ops *)law->ops)->force[sh->s->dim - 2](self, &b);
-		scatter_rows(sh, w, law, rows, body >= 0, begin, n_slots, n);
+		if (!sh->looks) scatter_rows(sh, w, law, rows, body >= 0, begin, n_slots, n);
 		rows += law->n_uses;
 	}
 }
 
-void quern_dem_add_couples(const forces_shared *sh, const forces_work *w, quern_real (*row)[8],
+void quern_dem_add_couples(const forces_shared *sh, const forces_work *w, quern_real (*row)[8], uint32_t lane,
 	quern_real *const couple[3], int32_t body, uint32_t first, uint32_t last, uint32_t n) {
 	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
 	const uint32_t spare = last - first, dim = sh->s->dim, turns = dim == 3 ? 3 : 1;
@@ -114,8 +114,8 @@ void quern_dem_add_couples(const forces_shared *sh, const forces_work *w, quern_
 		const uint32_t i = (uint32_t)w->first[q] - first, j = (uint32_t)w->second[q] - first;
 		const quern_real share = weighted ? w->weight[q] : 1;
 		for (uint32_t k = 0; k < turns; k++) {
-			row[i < spare ? i : spare][dim + k] += share * couple[k][q];
-			if (body < 0) row[j < spare ? j : spare][dim + k] -= share * couple[k][q];
+			row[i < spare ? i : spare][lane + k] += share * couple[k][q];
+			if (body < 0) row[j < spare ? j : spare][lane + k] -= share * couple[k][q];
 		}
 	}
 }

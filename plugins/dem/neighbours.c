@@ -342,6 +342,11 @@ static quern_status keep_inside(const listing *l) {
 	return QUERN_OK;
 }
 
+/* Before the first step there is no list yet, and after it there always is one. */
+quern_status quern_dem_list(const void *self, const quern_step *s) {
+	return isinf(s->use[NEAR_DISPLACEMENT].real[0][0]) ? quern_dem_neighbours(self, s) : QUERN_OK;
+}
+
 quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 	listing l = { .d = self, .s = s, .search = &s->slot[SLOT_NEIGHBOURS][0] };
 	l.ops = l.search->ops;

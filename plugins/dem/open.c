@@ -60,7 +60,7 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 }
 
 quern_status quern_dem_open(const void *self, const quern_step *s) {
-	opening o = { .s = s, .bound = &s->slot[SLOT_INTEGRATOR][0], .n = s->host->set(s->run, "grain").n };
+	opening o = { .s = s, .bound = dem_integrator(s), .n = s->host->set(s->run, "grain").n };
 	(void)self;
 	if (!((const quern_integrator_ops *)o.bound->ops)->open[s->dim - 2] || !o.n) return QUERN_OK;
 	o.n_spin = s->use[OPEN_SPIN].real[0] ? (s->dim == 3 ? 3 : 1) : 0;

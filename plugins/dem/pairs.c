@@ -21,9 +21,10 @@ QUERN_INLINE quern_vec nearest(quern_vec d, period p, const int dim) {
 		dim == 3 ? image(d.z, p.half.z, p.length.z) : 0 };
 }
 
-/* Slots whose grains are within the laws' reach, in list order. */
-QUERN_INLINE uint32_t compact(
-	const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n, const int dim) {
+/* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what it
+ * held is booked. */
+QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n,
+	const quern_real *held, const int dim) {
 	const quern_column at = sh->use[FORCE_OLD_POSITION];
 	const quern_real *restrict x = at.real[0], *restrict y = at.real[1], *restrict z = at.real[2];
 	const quern_real *restrict radius = sh->use[FORCE_RADIUS].real[0];
@@ -40,7 +41,11 @@ QUERN_INLINE uint32_t compact(
 		const quern_vec d =
 			nearest((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
 		const quern_real most = radius[i] + radius[j] + reach;
-		near[k] = quern_vec_dot(d, d, dim) < most * most;
+		near[k] = (quern_vec_dot(d, d, dim) < most * most);
+	}
+	if (held) {
+		QUERN_SIMD
+		for (uint32_t k = 0; k < n; k++) near[k] |= held[k] > 0;
 	}
 	for (uint32_t k = 0; k < n; k++) {
 		const int32_t is = near[k];
@@ -174,28 +179,71 @@ QUERN_INLINE void add_pairs(const forces_shared *sh, const forces_work *w, quern
 	}
 }
 
+/* The same with what dashpots give, in the lanes behind, and what sliding takes. The force's lanes get the same bits. */
+QUERN_INLINE void add_pairs_2d(const forces_shared *sh, const forces_work *w, quern_real *held,
+	uint32_t begin, uint32_t end, uint32_t n, const bool spin) {
+	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
+	const uint32_t spare = end - begin;
+	for (uint32_t q = 0; q < n; q++) {
+		uint32_t i = (uint32_t)w->first[q] - begin, j = (uint32_t)w->second[q] - begin;
+		i = i < spare ? i : spare;
+		j = j < spare ? j : spare;
+		const quern_real share = weighted ? w->weight[q] : 1, a = w->arm[0][q], b = w->arm[1][q];
+		const lanes8 f = { w->force[0][q], w->force[1][q], spin ? w->torque[0][q] : 0, w->dashpot[0][q],
+			w->dashpot[1][q], spin ? w->drag_torque[0][q] : 0, 0, 0 };
+		const lanes8 one = { 0, 0, 0, 0, 0, 0, dem_rubbed(w, q, share, held), 0 };
+		const lanes8 given = share * f + one, to_first = { 1, 1, a, 1, 1, a, 1, 0 },
+					 to_second = { -1, -1, b, -1, -1, b, 0, 0 };
+		*(lanes8 *)(void *)w->row[i] += to_first * given;
+		*(lanes8 *)(void *)w->row[j] += to_second * given;
+	}
+}
+
+static void add_rubbed(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t begin,
+	uint32_t end, uint32_t n) {
+	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
+	const uint32_t spare = end - begin;
+	for (uint32_t q = 0; q < n; q++) {
+		const uint32_t i = (uint32_t)w->first[q] - begin;
+		w->row[i < spare ? i : spare][LANE_RUBBED] += dem_rubbed(w, q, weighted ? w->weight[q] : 1, held);
+	}
+}
+
+/* Forces and torques to the grains of a block, and with them, if they are booked, losses. */
+QUERN_INLINE void add_all(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t first,
+	uint32_t last, uint32_t n, const int dim, const bool spin) {
+	if (spin) dem_torques(w, w->force, w->torque, n, dim);
+	if (sh->books && spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
+	if (sh->books && dim == 2) add_pairs_2d(sh, w, held, first, last, n, spin);
+	else add_pairs(sh, w, w->row, w->force, w->torque, first, last, n, dim, spin);
+	if (sh->books && dim == 3) {
+		add_pairs(sh, w, w->drag_row, w->dashpot, w->drag_torque, first, last, n, dim, spin);
+		add_rubbed(sh, w, held, first, last, n);
+	}
+	if (!spin || !sh->couple) return;
+	quern_dem_add_couples(sh, w, w->row, (uint32_t)dim, w->couple, -1, first, last, n);
+	if (sh->books)
+		quern_dem_add_couples(sh, w, dim == 2 ? w->row : w->drag_row, dim == 2 ? LANE_DRAG + 2 : 3,
+			w->drag_couple, -1, first, last, n);
+}
+
 QUERN_INLINE void block(
 	const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums, const int dim, const bool spin) {
 	const uint32_t first = sh->grain[b], last = sh->grain[b + 1];
 	for (uint32_t begin = sh->contact[b], end = sh->contact[b + 1]; begin < end; begin += sh->cap) {
 		const uint32_t n_slots = end - begin < sh->cap ? end - begin : sh->cap;
-		const uint32_t n = compact(sh, w, begin, n_slots, dim);
+		quern_real *held = sh->use[FORCE_CONTACT_SHEARED].real[0];
+		held = held && (sh->books || sh->starts) ? held + begin : NULL;
+		const uint32_t n = compact(sh, w, begin, n_slots, held, dim);
 		geometry(sh, w, n, dim);
 		motion(sh, w, n, dim, spin);
 		masses(sh, w, n);
 		quern_dem_call_laws(sh, w, -1, begin, n_slots, n);
-		if (sh->deep) quern_dem_look_at_contacts(sh, w, b, -1, n);
-		if (spin) dem_torques(w, w->force, w->torque, n, dim);
-		add_pairs(sh, w, w->row, w->force, w->torque, first, last, n, dim, spin);
-		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->row, w->couple, -1, first, last, n);
+		if (sh->deep) quern_dem_check_contacts(sh, w, b, -1, n);
+		add_all(sh, w, held, first, last, n, dim, spin);
 		quern_dem_keep(w, w->force, sh->use[FORCE_CONTACT], (uint32_t)dim, begin, n_slots, n);
 		quern_dem_keep(w, w->couple, sh->use[FORCE_CONTACT_COUPLE], dim == 3 ? 3 : 1, begin, n_slots, n);
-		if (!sh->energy) continue;
-		if (spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
-		add_pairs(sh, w, w->drag_row, w->dashpot, w->drag_torque, first, last, n, dim, spin);
-		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->drag_row, w->drag_couple, -1, first, last, n);
-		quern_dem_book(sh, w, sh->use[FORCE_CONTACT_SHEARED], begin, n_slots, n, first, last,
-			sh->use[FORCE_FIRST].index + begin, sums);
+		if (sh->looks) quern_dem_look(sh, w, held, n, first, last, sums);
 	}
 }
 

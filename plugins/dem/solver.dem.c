@@ -48,9 +48,9 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 	QUERN_PARAM_AS(dem, rest, "settle.energy", "1",
 		"At rest when the mean kinetic energy of a grain is below this share of m g d.", .def = 1e-5,
 		.flags = QUERN_MIN_OPEN, .max = 1),
-	QUERN_PARAM_AS(dem, drag, "settle.drag", "1/s",
-		"Drag on every grain while settling; default sqrt(g/d)/10.", .flags = QUERN_MAYBE, .min = 0,
-		.max = 1e9),
+	QUERN_PARAM_AS(dem, settle_step, "settle.step", "1",
+		"Step while settling, over half the shortest period of a contact.", .def = 0.1, .max = 0.2,
+		.flags = QUERN_MIN_OPEN),
 	QUERN_PARAM_AS(dem, settle_most, "settle.most", "1",
 		"Most steps of settling; then the run goes on with a warning.", .def = 1e6, .min = 1, .max = 2e9),
 	QUERN_PARAM(dem, fixed, NULL,
@@ -91,6 +91,11 @@ static const quern_slot slots[] = {
 		.kind = QUERN_PACKER,
 		.def = "two_point_tangent",
 		.stage = { "dem.fill" } },
+	{ .name = "settling",
+		.doc = "the step in time while settling",
+		.kind = QUERN_INTEGRATOR,
+		.def = "damped",
+		.stage = { "dem.forces", "dem.open" } },
 	{ .name = NULL }
 };
 
@@ -129,48 +134,46 @@ static const quern_use near_uses[] = { F("grain.position", "m", QUERN_UPDATE, QU
 		.doc = "The body's face, edge or vertex."),
 	QUERN_END_USES };
 #define ENERGY(name, access, text)                                                                           \
-	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .doc = text)
-static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR,
-											.flags = QUERN_OTHERS),
-	F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),
-	F("grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL),
-	F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
-	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
-	F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
-	F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL),
-	FIXED(QUERN_READ), F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), DISPLACEMENT,
-	F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
-	F("contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
-	F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),
-	F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body"),
-	F("contact.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
-		.doc = "On the first, unweighted."),
-	F("touch.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
-		.doc = "On the grain, unweighted."),
-	F("grain.force", "N", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
-		.doc = "Of all contacts, weighted; without gravity."),
-	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
-	F("total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,
+	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, .doc = text)
+/* What a look at the forces takes too, without moving anything. */
+#define FORCE_USES(moves, gives)                                                                             \
+	F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                               \
+		F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                         \
+		F("grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL),           \
+		F("grain.position", "m", moves, QUERN_VECTOR), F("grain.velocity", "m/s", moves, QUERN_VECTOR),      \
+		F("grain.spin", "rad/s", moves, QUERN_AXIAL, .flags = QUERN_OPTIONAL),                               \
+		F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                             \
+		F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                              \
+		F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL),            \
+		FIXED(QUERN_READ), F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),              \
+		F("contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                \
+		F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                   \
+		F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body"),                                     \
+		F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"),                                \
+		F("contact.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                \
+			.doc = "On the first, unweighted."),                                                             \
+		F("touch.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
+			.doc = "On the grain, unweighted."),                                                             \
+		F("contact.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                              \
+			.doc = "On the first, unweighted."),                                                             \
+		F("touch.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                                \
+			.doc = "On the grain, unweighted."),                                                             \
+		F("grain.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
+			.doc = "Of all contacts, weighted; without gravity."),                                           \
+		F("contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED,                       \
+			.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step."),         \
+		F("touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, .with = "total.rubbed", \
+			.doc = "In the tangential spring, weighted, at the last step."),                                 \
+		F("grain.id", "1", QUERN_READ, QUERN_ID)
+static const quern_use force_uses[] = { FORCE_USES(QUERN_UPDATE, QUERN_WRITE),
+	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), DISPLACEMENT,
+	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED),
+	F("total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED,
 		.doc = "Impulse that fixed grains have given to moving ones."),
-	F("contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "In the tangential spring."),
-	F("touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "In the tangential spring."),
-	ENERGY("kinetic", QUERN_WRITE, "Of the grains."),
-	ENERGY("potential", QUERN_WRITE, "Of the grains, -m g x."),
-	ENERGY("stored", QUERN_WRITE, "In normal springs."),
-	ENERGY("sheared", QUERN_WRITE, "In tangential springs."),
 	ENERGY("damped", QUERN_UPDATE, "Lost in dashpots so far."),
-	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."), F("grain.id", "1", QUERN_READ, QUERN_ID),
+	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."),
 	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
 		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
-	F("contact.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
-		.doc = "On the first, unweighted."),
-	F("touch.couple", "N m", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL,
-		.doc = "On the grain, unweighted."),
-	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"),
 	F("total.deep_first", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", .initial = -1,
 		.doc = "Id of the grain whose deep contact is watched; -1: none is."),
 	F("total.deep_second", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
@@ -178,6 +181,11 @@ static const quern_use force_uses[] = { F("grain.position", "m", QUERN_READ, QUE
 	F("total.deep_time", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
 		.doc = "For how long the contact has been deep."),
 	QUERN_END_USES };
+static const quern_use observe_uses[] = { FORCE_USES(QUERN_READ, QUERN_UPDATE),
+	ENERGY("kinetic", QUERN_WRITE, "Of the grains, with the velocity in the middle of a kick."),
+	ENERGY("potential", QUERN_WRITE, "Of the grains, -m g x."),
+	ENERGY("stored", QUERN_WRITE, "In normal springs."),
+	ENERGY("sheared", QUERN_WRITE, "In tangential springs."), QUERN_END_USES };
 
 static const quern_stage stages[] = { { .name = "dem.fill",
 										  .doc = "Places the first grains.",
@@ -200,6 +208,17 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 		.phase = QUERN_GRAINS,
 		.uses = force_uses,
 		.run = quern_dem_forces },
+	{ .name = "dem.list",
+		.doc = "The first list, if nothing has moved yet.",
+		.phase = QUERN_OUTPUT,
+		.sometimes = 1,
+		.uses = near_uses,
+		.run = quern_dem_list },
+	{ .name = "dem.observe",
+		.doc = "Forces and energies of the state as it is.",
+		.phase = QUERN_OUTPUT,
+		.uses = observe_uses,
+		.run = quern_dem_observe },
 	{ .name = NULL } };
 
 static quern_status refuse_settling(const dem *d, const quern_setup *setup, quern_err *err, const char *why) {
@@ -246,7 +265,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (d->settles && !(g2 > 0))
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
-	if (isnan(d->drag)) d->drag = 0.1 * sqrt(gravity / diameter);
+	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
 	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
 	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
@@ -379,6 +398,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		snprintf(reason, 160, "%s %s%s, half-period %.3g s%s%s", found.law, found.where, found.body,
 			found.period, by_period ? " / 50" : "", damped);
 	else snprintf(reason, 160, "grains without a contact law");
+	if (s->settling && d->settle_step * found.period < found.hard) return d->settle_step * found.period;
 	return by_period ? found.period / 50 : 0.5 * found.hard;
 }
 

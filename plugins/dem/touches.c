@@ -58,16 +58,29 @@ QUERN_INLINE void touch_body(const forces_shared *sh, forces_work *w, uint32_t b
 }
 
 QUERN_INLINE void add_touches(const forces_shared *sh, const forces_work *w, quern_real (*row)[8],
-	quern_real *const force[3], quern_real *const torque[3], uint32_t first, uint32_t n, const int dim,
-	const bool spin) {
+	uint32_t lane, quern_real *const force[3], quern_real *const torque[3], uint32_t first, uint32_t n,
+	const int dim, const bool spin) {
 	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
 	for (uint32_t q = 0; q < n; q++) {
 		quern_real *r = row[(uint32_t)w->first[q] - first];
 		const quern_real share = weighted ? w->weight[q] : 1;
-		for (int k = 0; k < dim; k++) r[k] += share * force[k][q];
+		for (int k = 0; k < dim; k++) r[(int)lane + k] += share * force[k][q];
 		for (int k = 0; k < (dim == 3 ? 3 : 1) && spin; k++)
-			r[dim + k] += share * w->arm[0][q] * torque[k][q];
+			r[(int)lane + dim + k] += share * w->arm[0][q] * torque[k][q];
 	}
+}
+
+QUERN_INLINE void add_losses(const forces_shared *sh, const forces_work *w, quern_real *held, int32_t body,
+	uint32_t first, uint32_t last, uint32_t n, const int dim, const bool spin) {
+	quern_real(*row)[8] = dim == 2 ? w->row : w->drag_row;
+	const uint32_t lane = dim == 2 ? LANE_DRAG : 0;
+	if (spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
+	add_touches(sh, w, row, lane, w->dashpot, w->drag_torque, first, n, dim, spin);
+	if (spin && sh->couple)
+		quern_dem_add_couples(sh, w, row, lane + (uint32_t)dim, w->drag_couple, body, first, last, n);
+	for (uint32_t q = 0; q < n; q++)
+		w->row[(uint32_t)w->first[q] - first][LANE_RUBBED] +=
+			dem_rubbed(w, q, sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1, held);
 }
 
 QUERN_INLINE void block(
@@ -78,22 +91,21 @@ QUERN_INLINE void block(
 		for (n = 1; begin + n < end && n < sh->cap && body[begin + n] == body[begin]; n++) {}
 		touch_body(sh, w, (uint32_t)body[begin], begin, n, dim, spin);
 		quern_dem_call_laws(sh, w, body[begin], begin, n, n);
-		if (sh->deep) quern_dem_look_at_contacts(sh, w, b, body[begin], n);
+		if (sh->deep) quern_dem_check_contacts(sh, w, b, body[begin], n);
 		if (spin) dem_torques(w, w->force, w->torque, n, dim);
-		add_touches(sh, w, w->row, w->force, w->torque, first, n, dim, spin);
-		if (spin && sh->couple) quern_dem_add_couples(sh, w, w->row, w->couple, body[begin], first, last, n);
+		add_touches(sh, w, w->row, 0, w->force, w->torque, first, n, dim, spin);
+		if (spin && sh->couple)
+			quern_dem_add_couples(sh, w, w->row, (uint32_t)dim, w->couple, body[begin], first, last, n);
 		quern_dem_keep(w, w->force, sh->use[FORCE_TOUCH], (uint32_t)dim, begin, n, n);
 		quern_dem_keep(w, w->couple, sh->use[FORCE_TOUCH_COUPLE], dim == 3 ? 3 : 1, begin, n, n);
 		quern_real *impulse = sh->impulse + ((size_t)b * (sh->n_bodies + 1) + (uint32_t)body[begin]) * 3;
 		for (uint32_t q = 0; q < n; q++)
 			for (int k = 0; k < dim; k++)
 				impulse[k] += (sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1) * w->force[k][q] * sh->s->dt;
-		if (!sh->energy) continue;
-		if (spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
-		add_touches(sh, w, w->drag_row, w->dashpot, w->drag_torque, first, n, dim, spin);
-		if (spin && sh->couple)
-			quern_dem_add_couples(sh, w, w->drag_row, w->drag_couple, body[begin], first, last, n);
-		quern_dem_book(sh, w, sh->use[FORCE_TOUCH_SHEARED], begin, n, n, 0, UINT32_MAX, w->first, sums);
+		quern_real *held = sh->use[FORCE_TOUCH_SHEARED].real[0];
+		held = held && (sh->books || sh->starts) ? held + begin : NULL;
+		if (sh->books) add_losses(sh, w, held, body[begin], first, last, n, dim, spin);
+		if (sh->looks) quern_dem_look(sh, w, held, n, first, last, sums);
 	}
 }
 

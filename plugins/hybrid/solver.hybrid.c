@@ -109,8 +109,8 @@ static const quern_use sample_uses[] = { F("contact.force", "N", QUERN_READ, QUE
 	F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL),
 	F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body", .flags = QUERN_OPTIONAL),
 	F("grain.position", "m", QUERN_READ, QUERN_VECTOR), F("grain.radius", "m", QUERN_READ, QUERN_SCALAR),
-	FIXED, F("cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC),
-	F("total.samples", "1", QUERN_UPDATE, QUERN_SCALAR),
+	FIXED, F("cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, .flags = QUERN_RELEASED),
+	F("total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED),
 	F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL), QUERN_END_USES };
 
 static const quern_use raster_uses[] = { F("grain.position", "m", QUERN_READ, QUERN_VECTOR),

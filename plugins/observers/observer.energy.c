@@ -17,9 +17,7 @@ enum {
 	SHEARED,
 	DAMPED,
 	RUBBED,
-	EXCHANGED,
-	CONTACT_SHEARED,
-	TOUCH_SHEARED
+	EXCHANGED
 };
 #define LOOK(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_OPTIONAL)
 #define WANT(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_WANTED)
@@ -29,8 +27,7 @@ static const quern_use uses[] = { CLOUD_USES, LOOK("grain.position", "m", QUERN_
 	LOOK("point.velocity", "m/s", QUERN_VECTOR), WANT("point.energy", "J/kg", QUERN_SCALAR),
 	WANT("total.stored", "J", QUERN_SCALAR), WANT("total.sheared", "J", QUERN_SCALAR),
 	WANT("total.damped", "J", QUERN_SCALAR), WANT("total.rubbed", "J", QUERN_SCALAR),
-	WANT("total.exchanged", "J", QUERN_SCALAR), WANT("contact.sheared", "J", QUERN_SCALAR),
-	WANT("touch.sheared", "J", QUERN_SCALAR), QUERN_END_USES };
+	WANT("total.exchanged", "J", QUERN_SCALAR), QUERN_END_USES };
 
 enum { KINETIC, SPINNING, POINTS, POTENTIAL, SPRINGS, TANGENTIAL, ELASTIC, DASHPOTS, SLIDING, COUPLING, SUM };
 static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = "Kinetic, of grains." },

@@ -142,6 +142,7 @@ static double budget_gap(int dim, int n) {
 	for (int step_of = 0; quern_run_time(run) < 0.02; step_of++) {
 		double sum = 0;
 		harness_steps(run, 1);
+		harness_look(run);
 		for (int p = 0; p < 6; p++) sum += harness_field(run, parts[p]).real[0][0];
 		if (step_of == 0) first = sum, kinetic = harness_field(run, parts[0]).real[0][0];
 		worst = fmax(worst, fabs(sum - first));

@@ -16,6 +16,7 @@ static double total(quern_run *run, const char *name) { return harness_field(run
 
 /* Of motion, weight and springs, all at one time. */
 static double mechanical(quern_run *run) {
+	harness_look(run);
 	return total(run, "total.kinetic") + total(run, "total.potential") + total(run, "total.stored") +
 		   total(run, "total.sheared");
 }
@@ -144,8 +145,8 @@ static void bed_row(const bed *b, double factor) {
 	const double before = mechanical(run);
 	for (int64_t i = beyond_is_long() && b->dim == 2 ? 20000 : 4000; i > 0 && harness_try(run, 1) == QUERN_OK;
 		 i--) {
-		moving = fmax(moving, total(run, "total.kinetic"));
 		gained = fmax(gained, mechanical(run) - before);
+		moving = fmax(moving, total(run, "total.kinetic"));
 	}
 	beyond_row("%s | %.3g | %.2g | %.2g | %lld | %s", b->name, factor, moving / unit, gained / unit,
 		(long long)run->clock.step, beyond_message(run));

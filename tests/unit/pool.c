@@ -7,9 +7,14 @@
 #include <cmocka.h>
 
 #include <math.h>
+#include <platform.h>
 #include <pool.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
 
 enum { N = 5000 };
 
@@ -45,6 +50,68 @@ static void every_index_once(void **state) {
 	}
 }
 
+typedef struct {
+	_Atomic uint32_t count[16];
+} counts;
+
+static void count_one(void *arg, uint32_t i, uint32_t worker) {
+	(void)worker;
+	atomic_fetch_add(&((counts *)arg)->count[i], 1);
+}
+
+/* Threads that come late, sleep, or are woken in between take no index of another round: short rounds of changing
+ * length, each with counts of its own, some after a pause that lets all of them fall asleep. */
+static void rounds_do_not_mix(void **state) {
+	enum { ROUNDS = 20000 };
+	(void)state;
+	quern_pool *pool = quern_pool_create(4);
+	counts *all = calloc(ROUNDS, sizeof *all);
+	assert_non_null(all);
+	for (uint32_t r = 0; r < ROUNDS; r++) {
+		quern_pool_each(pool, 2 + r * 7 % 13, count_one, &all[r]);
+		if (r % 4000 == 0) nanosleep(&(struct timespec) { .tv_nsec = 3000000 }, NULL);
+	}
+	for (uint32_t r = 0; r < ROUNDS; r++)
+		for (uint32_t i = 0; i < 16; i++) assert_int_equal(all[r].count[i], i < 2 + r * 7 % 13);
+	free(all);
+	quern_pool_destroy(pool);
+}
+
+/* Nobody waits for a thread that has taken nothing: here none exists any more, as in a process that was forked. */
+static void caller_does_it_alone(void **state) {
+	(void)state;
+	quern_pool *pool = quern_pool_create(3);
+	counts own = { 0 };
+	const pid_t child = fork();
+	if (child == 0) {
+		quern_pool_each(pool, 16, count_one, &own);
+		for (int i = 0; i < 16; i++)
+			if (own.count[i] != 1) _exit(1);
+		_exit(0);
+	}
+	int status = -1;
+	assert_int_equal(waitpid(child, &status, 0), child);
+	assert_int_equal(status, 0);
+	quern_pool_destroy(pool);
+}
+
+/* The number of workers can be had from the environment, where batch systems put it; nonsense there is passed over. */
+static void environment_is_heard(void **state) {
+	(void)state;
+	setenv("OMP_NUM_THREADS", "3", 1);
+	quern_pool *pool = quern_pool_create(0);
+	assert_int_equal(quern_pool_workers(pool), 3);
+	quern_pool_destroy(pool);
+	pool = quern_pool_create(2);
+	assert_int_equal(quern_pool_workers(pool), 2);
+	quern_pool_destroy(pool);
+	setenv("OMP_NUM_THREADS", "many", 1);
+	pool = quern_pool_create(0);
+	assert_int_equal(quern_pool_workers(pool), quern_platform_processors());
+	quern_pool_destroy(pool);
+	unsetenv("OMP_NUM_THREADS");
+}
+
 static void scratch_grows(void **state) {
 	quern_pool *pool = quern_pool_create(2);
 	(void)state;
@@ -77,7 +144,9 @@ static void tree_sums(void **state) {
 }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(every_index_once), cmocka_unit_test(scratch_grows),
+	const struct CMUnitTest tests[] = { cmocka_unit_test(every_index_once),
+		cmocka_unit_test(rounds_do_not_mix), cmocka_unit_test(caller_does_it_alone),
+		cmocka_unit_test(environment_is_heard), cmocka_unit_test(scratch_grows),
 		cmocka_unit_test(tree_sums) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* look - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains out of the
+/* checks - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains out of the
  * domain. docs/decisions/0015-too-deep.md */
 #include "forces.h"
 #include <math.h>
@@ -6,12 +6,10 @@
 
 enum { EVERY = 50, LASTS = 5 }; /* steps, about a contact's duration; durations */
 
-void quern_dem_decide_looks(forces_shared *sh) {
-	const quern_step *s = sh->s;
-	const bool regular = (s->substep + 1) % EVERY == 0;
-	const bool output = s->before_output && (s->substep + 1) % s->n_substeps == 0;
-	sh->looks = regular || output;
-	sh->deep = regular && sh->n_laws && sh->d->overlap_most > 0;
+void quern_dem_decide_checks(forces_shared *sh) {
+	const bool regular = (sh->s->substep + 1) % EVERY == 0;
+	sh->checks = regular || sh->looks;
+	sh->deep = regular && !sh->looks && sh->n_laws && sh->d->overlap_most > 0;
 }
 
 static bool is_watched(const forces_shared *sh, const deep_contact *c) {
@@ -39,7 +37,7 @@ static bool is_worse(const deep_contact *a, const deep_contact *b) {
 	return a->first != b->first ? a->first < b->first : a->second < b->second;
 }
 
-void quern_dem_look_at_contacts(
+void quern_dem_check_contacts(
 	const forces_shared *sh, const forces_work *w, uint32_t b, int32_t body, uint32_t n) {
 	const quern_real *radius = sh->use[FORCE_RADIUS].real[0];
 	const int64_t *id = sh->use[FORCE_ID].id;
@@ -59,7 +57,7 @@ void quern_dem_look_at_contacts(
 	}
 }
 
-void quern_dem_look_at_grains(const forces_shared *sh, uint32_t b) {
+void quern_dem_check_grains(const forces_shared *sh, uint32_t b) {
 	const quern_step *s = sh->s;
 	const quern_column *u = sh->use;
 	const int32_t *fixed = u[FORCE_FIXED].index;

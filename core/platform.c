@@ -1,0 +1,41 @@
+#include "platform.h"
+#include <math.h>
+#include <sched.h>
+#include <stdio.h>
+#include <string.h>
+
+/* Quota over period of a container, in processors; INFINITY where there is none. */
+static double quota_of(const char *quota_file, const char *period_file) {
+	char quota[32] = "";
+	double period = 0, amount = 0;
+	FILE *file = fopen(quota_file, "r");
+	if (!file) return INFINITY;
+	const int n = fscanf(file, "%31s %lf", quota, &period);
+	fclose(file);
+	if (n == 1 && period_file && (file = fopen(period_file, "r"))) {
+		if (fscanf(file, "%lf", &period) != 1) period = 0;
+		fclose(file);
+	}
+	if (sscanf(quota, "%lf", &amount) != 1 || !(amount > 0 && period > 0)) return INFINITY; /* "max", or -1 */
+	return amount / period;
+}
+
+uint32_t quern_platform_processors(void) {
+	cpu_set_t set;
+	CPU_ZERO(&set);
+	const int bound = sched_getaffinity(0, sizeof set, &set) ? 1 : CPU_COUNT(&set);
+	const double now = quota_of("/sys/fs/cgroup/cpu.max", NULL);
+	const double old =
+		quota_of("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us");
+	const double paid = ceil(fmin(now, old));
+	const double most = fmin(paid, bound);
+	return most < 1 ? 1 : (uint32_t)most;
+}
+
+void quern_platform_pause(void) {
+#if defined(__x86_64__)
+	__builtin_ia32_pause();
+#elif defined(__aarch64__)
+	__asm__ volatile("isb");
+#endif
+}
