@@ -4,10 +4,15 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { EVERY = 50, LASTS = 5 }; /* steps, about a contact's duration; durations */
+enum { LASTS = 5 }; /* durations of a contact */
+
+/* Steps, about a contact's duration. */
+static uint32_t every(const forces_shared *sh) {
+	return sh->s->settling ? (uint32_t)(1 / sh->d->settle_step) : 50;
+}
 
 void quern_dem_decide_checks(forces_shared *sh) {
-	const bool regular = (sh->s->substep + 1) % EVERY == 0;
+	const bool regular = (sh->s->substep + 1) % every(sh) == 0;
 	sh->checks = regular || sh->looks;
 	sh->deep = regular && !sh->looks && sh->n_laws && sh->d->overlap_most > 0;
 }
@@ -97,7 +102,8 @@ static quern_status stop_deep(const forces_shared *sh, const deep_contact *c, co
 }
 
 /* An impact may go deep for a while, and one contact after another may: so one is watched, the deepest at first, until it is
- * no longer deep. One that is watched for several of its own durations lasts; a centre behind a surface is enough at once. */
+ * no longer deep. One that is watched for several of its own durations lasts; a centre behind a surface is enough at once.
+ * What falls into place while settling bears the shock of all that falls behind it, which is over by the release. */
 quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_column *u = sh->use;
 	deep_contact worst = { .by = 0 }, watched = { .by = 0 };
@@ -107,8 +113,8 @@ quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks
 	}
 	quern_real *time = u[FORCE_DEEP_TIME].real[0];
 	if (worst.by >= 1) return stop_deep(sh, &worst, ", its centre behind the surface,");
-	if (watched.by > 0) {
-		*time += EVERY * sh->s->dt;
+	if (watched.by > 0 && !sh->s->settling) {
+		*time += every(sh) * sh->s->dt;
 		if (*time >= LASTS * watched.period) return stop_deep(sh, &watched, " for long");
 		return QUERN_OK;
 	}
