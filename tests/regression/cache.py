@@ -1,0 +1,99 @@
+"""Settled states are kept: a second run of the same beginning starts from one, to the same bits, whoever made it."""
+import os
+import pathlib
+import shutil
+
+import h5py
+
+import lab
+import workshop
+
+OPTIONS = [*lab.SMALL["column"], "--set=time.end=10 ms", "--set=output.every=5 ms",
+           "--set=grains.fill.1.region.box.upper=[0.039, 0.08]", "--set=grains.settle.step=0.05"]
+TAKEN, KEPT = "settled already: ", "settled state kept in "
+
+
+def run(out, cache, *options, **how):
+    lab.run("column", out, *OPTIONS, *options, QUERN_CACHE=str(cache), **how)
+    return (out / "log.txt").read_text()
+
+
+def files(cache):
+    return sorted(cache.glob("settled-*.h5")) if cache.exists() else []
+
+
+def same_bits(place, cache):
+    """The hybrid, with its energies, from its own state; and nothing is read or written that should not be."""
+    log = run(place / "none", cache, "--no-cache")
+    assert not files(cache) and TAKEN not in log and KEPT not in log
+    assert KEPT in run(place / "first", cache) and len(files(cache)) == 1
+    lab.same(place / "none", place / "first", "a state kept")
+    assert TAKEN in run(place / "second", cache, threads=2)
+    lab.same(place / "none", place / "second", "a state taken, two threads")
+    one, two = lab.summary(place / "first"), lab.summary(place / "second")
+    assert one["settle_steps"] == two["settle_steps"] > 1000
+    assert two["settle_seconds"] < one["settle_seconds"] / 5, (one["settle_seconds"], two["settle_seconds"])
+    assert TAKEN not in run(place / "not", cache, "--no-cache")
+
+
+def shared(place, cache):
+    """What does not act while grains settle does not ask for a state of its own: twins, oracles, observers, steps, fields."""
+    for name, options in {"grains": ["--set=model=grains"], "oracle": ["--set=hybrid.substeps=3"],
+                          "observe": ["--set=observe=[]"], "fields": ["--set=output.fields=[]"],
+                          "verlet": ["--set=model=grains", "--set=grains.integrator=velocity_verlet"]}.items():
+        own = place / f"{name}_own"
+        log = run(place / name, cache, *options)
+        if name == "verlet":  # its keys stand in the section: a state of its own, by caution
+            assert KEPT in log
+            continue
+        assert TAKEN in log, f"{name}: {log}"
+        run(own, cache, "--no-cache", *options)
+        lab.same(own, place / name, f"another run's state, {name}")
+    assert len(files(cache)) == 2
+
+
+def apart(place, cache):
+    """What acts does: seed, gravity, bodies, laws by their contents, and the plugin's own object."""
+    for k, option in enumerate(["seed=3", "gravity=[0, -9.0]", "bodies.1.plane.contact.friction=0.1",
+                                "grains.contact.linear.friction=0.3", "grains.settle.energy=2e-3"]):
+        assert TAKEN not in run(place / f"apart{k}", cache, f"--set={option}", "--until=0"), option
+    law = workshop.source("dem/contact.linear.c")
+    folder = place / "plugins"
+    folder.mkdir()
+    workshop.compile(law + "\nstatic const char *const other __attribute__((used)) = \"another object\";\n", "contact.linear", folder)
+    assert TAKEN not in run(place / "rebuilt", cache, "--until=0", QUERN_PLUGIN_PATH=str(folder))
+
+
+def damaged(place, cache):
+    """A file that is cut, altered or of something else is passed over and replaced; a folder that cannot be written to, too."""
+    shutil.rmtree(cache)
+    for k, damage in enumerate([lambda b: b[:len(b) // 2], lambda b: b[:3000] + bytes([b[3000] ^ 1]) + b[3001:], lambda b: b""]):
+        run(place / f"base{k}", cache, "--until=0")
+        path, = files(cache)
+        path.write_bytes(damage(path.read_bytes()))
+        assert KEPT in run(place / f"damaged{k}", cache, "--until=0"), k
+        assert TAKEN in run(place / f"mended{k}", cache, "--until=0"), k
+    blocked = place / "blocked"
+    blocked.write_text("no folder")
+    assert "settled state not kept: " in run(place / "nowhere", blocked / "cache", "--until=0")
+    run(place / "off", "", "--until=0")
+
+
+def renamed(place, cache):
+    """The text of all it depends on is in the file: one under another's name is not taken."""
+    a = files(cache)[0]
+    run(place / "other", cache, "--set=seed=11", "--until=0")
+    b = next(path for path in files(cache) if path != a)
+    shutil.copy(a, b)
+    assert TAKEN not in run(place / "other2", cache, "--set=seed=11", "--until=0")
+    with h5py.File(a) as file:
+        assert bytes(file["depends"][:]).startswith(b"quern ")
+
+
+if __name__ == "__main__":
+    with lab.workplace() as name:
+        place = pathlib.Path(name)
+        cache = place / "cache"
+        for test in (same_bits, shared, apart, damaged, renamed):
+            test(place, cache)
+            print(test.__name__.replace("_", " "), "holds")
