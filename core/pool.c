@@ -95,11 +95,13 @@ static void wake(quern_pool *p) {
 	pthread_mutex_unlock(&p->lock);
 }
 
-/* Signals are the main thread's. */
+/* Signals are the main thread's, but for those that a thread makes itself. */
 static void start(quern_pool *p) {
-	sigset_t all, before;
-	sigfillset(&all);
-	pthread_sigmask(SIG_SETMASK, &all, &before);
+	static const int own[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTRAP, SIGSYS };
+	sigset_t others, before;
+	sigfillset(&others);
+	for (size_t i = 0; i < sizeof own / sizeof *own; i++) sigdelset(&others, own[i]);
+	pthread_sigmask(SIG_SETMASK, &others, &before);
 	for (uint32_t i = 1; i < p->workers; i++) {
 		helper *h = &p->helpers[p->started];
 		*h = (helper) { .pool = p, .number = i };
