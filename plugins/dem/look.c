@@ -99,7 +99,8 @@ static quern_status stop_deep(const forces_shared *sh, const deep_contact *c, co
 }
 
 /* An impact may go deep for a while, and one contact after another may: so one is watched, the deepest at first, until it is
- * no longer deep. One that is watched for several of its own durations lasts; a centre behind a surface is enough at once. */
+ * no longer deep. One that is watched for several of its own durations lasts, though not while grains fall into place; a
+ * centre behind a surface is enough at once. */
 quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_column *u = sh->use;
 	deep_contact worst = { .by = 0 }, watched = { .by = 0 };
@@ -109,7 +110,7 @@ quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks
 	}
 	quern_real *time = u[FORCE_DEEP_TIME].real[0];
 	if (worst.by >= 1) return stop_deep(sh, &worst, ", its centre behind the surface,");
-	if (watched.by > 0) {
+	if (watched.by > 0 && !sh->s->settling) {
 		*time += EVERY * sh->s->dt;
 		if (*time >= LASTS * watched.period) return stop_deep(sh, &watched, " for long");
 		return QUERN_OK;
