@@ -60,12 +60,9 @@ static void height_is_along_gravity(void **state) {
 /* The stiffness of a Hertz contact under the weight of the fill is that under its whole height, whatever the order of the
  * fills: with it goes the bulk modulus that a continuum takes. */
 static void stiffness_is_that_of_the_whole(void **state) {
-	static const char *const fills[] = { "{region: {box: {lower: [0, 0], upper: [0.2, 0.2]}}}",
-		"{region: {box: {lower: [0, 0], upper: [0.2, 0.15]}}}, {region: {box: {lower: [0, 0.15], upper: "
-		"[0.2, "
-		"0.2]}}}",
-		"{region: {box: {lower: [0, 0.15], upper: [0.2, 0.2]}}}, {region: {box: {lower: [0, 0], upper: [0.2, "
-		"0.15]}}}" };
+#define LAYER(from, to) "{region: {box: {lower: [0, " from "], upper: [0.2, " to "]}}}"
+	static const char *const fills[] = { LAYER("0", "0.2"), (LAYER("0", "0.15") ", " LAYER("0.15", "0.2")),
+		(LAYER("0.15", "0.2") ", " LAYER("0", "0.15")) };
 	double bulk[3];
 	(void)state;
 	for (int k = 0; k < 3; k++) {
