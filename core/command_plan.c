@@ -1,6 +1,7 @@
 /* quern plan - everything short of running: what is loaded, in which order it works, what is allocated and what not */
 #include "command.h"
 #include "config.h"
+#include "estimate.h"
 #include "options.h"
 #include "run.h"
 #include "text.h"
@@ -77,8 +78,6 @@ static json_t *skipped(const quern_run *run) {
 
 static json_t *whole(quern_run *run) {
 	const quern_general *g = &run->scene->general;
-	char reason[200], hard_reason[200];
-	double hard;
 	json_t *root = json_object();
 	json_object_set_new(root, "name", json_string(g->name));
 	json_object_set_new(root, "dimension", json_integer(g->dimension));
@@ -88,21 +87,16 @@ static json_t *whole(quern_run *run) {
 	json_object_set_new(root, "skipped", skipped(run));
 	json_object_set_new(root, "grains", json_integer(quern_host_table.set(run, "grain").n));
 	json_object_set_new(root, "points", json_integer(quern_host_table.set(run, "point").n));
-	const double limit = quern_run_limit(run, &hard, reason, hard_reason),
-				 step = g->step > 0 ? g->step : limit;
-	const uint32_t substeps = quern_run_substeps(run);
-	json_object_set_new(root, "step", number(step));
-	json_object_set_new(root, "step_set_by", json_string(g->step > 0 ? "the scene's time.step" : reason));
-	json_object_set_new(root, "step_limit", number(hard));
-	json_object_set_new(root, "step_limit_set_by", json_string(hard_reason));
-	json_object_set_new(root, "substeps", json_integer(substeps));
-	json_object_set_new(root, "steps", number(isfinite(step) ? ceil(g->end / step) : 1));
-	/* a rough price: 40 and 100 ns per grain and step in 2-D and 3-D on one core, before anything was measured here */
-	const double each = g->dimension == 2 ? 40e-9 : 100e-9;
-	const double n =
-		quern_host_table.set(run, "grain").n + (double)quern_host_table.set(run, "point").n / substeps;
-	json_object_set_new(
-		root, "estimated_core_seconds", number(isfinite(step) ? g->end / step * substeps * n * each : 0));
+	const quern_estimate e = quern_estimate_of(run);
+	json_object_set_new(root, "step", number(e.step));
+	json_object_set_new(root, "step_set_by", json_string(e.reason));
+	json_object_set_new(root, "step_limit", number(e.hard));
+	json_object_set_new(root, "step_limit_set_by", json_string(e.hard_reason));
+	json_object_set_new(root, "substeps", json_integer((json_int_t)e.substeps));
+	json_object_set_new(root, "steps", number(e.steps));
+	json_object_set_new(root, "settling_steps", number(e.settle_steps));
+	json_object_set_new(root, "estimated_core_seconds", number(e.running));
+	json_object_set_new(root, "estimated_settling_core_seconds", number(e.settling));
 	json_object_set_new(root, "bytes", json_integer((json_int_t)quern_store_bytes(&run->plan->store)));
 	return root;
 }
@@ -165,8 +159,13 @@ static void print(const json_t *root) {
 		number_of(root, "bytes") * 1e-6);
 	printf("step %.4g s, set by %s\n", number_of(root, "step"), text_of(root, "step_set_by"));
 	printf("unstable beyond %.4g s: %s\n", number_of(root, "step_limit"), text_of(root, "step_limit_set_by"));
-	printf("%.0f steps of %.0f substeps, about %.0f core seconds without settling\n",
-		number_of(root, "steps"), number_of(root, "substeps"), number_of(root, "estimated_core_seconds"));
+	char settling[32], running[32];
+	quern_estimate_time(number_of(root, "estimated_settling_core_seconds"), settling);
+	quern_estimate_time(number_of(root, "estimated_core_seconds"), running);
+	if (number_of(root, "settling_steps") > 0)
+		printf("settling: some %.2g steps, %s on one core\n", number_of(root, "settling_steps"), settling);
+	printf("%.0f steps of %.0f substeps, %s on one core\n", number_of(root, "steps"),
+		number_of(root, "substeps"), running);
 }
 
 static quern_status check_step(quern_run *run) {
@@ -174,6 +173,12 @@ static quern_status check_step(quern_run *run) {
 	double hard;
 	const double limit = quern_run_limit(run, &hard, reason, hard_reason);
 	return quern_run_check_step(run, hard, hard_reason, limit);
+}
+
+static void warn_of_length(quern_run *run) {
+	const quern_estimate e = quern_estimate_of(run);
+	char say[600];
+	if (quern_estimate_is_long(&e, quern_pool_workers(run->pool), say)) fprintf(stderr, "warning: %s\n", say);
 }
 
 int quern_command_plan(int argc, char **argv) {
@@ -196,6 +201,7 @@ int quern_command_plan(int argc, char **argv) {
 		status = run->status == QUERN_E_PARAM ? QUERN_EXIT_SCENE : QUERN_EXIT_FAILED;
 	} else {
 		json_t *root = whole(run);
+		warn_of_length(run);
 		if (json) json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 		else print(root);
 		json_decref(root);

@@ -2,6 +2,7 @@
 #include "checkpoint.h"
 #include "command.h"
 #include "config.h"
+#include "estimate.h"
 #include "frame.h"
 #include "options.h"
 #include "run_folder.h"
@@ -307,6 +308,19 @@ static void log_command(quern_log *log, int argc, char **argv) {
 	quern_text_finish(&line);
 }
 
+/* What it will take, before the first step. */
+static void say_estimate(quern_run *run) {
+	const quern_estimate e = quern_estimate_of(run);
+	const uint32_t cores = quern_pool_workers(run->pool);
+	char settling[32], running[32], say[600];
+	quern_estimate_time(e.settling / cores, settling);
+	quern_estimate_time(e.running / cores, running);
+	if (quern_estimate_is_long(&e, cores, say)) quern_log_add(run->log, 2, "%s", say);
+	else if (e.settle_steps > 0)
+		quern_log_add(run->log, 1, "estimated: settling %s, running %s", settling, running);
+	else quern_log_add(run->log, 1, "estimated: running %s", running);
+}
+
 static int drive(session *s, const options *o) {
 	quern_run *run = s->run;
 	quern_text why = { 0 };
@@ -320,6 +334,7 @@ static int drive(session *s, const options *o) {
 	}
 	quern_text_finish(&why);
 	if (s->begun) tell_what_stays(s);
+	if (s->begun && run->status == QUERN_OK) say_estimate(run);
 	if (s->begun && run->status == QUERN_OK && settle(s, !o->no_cache) == QUERN_OK && !interrupted)
 		step_on(s);
 	return finish(s);

@@ -348,21 +348,39 @@ static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
 
 quern_status quern_run_setup(quern_run *run) { return run_phase(run, QUERN_SETUP, 0); }
 
+/* The grains' own limit, not the continuum's. */
+static double settle_dt(quern_run *run) {
+	double hard;
+	char reason[200];
+	double dt = quern_run_limit(run, &hard, run->limit_reason, reason);
+	for (size_t i = 0; i < run->scene->n_sections; i++) {
+		const quern_section *s = &run->scene->sections[i];
+		const quern_step step = quern_run_record(run, s);
+		char why[160];
+		if (steps_grains(run, s) && s->ops->limit) dt = limit_of(s, &step, &hard, why);
+	}
+	return isfinite(dt) ? dt : 0;
+}
+
+double quern_run_settling(quern_run *run, double *dt) {
+	double most = 0;
+	*dt = settle_dt(run);
+	for (size_t i = 0; i < run->scene->n_sections; i++) {
+		const quern_section *s = &run->scene->sections[i];
+		if (!s->ops->settling) continue;
+		quern_step step = quern_run_record(run, s);
+		step.dt = *dt;
+		quern_watch_enter(s->solver->file->plugin.id, "settling");
+		most = fmax(most, s->ops->settling(s->solver->self, &step));
+		quern_watch_leave();
+	}
+	return most;
+}
+
 bool quern_run_settle(quern_run *run) {
 	quern_clock *c = &run->clock;
 	bool rest = true;
-	if (c->settle_step == 0) {
-		double hard;
-		char reason[200];
-		c->settle_dt = quern_run_limit(run, &hard, run->limit_reason, reason);
-		for (size_t i = 0; i < run->scene->n_sections; i++) { /* the grains' own limit, not the continuum's */
-			const quern_section *s = &run->scene->sections[i];
-			const quern_step step = quern_run_record(run, s);
-			char why[160];
-			if (steps_grains(run, s) && s->ops->limit) c->settle_dt = limit_of(s, &step, &hard, why);
-		}
-		if (!isfinite(c->settle_dt)) c->settle_dt = 0;
-	}
+	if (c->settle_step == 0) c->settle_dt = settle_dt(run);
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
 		if (!s->ops->settled) continue;

@@ -53,6 +53,8 @@ void quern_run_destroy(quern_run *);
 
 /* Runs the stages of the set-up phase. */
 quern_status quern_run_setup(quern_run *);
+/* About how many steps settling takes from here, by what its solvers say, and their length; 0: none. */
+double quern_run_settling(quern_run *, double *dt);
 /* One grain step of the settling phase; true when at rest. */
 bool quern_run_settle(quern_run *);
 /* Refuses the scene's own step if it is beyond the hard limit of the state as it is. */

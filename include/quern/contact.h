@@ -54,7 +54,7 @@ QUERN_INLINE quern_cone quern_cone_shares(quern_vec a, quern_vec b, quern_real c
 	const bool slides = quern_vec_dot(sum, sum, 3) > cc, beyond = least2 >= cc;
 	const quern_real clip = cap / __builtin_sqrt(least2 > 0 ? least2 : 1);
 	const quern_real kept = share < 1 ? (share > part ? share : part) : 1;
-	return (quern_cone) { slides ? (beyond ? part * clip : kept) : 1, slides & beyond ? clip : 1 };
+	return (quern_cone) { slides ? (beyond ? part * clip : kept) : 1, (slides & beyond) ? clip : 1 };
 }
 
 /* The same along one line, a and b of either sign; returns what is left of a + b, and of a alone in *spring. */

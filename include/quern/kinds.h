@@ -386,6 +386,9 @@ typedef struct quern_solver_ops {
 	/* [stage] after every grain step while settling: true when at rest. NULL: nothing to settle */
 	bool (*settled)(const void *self, const quern_step *);
 	void (*account)(const void *self, const quern_step *, quern_account *); /* [stage] adds; may be NULL */
+	/* [stage] after the set-up: about how many steps of s->dt it takes until settled, within a factor of three or so. For
+	 * an estimate alone; may be NULL */
+	quern_real (*settling)(const void *self, const quern_step *);
 } quern_solver_ops;
 
 #ifdef __cplusplus

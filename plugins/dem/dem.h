@@ -16,6 +16,9 @@ typedef struct dem {
 	bool settles;
 	quern_real reach;  /* m, of the laws beyond touching */
 	quern_real height; /* m, of the fill, or of the domain where there is none */
+	quern_real sinks,
+		stiffness;        /* overlap under the fill's weight over the diameter; N/m, of all laws there */
+	const char *stiffest; /* of the laws */
 	uint32_t dim;
 } dem;
 
@@ -118,6 +121,7 @@ quern_status quern_dem_left(const quern_step *, int64_t id, uint32_t axis, quern
 quern_status quern_dem_list(const void *self, const quern_step *);
 quern_status quern_dem_observe(const void *self, const quern_step *);
 bool quern_dem_settled(const void *self, const quern_step *);
+quern_real quern_dem_settling(const void *self, const quern_step *);
 
 /* ---- grain_file.c ---- */
 typedef struct grain_table {

@@ -286,6 +286,18 @@ static quern_status refuse_two_steps(const quern_step *s) {
 		"%s acts in two steps, and the books of a hybrid take one: use symplectic_euler", integrator->id);
 }
 
+/* Grains stand for stiff ones: where their weight alone presses them into each other, the bed is too dense and too low. */
+static void warn_of_softness(const dem *d, const quern_step *s) {
+	bool loose = false;
+	for (uint32_t i = 0; i < d->fill.n; i++) loose = loose || !((const dem_fill *)d->fill.items)[i].fixed;
+	if (!loose || !(d->sinks > 0.01)) return;
+	s->host->log(s->run, 2,
+		"under %.3g m of fill grains overlap by about %.2g %% of a diameter, so that the bed is too dense: "
+		"the contacts "
+		"(%s) have %.2g N/m there; take %.2g N/m, for half a percent",
+		d->height, 100 * d->sinks, d->stiffest, d->stiffness, d->stiffness * d->sinks / 0.005);
+}
+
 quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	if (refuse_two_steps(s) != QUERN_OK) return QUERN_E_PARAM;
 	filling f = { .d = self, .step = s };
@@ -293,6 +305,7 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	quern_status status = read_file(f.d, s, &table);
 	if (status == QUERN_OK) status = open_placer(&f, &table);
 	if (status == QUERN_OK) status = fill_all(&f, &table);
+	if (status == QUERN_OK) warn_of_softness(f.d, s);
 	quern_placer_finish(&f.placer);
 	quern_grain_table_finish(&table);
 	free(f.grain);
@@ -330,4 +343,14 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 	}
 	const quern_real mean = s->host->sum(s->run, grains.n, energy);
 	return mean <= d->rest * moving * g * diameter;
+}
+
+/* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */
+quern_real quern_dem_settling(const void *self, const quern_step *s) {
+	const dem *d = self;
+	quern_real g2 = 0;
+	for (uint32_t k = 0; k < d->dim; k++) g2 += s->gravity[k] * s->gravity[k];
+	if (!d->settles || !(g2 > 0) || !(s->dt > 0)) return 0;
+	const quern_real steps = 4 * sqrt((d->height + 2 * d->radii.mean) / sqrt(g2)) / s->dt;
+	return steps < d->settle_most ? steps : d->settle_most;
 }

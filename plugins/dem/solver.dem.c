@@ -309,7 +309,7 @@ static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	dem *d = self;
-	quern_real kn = 0, g2 = 0;
+	quern_real kn = 0, most = 0, g2 = 0;
 	if (d->settles && !n_slot[SLOT_CONTACT])
 		return refuse_settling(d, setup, err, "without a contact law grains fall for ever: give contact one");
 	d->features = false;
@@ -322,11 +322,16 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
 		const quern_bound *law = &slot[SLOT_CONTACT][l];
 		const quern_contact_ops *ops = law->ops;
-		if (ops->stiffness) kn += ops->stiffness(law->self, d->dim, 0.5 * d->radii.mean, 0.5 * force);
+		const quern_real k =
+			ops->stiffness ? ops->stiffness(law->self, d->dim, 0.5 * d->radii.mean, 0.5 * force) : 0;
+		kn += k;
+		if (k > most) most = k, d->stiffest = law->id;
 		if (ops->reach) find_reach(d, law, widest(d), n_slot[SLOT_BODIES]);
 	}
 	const quern_real bulk =
 		d->dim == 2 ? 0.3 * kn : 0.6 * 5 * packing * kn / (3 * 3.141592653589793 * diameter);
+	d->stiffness = kn;
+	d->sinks = kn > 0 ? force / (kn * diameter) : 0;
 	setup->host->publish(setup, "grain.stiffness", "N/m", kn);
 	setup->host->publish(setup, "grain.bulk_modulus", "Pa", bulk);
 	setup->host->publish(setup, "grain.packed_density", "kg/m^3", packing * d->density);
@@ -443,7 +448,8 @@ static const quern_solver_ops ops = { .size = sizeof ops,
 	.ready = ready,
 	.limit = limit,
 	.settled = quern_dem_settled,
-	.account = account };
+	.account = account,
+	.settling = quern_dem_settling };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.kind = QUERN_SOLVER,
 	.revision = 1,

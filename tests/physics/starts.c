@@ -60,12 +60,9 @@ static void height_is_along_gravity(void **state) {
 /* The stiffness of a Hertz contact under the weight of the fill is that under its whole height, whatever the order of the
  * fills: with it goes the bulk modulus that a continuum takes. */
 static void stiffness_is_that_of_the_whole(void **state) {
-	static const char *const fills[] = { "{region: {box: {lower: [0, 0], upper: [0.2, 0.2]}}}",
-		"{region: {box: {lower: [0, 0], upper: [0.2, 0.15]}}}, {region: {box: {lower: [0, 0.15], upper: "
-		"[0.2, "
-		"0.2]}}}",
-		"{region: {box: {lower: [0, 0.15], upper: [0.2, 0.2]}}}, {region: {box: {lower: [0, 0], upper: [0.2, "
-		"0.15]}}}" };
+#define LAYER(from, to) "{region: {box: {lower: [0, " from "], upper: [0.2, " to "]}}}"
+	static const char *const fills[] = { LAYER("0", "0.2"), (LAYER("0", "0.15") ", " LAYER("0.15", "0.2")),
+		(LAYER("0.15", "0.2") ", " LAYER("0", "0.15")) };
 	double bulk[3];
 	(void)state;
 	for (int k = 0; k < 3; k++) {
@@ -119,8 +116,43 @@ static void points_in_bodies_are_left_out(void **state) {
 	assert_true(good);
 }
 
+/* What plan and run say about settling is within a factor of three of what it takes, in steps: it scales with the height
+ * of the fill and with the step. A tenth of the stiffness needs a third of the steps. */
+static void settling_is_estimated(void **state) {
+	static const struct {
+		const char *name, *dim, *gravity, *upper, *body, *fill, *stiffness;
+	} beds[] = { { "5 discs high", "2", "0, -9.81", "0.02, 0.1", "[0, 0], normal: [0, 1]",
+					 "{lower: [0, 0], upper: [0.02, 0.01]}", "1e5" },
+		{ "40 discs high", "2", "0, -9.81", "0.02, 0.1", "[0, 0], normal: [0, 1]",
+			"{lower: [0, 0], upper: [0.02, 0.08]}", "1e5" },
+		{ "5 spheres high", "3", "0, 0, -9.81", "0.01, 0.01, 0.1", "[0, 0, 0], normal: [0, 0, 1]",
+			"{lower: [0, 0, 0], upper: [0.01, 0.01, 0.01]}", "1e3" },
+		{ "the same, a tenth as stiff", "3", "0, 0, -9.81", "0.01, 0.01, 0.1", "[0, 0, 0], normal: [0, 0, 1]",
+			"{lower: [0, 0, 0], upper: [0.01, 0.01, 0.01]}", "1e2" } };
+	(void)state;
+	bool good = true;
+	table_head("steps of settling over the estimate, its logarithm to base 3");
+	for (size_t k = 0; k < sizeof beds / sizeof *beds; k++) {
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: %s\ngravity: [%s]\ndomain: {lower: [%s], upper: [%s], periodic: [%s]}\n"
+			"time: {end: 1}\nbodies: [{plane: {point: %s}}]\n"
+			"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 0.2}},\n"
+			"  contact: {linear: {stiffness: %s, friction: 0.5}}, fill: {region: {box: %s}, settle: true}}\n",
+			beds[k].dim, beds[k].gravity, *beds[k].dim == '2' ? "0, 0" : "0, 0, 0", beds[k].upper,
+			*beds[k].dim == '2' ? "true, false" : "true, true, false", beds[k].body, beds[k].stiffness,
+			beds[k].fill);
+		double dt;
+		const double about = quern_run_settling(run, &dt);
+		harness_settle(run);
+		good &= table_row(beds[k].name, log((double)run->clock.settle_step / about) / log(3), 0, 1);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(height_is_along_gravity),
-		cmocka_unit_test(stiffness_is_that_of_the_whole), cmocka_unit_test(points_in_bodies_are_left_out) };
+		cmocka_unit_test(stiffness_is_that_of_the_whole), cmocka_unit_test(points_in_bodies_are_left_out),
+		cmocka_unit_test(settling_is_estimated) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

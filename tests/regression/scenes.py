@@ -90,12 +90,27 @@ def check_options():
 
 def check_warnings():
     """What is taken with a warning: plan says it too."""
-    scene = ["configs/elastic_bar.yaml", "--set", "bodies=[{box: {lower: [-1, -1], upper: [1, 1]}}]"]
-    done = subprocess.run([QUERN, "plan", *scene], cwd=SCENES.parents[2], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    assert re.search(r"warning: \d+ of \d+ points of continuum.fill lie in body 0, a body.box, and are left out",
-                     done.stderr), done.stderr
-    print("plan warns of points that lie in a body")
+    def warns(command, scene, *sets):
+        words = [QUERN, *command, f"configs/{scene}.yaml", *(word for one in sets for word in ("--set", one))]
+        done = subprocess.run(words, cwd=SCENES.parents[2], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stderr
+        return done.stderr
+
+    said = warns(["plan"], "elastic_bar", "bodies=[{box: {lower: [-1, -1], upper: [1, 1]}}]")
+    assert re.search(r"warning: \d+ of \d+ points of continuum.fill lie in body 0, a body.box, and are left out", said), said
+    # a bed of fifty diameters whose grains bear their weight with a tenth of a millimetre, a twentieth of a diameter
+    bed = ["bodies=[{plane: {point: [0, 0], normal: [0, 1]}}]", "gravity=[0, -10]", "domain.upper=[0.05, 0.15]",
+           "grains.place=[]", "grains.material.radius.mean=1 mm", "grains.fill={region: {box: {lower: [0, 0], upper: [0.02, 0.1]}}}"]
+    said = warns(["plan"], "two_grains", *bed, "grains.contact.linear.stiffness=4e4")
+    assert re.search(r"warning: under 0.1 m of fill grains overlap by about 5(\.\d+)? % of a diameter", said), said
+    assert re.search(r"contact.linear. have 4e\+04 N/m there; take 4.1e\+05 N/m", said), said
+    assert "warning" not in warns(["plan"], "two_grains", *bed, "grains.contact.linear.stiffness=4e5")
+    # 5e13 steps of two grains
+    with tempfile.TemporaryDirectory() as folder:
+        for command in (["plan"], ["run", "--quiet", "--until", "0", "-o", folder]):
+            said = warns(command, "two_grains", "time.end=1e9", "output.every=1e9")
+            assert re.search(r"warning: this will take long on \d+ cores?: .* and about \d+ days of running", said), said
+    print("plan and run warn of points in bodies, of contacts too soft, and of runs too long")
 
 
 def check_pipes():

@@ -1,0 +1,18 @@
+/* estimate - what a run will cost, before its first step */
+#pragma once
+#include "run.h"
+
+typedef struct quern_estimate {
+	double step, hard;                  /* s: the long step, and what is unstable */
+	double steps, substeps;             /* that are left */
+	double settle_step, settle_steps;   /* s; 0 steps: nothing to settle */
+	double settling, running;           /* s on one core */
+	char reason[200], hard_reason[200]; /* what sets step and hard */
+} quern_estimate;
+
+/* After the set-up or a resume, of what is left. */
+quern_estimate quern_estimate_of(quern_run *);
+/* "less than 2 s", "about 3.5 h", "about 12 days" */
+void quern_estimate_time(double seconds, char out[32]);
+/* True if it takes more than a day on as many cores; then `say` has a sentence about why. */
+bool quern_estimate_is_long(const quern_estimate *, uint32_t cores, char say[600]);
