@@ -32,7 +32,7 @@ def run(out, scene, model, seed, threads):
     summary = out / "summary.json"
     if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
         sets = [f"seed={seed}"] + MODELS[model]
-        subprocess.run([ROOT / "build/quern", "run", ROOT / f"configs/{scene}.yaml", "-o", out, "--force", "--quiet"]
+        subprocess.run([ROOT / "build/quern", "run", ROOT / f"configs/{scene}.yaml", "-o", out, "--force", "--quiet", "--no-cache"]
                        + ["--threads", str(threads)] + [word for one in sets for word in ("--set", one)], check=True)
     return json.loads(summary.read_text())
 
