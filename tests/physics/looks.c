@@ -1,0 +1,53 @@
+/* What is seen when somebody looks is the state as it is: before the first step too, whatever near grains do. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <math.h>
+
+/* A grain near the floor, however slowly it comes, feels nothing of it: its kinetic energy is what it was given. */
+static void near_and_slow(void **state) {
+	static const double speeds[] = { 1e-3, 1e-9, 1e-13, 1e-100, 1e-300, 4e-324 };
+	static const char *const laws[] = { "linear: {stiffness: 1e6}", "hertz: {young: 1e9, impact_speed: 1}" };
+	bool good = true;
+	(void)state;
+	table_head("kinetic energy of a grain above the floor, over what it was given");
+	for (uint32_t dim = 2; dim <= 3; dim++)
+		for (int law = 0; law < 2; law++)
+			for (size_t k = 0; k < sizeof speeds / sizeof *speeds; k++) {
+				const char *more = dim == 2 ? "" : ", 0";
+				quern_run *run = harness_open(1,
+					"{quern: 1, dimension: %u, gravity: [0, 0%s], domain: {lower: [0, 0%s], upper: [1, "
+					"1%s]},\n"
+					"time: {end: 1, step: 1e-7}, output: {every: 0.1, fields: [total.kinetic, "
+					"total.sheared]},\n"
+					"bodies: [{plane: {point: [0, 0%s], normal: [0, 1%s]}}],\n"
+					"grains: {material: {density: 2500, radius: {mean: 0.01}}, contact: {%s},\n"
+					"  place: [{position: [0.5, 0.0105%s], velocity: [1, %.17g%s]}]}}\n",
+					dim, more, more, dim == 2 ? "" : ", 1", more, more, laws[law], dim == 2 ? "" : ", 0.5",
+					-speeds[k], dim == 2 ? "" : ", 0.25");
+				harness_settle(run);
+				const double m = harness_field(run, "grain.mass").real[0][0];
+				char name[80];
+				snprintf(name, sizeof name, "%u-D %.5s, %g m/s", dim, laws[law], speeds[k]);
+				harness_look(run);
+				good &= table_row(name, harness_field(run, "total.kinetic").real[0][0] / (0.5 * m),
+					dim == 2 ? 1 : 1.0625, 1e-5);
+				harness_steps(run, 3);
+				harness_look(run);
+				good &= table_row(name, harness_field(run, "total.kinetic").real[0][0] / (0.5 * m),
+					dim == 2 ? 1 : 1.0625, 1e-5);
+				harness_close(run);
+			}
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(near_and_slow) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
