@@ -69,7 +69,39 @@ static void a_gate_is_gone(void **state) {
 	harness_close(run);
 }
 
+/* Velocity Verlet asks for forces at the positions that it leaves, and moves tangential springs to them: who looks must not
+ * move them once more. What the springs hold is k_t xi^2/2 of the spring that is remembered. */
+static void springs_stay(void **state) {
+	static const char *const scenes[] = { "2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [1, 1]}",
+		"3, gravity: [0, -9.81, 0], domain: {lower: [0, 0, 0], upper: [1, 1, 1]}" };
+	bool good = true;
+	(void)state;
+	table_head("energy of a tangential spring over k_t xi^2/2");
+	for (int dim = 2; dim <= 3; dim++) {
+		const char *more = dim == 2 ? "" : ", 0";
+		quern_run *run = harness_open(1,
+			"{quern: 1, dimension: %s, time: {end: 1, step: 2e-6}, output: {every: 0.1}, observe: [energy],\n"
+			"bodies: [{plane: {point: [0, 0%s], normal: [0, 1%s]}}], grains: {integrator: velocity_verlet,\n"
+			"  material: {density: 2500, radius: {mean: 0.01}}, contact: {linear: {stiffness: 1e5, friction: "
+			"10, tangential_stiffness: 0.5}},\n"
+			"  place: [{position: [0.5, 0.00995%s], velocity: [0.01, 0%s]}]}}\n",
+			scenes[dim - 2], more, more, dim == 2 ? "" : ", 0.5", more);
+		for (int k = 0; k < 5; k++) {
+			harness_steps(run, 7);
+			harness_look(run);
+			const quern_column slip = harness_field(run, "touch.slip");
+			double square = 0;
+			for (int a = 0; a < (dim == 2 ? 1 : 3); a++) square += slip.real[a][0] * slip.real[a][0];
+			good &= table_row(dim == 2 ? "2-D" : "3-D",
+				harness_field(run, "total.sheared").real[0][0] / (0.5 * 0.5e5 * square), 1, 1e-12);
+		}
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(near_and_slow), cmocka_unit_test(a_gate_is_gone) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(near_and_slow), cmocka_unit_test(a_gate_is_gone),
+		cmocka_unit_test(springs_stay) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
