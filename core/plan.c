@@ -290,6 +290,7 @@ static void miss_asked(quern_plan *p, size_t k) {
 	const char **known = quern_take(p->n_uses + 1, sizeof(char *));
 	for (size_t i = 0; i < p->n_uses; i++) known[i] = p->uses[i].field;
 	const char *near = quern_nearest(s->fields[k], known);
+	if (near && !strcmp(near, s->fields[k])) near = NULL; /* somebody could make it, and nobody asks for it */
 	quern_report_add(s->report, s->field_marks[k],
 		"scene: output.fields: nothing in this scene makes '%s'%s%s%s", s->fields[k],
 		near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");

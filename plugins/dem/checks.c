@@ -6,9 +6,10 @@
 
 enum { LASTS = 5 }; /* durations of a contact */
 
-/* Steps, about a contact's duration. */
+/* Steps, about a contact's duration; that of settling may be given as short as one likes. */
 static uint32_t every(const forces_shared *sh) {
-	return sh->s->settling ? (uint32_t)(1 / sh->d->settle_step) : 50;
+	const quern_real wanted = sh->s->settling ? 1 / sh->d->settle_step : 50;
+	return wanted < 1e6 ? (uint32_t)wanted : 1000000;
 }
 
 void quern_dem_decide_checks(forces_shared *sh) {

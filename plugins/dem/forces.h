@@ -38,9 +38,10 @@ typedef struct forces_shared {
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
 	bool spin, couple;
-	bool books;  /* losses of this step are booked */
-	bool looks;  /* nothing moves: forces and energies of the state as it is */
-	bool starts; /* losses will be booked from now on: what springs hold is noted */
+	quern_real dt; /* s, by which springs move */
+	bool books;    /* losses of this step are booked */
+	bool looks;    /* nothing moves: forces and energies of the state as it is */
+	bool starts;   /* losses will be booked from now on: what springs hold is noted */
 	quern_real half[3],
 		length[3]; /* periodic: half the domain's length and the length; infinite and 0 otherwise */
 	const uint32_t *grain, *contact, *touch; /* partitions */
