@@ -288,8 +288,12 @@ static void remove_one(void *context, const char *path, int64_t number) {
 
 void quern_run_folder_clear(const quern_run_folder *f, const quern_scene *scene) {
 	inputs in = inputs_of(scene);
+	char *own = in_folder(f, "scene.yaml"), *input = in_folder(f, "input.yaml");
+	if (is_input(&in, own)) add_input(&in, input); /* it is what that one was made from */
 	visit_all(f, remove_one, &in);
 	free(in.at);
+	free(own);
+	free(input);
 	for (const char *const *name = names; *name; name++) {
 		char *path = in_folder(f, *name);
 		rmdir(path); /* stays where anything else is in it */

@@ -112,6 +112,12 @@ def resumed(place):
     before = contents(out)
     assert "no checkpoint.h5" in run(SCENE, out, "--resume", status=4)
     assert contents(out) == before
+    # one that was stopped before its first checkpoint begins anew, and still has the text that somebody wrote
+    begun = place / "begun"
+    run(SCENE, begun, "--until", "0")
+    (begun / "checkpoint.h5").unlink()
+    run(begun / "scene.yaml", begun, "--resume", "--until", "1 ms")
+    assert (begun / "input.yaml").read_bytes() == SCENE.read_bytes()
     print("a run goes on from its own scene.yaml")
 
 
