@@ -348,18 +348,18 @@ static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
 
 quern_status quern_run_setup(quern_run *run) { return run_phase(run, QUERN_SETUP, 0); }
 
-/* The grains' own limit, not the continuum's. */
+/* The least limit of those who step grains, not the continuum's. */
 static double settle_dt(quern_run *run) {
-	double hard;
-	char reason[200];
-	double dt = quern_run_limit(run, &hard, run->limit_reason, reason);
+	double least = INFINITY;
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
+		if (!steps_grains(run, s) || !s->ops->limit) continue;
 		const quern_step step = quern_run_record(run, s);
+		double hard;
 		char why[160];
-		if (steps_grains(run, s) && s->ops->limit) dt = limit_of(s, &step, &hard, why);
+		least = fmin(least, limit_of(s, &step, &hard, why));
 	}
-	return isfinite(dt) ? dt : 0;
+	return isfinite(least) ? least : 0;
 }
 
 double quern_run_settling(quern_run *run, double *dt) {

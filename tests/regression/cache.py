@@ -13,6 +13,7 @@ OPTIONS = [*lab.SMALL["column"], "--set=time.end=10 ms", "--set=output.every=5 m
            "--set=grains.fill.1.region.box.upper=[0.039, 0.08]", "--set=grains.settle.step=0.05"]
 # Stands in for the continuum: lets grains grow a little at every step, also while they settle, and shows by how much.
 SWELL = """#include <quern/abi.h>
+#include <math.h>
 typedef struct { quern_real rate; } swell;
 static const quern_param params[] = { QUERN_PARAM(swell, rate, "1", "Per step.", .max = 1), QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES }, rows[] = {
@@ -29,7 +30,10 @@ static quern_status grow(const void *self, const quern_step *s) {
 }
 static const quern_stage stages[] = {
 	{ .name = "swell.grow", .phase = QUERN_GRAINS, .uses = rows, .run = grow }, { .name = NULL } };
-static const quern_solver_ops ops = { .size = sizeof ops, .stages = stages };
+static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
+	return *hard = INFINITY; /* the other solver's is the least */
+}
+static const quern_solver_ops ops = { .size = sizeof ops, .stages = stages, .limit = limit };
 static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_SOLVER, .revision = 1,
 	.dims = QUERN_2D | QUERN_3D, .id = "solver.swell", .brief = "Growth.", .instance_size = sizeof(swell),
 	.params = params, .uses = uses, .ops = &ops };
@@ -140,6 +144,8 @@ def helped(place, cache):
         options = ["--until=0", f"--set=hybrid={{solver: swell, rate: {rate}}}",
                    "--set=output.fields=[grain.swollen]", "--set=observe=[energy]"]
         assert (TAKEN in run(place / f"helped{k}", cache, *options, **how)) == taken, rate
+        with h5py.File(place / f"helped{k}/checkpoint.h5") as file:
+            assert 1e-6 < file.attrs["settle_dt"] < 1e-4, "the step while settling is not the least of both"
         lab.run("column", place / f"helped{k}_own", *OPTIONS, *options, "--no-cache", **how)
         lab.same(place / f"helped{k}_own", place / f"helped{k}", f"with another solver's help, {rate}")
 
