@@ -63,6 +63,7 @@ static void write_run(quern_h5 *h, quern_run *run, int64_t rows) {
 	for (size_t i = 0; i < N_NUMBERS; i++) quern_h5_number(h, h->file, numbers[i].name, *number(run, i));
 	write_text(h, "scene", quern_run_identity(run));
 	write_text(h, "replaced", run->replaced ? run->replaced : "");
+	write_text(h, "limited_by", run->limit_reason);
 	write_plugins(h, run);
 	if (!run->has_grid) return;
 	const uint32_t n = run->grid.view.n_blocks;
@@ -174,6 +175,12 @@ static char *read_text(quern_h5 *h, const char *name) {
 	return NULL;
 }
 
+static void read_reason(quern_run *run, quern_h5 *h) {
+	char *reason = read_text(h, "limited_by");
+	snprintf(run->limit_reason, sizeof run->limit_reason, "%s", reason ? reason : "");
+	free(reason);
+}
+
 /* ---- whether it is this run's ---- */
 
 static bool read_scene(quern_run *run, quern_h5 *h, quern_text *said, quern_text *why) {
@@ -260,6 +267,7 @@ static bool read_all(
 		const char *wrong = quern_state_fault(run, &store->fields[k]);
 		if (wrong) return fault(why, wrong, store->fields[k].name);
 	}
+	read_reason(run, h);
 	return rejoin(run, why);
 }
 

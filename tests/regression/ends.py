@@ -114,8 +114,10 @@ def until(place):
     assert bytes_of(out) == before, "a run that had nothing to do has changed its folder"
     run(out, *sets(10, 3), "--until", "9 ms", resume=True)
     assert lab.summary(out)["time_end"] == 0.009000000000000001
+    run(out, *sets(10, 3), "--until", "9.5 ms", resume=True)
     run(out, *sets(10, 3), resume=True)
     lab.same(base, out, "stopped by --until and gone on")
+    assert lab.summary(out)["step_limited_by"] == lab.summary(base)["step_limited_by"] != ""
     # the command that it recommends
     run(out.with_name("said"), *sets(10, 3), "--until", "4 ms")
     line = (out.with_name("said") / "log.txt").read_text().splitlines()[-1]
