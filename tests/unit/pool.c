@@ -12,6 +12,7 @@
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
@@ -131,6 +132,29 @@ static void crash_has_a_stack(void **state) {
 }
 #endif
 
+static void call_again(void *arg, uint32_t i, uint32_t worker) {
+	counts own = { 0 };
+	(void)i, (void)worker;
+	quern_pool_each(arg, 1, count_one, &own);
+}
+
+static void call_within(uint32_t workers, uint32_t n) {
+	quern_pool *pool = quern_pool_create(workers);
+	fclose(stderr); /* it complains */
+	quern_pool_each(pool, n, call_again, pool);
+}
+static void one_within(void) { call_within(1, 1); }
+static void many_within(void) { call_within(2, 8); }
+
+/* With two workers a body that calls would hang: it ends the program with one as well, so that its author learns of it. */
+static void body_may_not_call(void **state) {
+	(void)state;
+	for (int k = 0; k < 2; k++) {
+		const int status = end_of(k ? many_within : one_within);
+		assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT);
+	}
+}
+
 /* The number of workers can be had from the environment, where batch systems put it; nonsense there is passed over. */
 static void environment_is_heard(void **state) {
 	(void)state;
@@ -185,7 +209,7 @@ int main(void) {
 #ifndef QUERN_SANITIZED
 		cmocka_unit_test(crash_has_a_stack),
 #endif
-		cmocka_unit_test(environment_is_heard), cmocka_unit_test(scratch_grows),
-		cmocka_unit_test(tree_sums) };
+		cmocka_unit_test(body_may_not_call), cmocka_unit_test(environment_is_heard),
+		cmocka_unit_test(scratch_grows), cmocka_unit_test(tree_sums) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
