@@ -102,6 +102,14 @@ def damaged(place, cache):
         path.write_bytes(damage(path.read_bytes()))
         assert KEPT in run(place / f"damaged{k}", cache, "--until=0"), k
         assert TAKEN in run(place / f"mended{k}", cache, "--until=0"), k
+    path, = files(cache)
+    with open(path, "wb") as file:
+        file.truncate(8 << 30)  # of nothing: it is not read to its end
+    run(place / "huge", cache, "--until=0")
+    assert lab.summary(place / "huge")["settle_seconds"] < 10
+    path.unlink()
+    os.mkfifo(path)
+    assert KEPT in run(place / "pipe", cache, "--until=0") and path.is_file()
     blocked = place / "blocked"
     blocked.write_text("no folder")
     assert "settled state not kept: " in run(place / "nowhere", blocked / "cache", "--until=0")
