@@ -23,7 +23,12 @@ with tempfile.TemporaryDirectory() as folder:
     (here / "scene.yaml").write_text(scene)
     done = subprocess.run([QUERN, "plan", "scene.yaml"], cwd=here, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    print("ok  the scene of README plans")
+    grains = re.sub(r"^(continuum|hybrid):.*\n(  .*\n)*", "", scene, flags=re.M)
+    assert "grains:" in grains and "continuum" not in grains and "hybrid" not in grains
+    (here / "grains.yaml").write_text(grains)
+    done = subprocess.run([QUERN, "plan", "grains.yaml"], cwd=here, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    print("ok  the scene of README plans, without continuum and hybrid too")
 
 for link in re.findall(r"\]\(([^)]+)\)", text):
     assert (SOURCE / link).exists(), f"README links to {link}, which is not there"
