@@ -1,5 +1,6 @@
 """The folder of a run: not replaced without --force, and then no more than what a run has left; never what the run was given;
 held by one run at a time, and free again once that is gone, however it went."""
+import os
 import pathlib
 import shutil
 import signal
@@ -86,6 +87,10 @@ def own_scene(place):
     with open(place / "changed/scene.yaml", "a") as file:
         file.write("# changed\n")
     run(SCENE, place / "changed", "--force", status=4)
+    # a pipe is nobody's scene, and nobody waits for it
+    (place / "pipe").mkdir()
+    os.mkfifo(place / "pipe/scene.yaml")
+    assert "pipe/scene.yaml is not what a run has left" in run(SCENE, place / "pipe", "--force", status=4)
     print("what a run was given is never replaced")
 
 
