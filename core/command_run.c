@@ -92,10 +92,13 @@ static char *folder_of(const options *o) {
 
 /* ---- progress and checkpoints ---- */
 
+/* s on the clock, of all that has led here: the start moves on with each checkpoint. */
+static double wall_of(const session *s) { return s->run->wall_before + quern_wall() - s->start; }
+
 static void progress(session *s, bool settling) {
 	quern_run *run = s->run;
 	if (!quern_log_due(run->log)) return;
-	const double wall = quern_wall() - s->start, t = quern_run_time(run), end = run->scene->general.end;
+	const double wall = wall_of(s), t = quern_run_time(run), end = run->scene->general.end;
 	if (settling)
 		quern_log_progress(
 			run->log, false, "settling: %lld steps, %.0f s", (long long)run->clock.settle_step, wall);
@@ -203,7 +206,7 @@ static int exit_status(const quern_run *run) {
 
 static void report_end(session *s, const char *status) {
 	quern_run *run = s->run;
-	const double wall = run->wall_before + quern_wall() - s->start;
+	const double wall = wall_of(s);
 	quern_log_add(run->log, 1, "%s: t = %.6g s, %lld steps, %.1f s (settling %.1f s), %s", status,
 		quern_run_time(run), (long long)run->clock.step, wall, run->settle_wall, run->folder);
 	if (run->status == QUERN_OK && !quern_run_over(run))
