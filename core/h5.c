@@ -66,7 +66,7 @@ bool quern_h5_create(quern_h5 *h, bool compress, size_t user_block) {
 	return !h->failed;
 }
 
-void quern_h5_discard(quern_h5 *h) {
+static void discard(quern_h5 *h) {
 	if (h->file >= 0) H5Fclose(h->file);
 	h->file = -1;
 	free(h->image);
@@ -96,7 +96,7 @@ bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
 	if (!good) snprintf(why, 256, "%.180s cannot be made: out of memory, or HDF5 refuses", path);
 	if (good && h->user_block) quern_h5_seal(h->image, size);
 	good = good && quern_save_bytes(path, h->image, size, why);
-	quern_h5_discard(h);
+	discard(h);
 	return good;
 }
 

@@ -138,7 +138,8 @@ void quern_run_destroy(quern_run *run) {
 /* How far from a whole number of intervals still counts as one, in intervals: both times may be written as decimals. */
 static double slack(double intervals) { return fmin(1e-9 * fmax(intervals, 1), 0.01); }
 
-double quern_run_due(const quern_run *run, double time) {
+/* s, when the first frame after `time` is due: at whole multiples of output.every, and at time.end. */
+static double due(const quern_run *run, double time) {
 	const quern_general *g = &run->scene->general;
 	const double last = g->end / g->every, now = time / g->every;
 	const double next = floor(now + slack(now)) + 1;
@@ -168,7 +169,7 @@ bool quern_run_rejoin(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	const double now = quern_run_time(run), intervals = now / g->every;
 	if (c->frame >= 0 && g->end / g->every < intervals - slack(intervals)) return false;
-	const bool same = quern_run_due(run, c->begin) == c->end || quern_run_due(run, now) == c->end;
+	const bool same = due(run, c->begin) == c->end || due(run, now) == c->end;
 	if (c->steps_in && !same) quern_run_cut(run);
 	return true;
 }
@@ -271,7 +272,7 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 quern_status quern_run_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
-	const double end = quern_run_due(run, c->end), length = end - c->end;
+	const double end = due(run, c->end), length = end - c->end;
 	double hard;
 	char hard_reason[200];
 	double limit = quern_run_limit(run, &hard, run->limit_reason, hard_reason);
