@@ -16,20 +16,6 @@
 static const double diameter = 2e-3, start = 14e-3;
 enum { CYCLES = 4, STRIDES = 20, STRIDE_UPDATES = 1 }; /* half a diameter per update */
 
-/* The oracle's parameter in the running scene. */
-static double *depth_of(quern_run *run) {
-	const quern_scene *scene = run->scene;
-	for (size_t i = 0; i < scene->n_instances; i++) {
-		const quern_instance *one = scene->instances[i];
-		if (strcmp(one->file->plugin.id, "oracle.packing_fraction") != 0) continue;
-		const quern_param *row = quern_param_find(one->file->plugin.params, "depth");
-		assert_non_null(row);
-		return (double *)(void *)((char *)one->self + row->offset);
-	}
-	fail_msg("there is no oracle");
-	return NULL;
-}
-
 typedef struct book {
 	double kinetic, lowest,
 		highest;             /* largest over m g d; floor's push over the weight, means over an update */
@@ -70,7 +56,7 @@ static void put(const held *h, const char *packer, const char *when, const book 
 
 static void sweep(const char *packer, double most_carried, double most_left) {
 	const held h = held_open(0.04, 0.06, 20, packer);
-	double *depth = depth_of(h.run);
+	double *depth = harness_param(h.run, "oracle.packing_fraction", "depth");
 	assert_true(fabs(*depth - start) < 1e-12);
 	harness_steps(h.run, 2);
 	const double mass = h.weight / 9.81, top = held_top(&h);
