@@ -13,8 +13,11 @@ import math
 import pathlib
 import statistics
 import subprocess
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import provenance  # noqa: E402
 MODELS = {"hybrid": [], "grains": ["model=grains"], "continuum": ["model=continuum"],
           "continuum, affine": ["model=continuum", "continuum.rasterise=affine"]}
 FIGURES = (("run-out", "front"), ("height", "height"))
@@ -51,6 +54,7 @@ def report(runs, threads):
     """The page, as text."""
     seeds = len(runs["grains"])
     lines = [f"<!-- written by studies/column/study.py: {seeds} seeds, {threads} threads -->", "",
+             f"Measured on {provenance.line(provenance.of())}.", "",
              f"**configs/column.yaml and its twins, {threads} threads; entries and carried mass relative to the mass, mean over time**", "",
              "| model | seed | run-out, m | height, m | settling, s | from release on, s | discrete share | entries | carried mass, mean and worst | invariants, worst step |",
              "|---|---|---|---|---|---|---|---|---|---|"]
