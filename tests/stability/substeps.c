@@ -53,7 +53,7 @@ static void row(int substeps, int seed) {
 }
 
 static void more_and_more_substeps(void **unused) {
-	static const int substeps[] = { 1, 3, 10, 20, 30, 42, 50, 60, 80, 120, 200 };
+	static const int substeps[] = { 1, 3, 10, 20, 30, 42, 50, 60, 80, 100, 120, 200 };
 	enum { SEED = 7, MORE = 5 };
 	(void)unused;
 	beyond_table(
