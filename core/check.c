@@ -6,28 +6,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-void check_environment(const check *c) {
+void quern_check_environment(const check *c) {
 	const char *changed = quern_environment_restore(c->home);
 	if (changed && !*c->shared->left)
 		snprintf(c->shared->left, sizeof c->shared->left, "%s.%s: changes %s",
 			quern_id_name(c->file->plugin.id), c->shared->place, changed);
 }
 
-void check_place(const check *c, const char *fmt, ...) {
+void quern_check_place(const check *c, const char *fmt, ...) {
 	va_list list;
-	if (quern_arithmetic() != c->home->arithmetic) check_environment(c);
+	if (quern_arithmetic() != c->home->arithmetic) quern_check_environment(c);
 	va_start(list, fmt);
 	vsnprintf(c->shared->place, sizeof c->shared->place, fmt, list);
 	va_end(list);
 }
 
-double check_uniform(uint64_t key, uint64_t counter, double low, double high) {
+double quern_check_uniform(uint64_t key, uint64_t counter, double low, double high) {
 	double u[2];
 	quern_random(0x71756572, key, counter, u);
 	return low + u[0] * (high - low);
 }
 
-void check_direction(uint32_t dim, uint64_t key, uint64_t counter, double out[3]) {
+void quern_check_direction(uint32_t dim, uint64_t key, uint64_t counter, double out[3]) {
 	double u[2];
 	quern_random(0x6e, key, counter, u);
 	const double angle = 2 * 3.141592653589793 * u[0], z = dim == 3 ? 2 * u[1] - 1 : 0, r = sqrt(1 - z * z);
@@ -40,7 +40,7 @@ static void note_failure(check_tally *t, const char *fmt, va_list list) {
 	if (!t->failed++) vsnprintf(t->first, sizeof t->first, fmt, list);
 }
 
-void check_expect(check_tally *t, bool good, const char *fmt, ...) {
+void quern_check_expect(check_tally *t, bool good, const char *fmt, ...) {
 	va_list list;
 	t->tried++;
 	if (good) return;
@@ -49,7 +49,7 @@ void check_expect(check_tally *t, bool good, const char *fmt, ...) {
 	va_end(list);
 }
 
-void check_measure(check_tally *t, double value, double allowed, const char *fmt, ...) {
+void quern_check_measure(check_tally *t, double value, double allowed, const char *fmt, ...) {
 	va_list list;
 	t->tried++;
 	if (!(value * t->allowed <= t->worst * allowed) || !(t->allowed > 0))
@@ -60,7 +60,7 @@ void check_measure(check_tally *t, double value, double allowed, const char *fmt
 	va_end(list);
 }
 
-void check_tell(const check *c, const check_tally *t, const char *note, ...) {
+void quern_check_tell(const check *c, const check_tally *t, const char *note, ...) {
 	quern_text text = { 0 };
 	if (t->failed) quern_text_add(&text, "%s (%u of %u cases)", t->first, t->failed, t->tried);
 	else if (note) {
@@ -83,7 +83,7 @@ enum { GUARD = 64, POISON = 0xa5 };
 
 static size_t entry_bytes(const check_column *c) { return c->integer ? sizeof(int32_t) : sizeof(quern_real); }
 
-void check_kernel_init(
+void quern_check_kernel_init(
 	check_kernel *k, const check *c, const check_instance *instance, const char *name, uint32_t n) {
 	*k = (check_kernel) { .check = c,
 		.instance = instance,
@@ -96,7 +96,7 @@ void check_kernel_init(
 	for (int i = 0; i < CHECK_ROWS; i++) k->use[i] = k->use_second[i] = -1;
 }
 
-void check_kernel_finish(check_kernel *k) {
+void quern_check_kernel_finish(check_kernel *k) {
 	for (uint32_t i = 0; i < k->n_columns; i++) {
 		free(k->column[i].given);
 		free(k->column[i].found);
@@ -112,44 +112,45 @@ static int add_column(check_kernel *k, const char *text, check_role role, bool i
 	return (int)k->n_columns++;
 }
 
-int check_add(check_kernel *k, int name, const char *text, check_role role, uint32_t count) {
+int quern_check_add(check_kernel *k, int name, const char *text, check_role role, uint32_t count) {
 	const int first = (int)k->n_columns;
 	for (uint32_t i = 0; i < count; i++) add_column(k, text, role, false);
 	return k->at[name] = first;
 }
 
-int check_add_integers(check_kernel *k, int name, const char *text, check_role role) {
+int quern_check_add_integers(check_kernel *k, int name, const char *text, check_role role) {
 	return k->at[name] = add_column(k, text, role, true);
 }
 
-quern_real *check_given(const check_kernel *k, int name, uint32_t component) {
+quern_real *quern_check_given(const check_kernel *k, int name, uint32_t component) {
 	return k->at[name] < 0 ? NULL : k->column[k->at[name] + (int)component].given;
 }
 
-quern_real *check_found(const check_kernel *k, int name, uint32_t component) {
+quern_real *quern_check_found(const check_kernel *k, int name, uint32_t component) {
 	return k->at[name] < 0 ? NULL : k->column[k->at[name] + (int)component].found;
 }
 
-void check_fill(const check_kernel *k, int name, uint32_t count, uint64_t key, double low, double high) {
+void quern_check_fill(
+	const check_kernel *k, int name, uint32_t count, uint64_t key, double low, double high) {
 	for (uint32_t c = 0; c < count; c++)
 		for (uint32_t i = 0; i < k->n; i++)
-			check_given(k, name, c)[i] = check_uniform(key, (uint64_t)c << 32 | i, low, high);
+			quern_check_given(k, name, c)[i] = quern_check_uniform(key, (uint64_t)c << 32 | i, low, high);
 }
 
-uint32_t check_components(uint8_t shape, uint32_t dim) {
+uint32_t quern_check_components(uint8_t shape, uint32_t dim) {
 	static const uint8_t planar[] = { 0, 1, 2, 1, 3, 4, 1, 1 }, spatial[] = { 0, 1, 3, 3, 6, 9, 1, 1 };
 	return shape > QUERN_ID ? 0 : (dim == 2 ? planar : spatial)[shape];
 }
 
 /* Fields that are read: of ordinary size, a unit vector where the unit is 1. Those that are changed: as new. */
 static void fill_row(check_kernel *k, const quern_use *row, int first, uint64_t key) {
-	const uint32_t count = check_components(row->shape, k->dim);
+	const uint32_t count = quern_check_components(row->shape, k->dim);
 	const bool fresh = row->access != QUERN_READ;
 	const bool unit = row->shape == QUERN_VECTOR && (!row->unit || !strcmp(row->unit, "1"));
-	const double size = check_ordinary(k->check, row->unit);
+	const double size = quern_check_ordinary(k->check, row->unit);
 	for (uint32_t i = 0; i < k->n; i++) {
 		double direction[3];
-		check_direction(k->dim, key, i, direction);
+		quern_check_direction(k->dim, key, i, direction);
 		for (uint32_t c = 0; c < count; c++) {
 			const check_column *column = &k->column[first + (int)c];
 			const bool diagonal = (row->shape == QUERN_TENSOR && c % (k->dim + 1) == 0) ||
@@ -158,8 +159,8 @@ static void fill_row(check_kernel *k, const quern_use *row, int first, uint64_t 
 			const double x = fresh  ? (diagonal ? row->initial : 0)
 							 : unit ? direction[c]
 							 : row->shape == QUERN_SCALAR
-								 ? check_uniform(key, (uint64_t)c << 32 | i, 0.5 * size, 1.5 * size)
-								 : check_uniform(key, (uint64_t)c << 32 | i, -size, size);
+								 ? quern_check_uniform(key, (uint64_t)c << 32 | i, 0.5 * size, 1.5 * size)
+								 : quern_check_uniform(key, (uint64_t)c << 32 | i, -size, size);
 			if (column->integer) ((int32_t *)column->given)[i] = fresh ? (int32_t)row->initial : 0;
 			else ((quern_real *)column->given)[i] = x;
 		}
@@ -174,7 +175,7 @@ static int same_field(const check_kernel *k, const quern_use *row, const int *us
 	return -1;
 }
 
-void check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) {
+void quern_check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) {
 	static const check_role roles[] = { CHECK_IN, CHECK_IN, CHECK_OUT, CHECK_CHANGED, CHECK_CHANGED };
 	const quern_use *rows = k->check->file->uses;
 	k->hook = hook;
@@ -183,7 +184,7 @@ void check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) 
 		if (row->hook != hook || row->shape == QUERN_ID) continue;
 		if (!strcmp(row->field, "contact.couple")) continue; /* a batch brings it, beside the force */
 		if ((row->with || row->flags & (QUERN_OPTIONAL | QUERN_WANTED)) && !optional) continue;
-		if (!check_counts(k->check, k->instance, row)) continue;
+		if (!quern_check_counts(k->check, k->instance, row)) continue;
 		for (uint32_t side = 0; side <= second; side++) {
 			int *use = side ? k->use_second : k->use;
 			const bool history = !strncmp(row->field, "contact.", 8);
@@ -191,14 +192,14 @@ void check_add_uses(check_kernel *k, uint32_t hook, bool optional, bool second) 
 			use[r] = same_field(k, row, use);
 			if (use[r] >= 0) continue;
 			use[r] = (int)k->n_columns;
-			for (uint32_t c = 0; c < check_components(row->shape, k->dim); c++)
+			for (uint32_t c = 0; c < quern_check_components(row->shape, k->dim); c++)
 				add_column(k, row->field, roles[row->access], row->shape == QUERN_INDEX);
 			fill_row(k, row, use[r], 1000 + r * 2 + side);
 		}
 	}
 }
 
-void check_columns(
+void quern_check_columns(
 	const check_kernel *k, const check_batch *b, const int *use, quern_column out[CHECK_ROWS]) {
 	const quern_use *rows = k->check->file->uses;
 	for (uint32_t r = 0; r < CHECK_ROWS; r++) out[r] = (quern_column) { .real = { NULL } };
@@ -206,7 +207,7 @@ void check_columns(
 		if (use[r] < 0) continue;
 		if (rows[r].shape == QUERN_INDEX) out[r].index = b->at[use[r]];
 		else
-			for (uint32_t c = 0; c < check_components(rows[r].shape, k->dim); c++)
+			for (uint32_t c = 0; c < quern_check_components(rows[r].shape, k->dim); c++)
 				out[r].real[c] = b->at[use[r] + (int)c];
 	}
 }
@@ -268,7 +269,7 @@ static void run_piece(void *arg, uint32_t piece, uint32_t worker) {
 		store_column(r, worker, &k->column[c], b.at[c], begin, n, b.cap);
 }
 
-void check_run(check_kernel *k, uint32_t cut, quern_pool *pool) {
+void quern_check_run(check_kernel *k, uint32_t cut, quern_pool *pool) {
 	enum { MOST = 16 };
 	const uint32_t workers = pool ? quern_pool_workers(pool) : 1, size = k->check->file->plugin.instance_size;
 	const uint32_t cap = (cut + QUERN_LANES - 1) / QUERN_LANES * QUERN_LANES;
@@ -283,13 +284,13 @@ void check_run(check_kernel *k, uint32_t cut, quern_pool *pool) {
 		memory[w] = aligned_alloc(64, r.stride * (k->n_columns + 1));
 		if (!memory[w]) abort();
 	}
-	check_place(k->check, "%s, %u-D, while n = %u", k->name, k->dim, cut < k->n ? cut : k->n);
+	quern_check_place(k->check, "%s, %u-D, while n = %u", k->name, k->dim, cut < k->n ? cut : k->n);
 	const uint32_t pieces = (k->n + cut - 1) / cut;
 	if (pool) quern_pool_each(pool, pieces, run_piece, &r);
 	else
 		for (uint32_t i = 0; i < pieces; i++) {
 			const uint32_t n = k->n - i * cut < cut ? k->n - i * cut : cut;
-			if (n != cut) check_place(k->check, "%s, %u-D, while n = %u", k->name, k->dim, n);
+			if (n != cut) quern_check_place(k->check, "%s, %u-D, while n = %u", k->name, k->dim, n);
 			run_piece(&r, i, 0);
 		}
 	k->altered += memcmp(self, k->instance->self, size) != 0;
@@ -303,18 +304,18 @@ void check_run(check_kernel *k, uint32_t cut, quern_pool *pool) {
 	free(self);
 }
 
-void check_advance(check_kernel *k) {
+void quern_check_advance(check_kernel *k) {
 	for (uint32_t c = 0; c < k->n_columns; c++)
 		if (k->column[c].role == CHECK_CHANGED)
 			memcpy(k->column[c].given, k->column[c].found, k->n * entry_bytes(&k->column[c]));
 }
 
-void check_carry(const check_kernel *from, check_kernel *to) {
+void quern_check_carry(const check_kernel *from, check_kernel *to) {
 	const quern_use *rows = from->check->file->uses;
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++)
 		for (uint32_t q = 0; rows[q].field && q < CHECK_ROWS; q++) {
 			if (from->use[r] < 0 || to->use[q] < 0 || strcmp(rows[r].field, rows[q].field) != 0) continue;
-			for (uint32_t c = 0; c < check_components(rows[r].shape, from->dim); c++) {
+			for (uint32_t c = 0; c < quern_check_components(rows[r].shape, from->dim); c++) {
 				const check_column *a = &from->column[from->use[r] + (int)c],
 								   *b = &to->column[to->use[q] + (int)c];
 				if (a->found) memcpy(b->given, a->found, from->n * entry_bytes(a));
@@ -322,7 +323,7 @@ void check_carry(const check_kernel *from, check_kernel *to) {
 		}
 }
 
-bool check_finite(const check_kernel *k, const char **column) {
+bool quern_check_finite(const check_kernel *k, const char **column) {
 	for (uint32_t c = 0; c < k->n_columns; c++) {
 		const check_column *one = &k->column[c];
 		for (uint32_t i = 0; i < k->n && one->found && !one->integer; i++)

@@ -25,14 +25,14 @@ typedef struct check {
 } check;
 
 /* Names the next call. If the last one has changed arithmetic, that is noted and put back. */
-__attribute__((format(printf, 2, 3))) void check_place(const check *, const char *fmt, ...);
+__attribute__((format(printf, 2, 3))) void quern_check_place(const check *, const char *fmt, ...);
 /* The same for all of the environment, after calls that may do more than compute. */
-void check_environment(const check *);
+void quern_check_environment(const check *);
 
 /* Uniform in [low, high), a function of its arguments. */
-double check_uniform(uint64_t key, uint64_t counter, double low, double high);
+double quern_check_uniform(uint64_t key, uint64_t counter, double low, double high);
 /* A unit vector; in 2-D the third component is zero. */
-void check_direction(uint32_t dim, uint64_t key, uint64_t counter, double out[3]);
+void quern_check_direction(uint32_t dim, uint64_t key, uint64_t counter, double out[3]);
 
 /* ---- tallies: one line of output each ---- */
 typedef struct check_tally {
@@ -42,11 +42,11 @@ typedef struct check_tally {
 	char first[240];       /* what failed first */
 } check_tally;
 
-__attribute__((format(printf, 3, 4))) void check_expect(check_tally *, bool good, const char *fmt, ...);
-__attribute__((format(printf, 4, 5))) void check_measure(
+__attribute__((format(printf, 3, 4))) void quern_check_expect(check_tally *, bool good, const char *fmt, ...);
+__attribute__((format(printf, 4, 5))) void quern_check_measure(
 	check_tally *, double value, double allowed, const char *fmt, ...);
 /* Prints the line: "ok  name: figure". `note` (printf-like, NULL: none) stands in place of the number of cases. */
-__attribute__((format(printf, 3, 4))) void check_tell(
+__attribute__((format(printf, 3, 4))) void quern_check_tell(
 	const check *, const check_tally *, const char *note, ...);
 
 /* ---- instances ---- */
@@ -64,15 +64,16 @@ typedef enum { CHECK_READY, CHECK_REFUSED, CHECK_RUDE } check_outcome;
 
 /* Setting 0: ordinary parameters; 1 .. 2 n: one of them at its lower or upper bound; above: any mixture. RUDE: init
  * fails without a word, or complains and goes on; REFUSED: the reason is in `why`. Finish in any case. */
-check_outcome check_instance_create(const check *, uint32_t dim, uint64_t setting, check_instance *);
+check_outcome quern_check_instance_create(const check *, uint32_t dim, uint64_t setting, check_instance *);
 /* The same setting with every parameter that contains a mass, such as N/m or J/kg, for masses that are `factor` times as
  * large. */
-check_outcome check_instance_scaled(const check *, const check_instance *, double factor, check_instance *);
-void check_instance_finish(const check *, check_instance *);
-uint64_t check_settings(const check *); /* how many single ones there are, setting 0 included */
+check_outcome quern_check_instance_scaled(
+	const check *, const check_instance *, double factor, check_instance *);
+void quern_check_instance_finish(const check *, check_instance *);
+uint64_t quern_check_settings(const check *); /* how many single ones there are, setting 0 included */
 /* A value of ordinary size in this unit: 1e-3 for m, 1500 for kg/m^3. */
-double check_ordinary(const check *, const char *unit);
-bool check_counts(const check *, const check_instance *, const quern_use *);
+double quern_check_ordinary(const check *, const char *unit);
+bool quern_check_counts(const check *, const check_instance *, const quern_use *);
 
 /* ---- kernels ---- */
 /* Columns: all uses on both sides as tensors, and what a kind knows by a name. */
@@ -108,18 +109,20 @@ typedef struct check_kernel {
 	const char *culprit;
 } check_kernel;
 
-void check_kernel_init(check_kernel *, const check *, const check_instance *, const char *name, uint32_t n);
-void check_kernel_finish(check_kernel *);
+void quern_check_kernel_init(
+	check_kernel *, const check *, const check_instance *, const char *name, uint32_t n);
+void quern_check_kernel_finish(check_kernel *);
 /* Adds `count` columns, zero so far; returns the first one, which is also noted as at[name]. */
-int check_add(check_kernel *, int name, const char *text, check_role, uint32_t count);
-int check_add_integers(check_kernel *, int name, const char *text, check_role);
+int quern_check_add(check_kernel *, int name, const char *text, check_role, uint32_t count);
+int quern_check_add_integers(check_kernel *, int name, const char *text, check_role);
 /* Adds the rows of this hook that count; `optional` also those that are. `second`: contact's other body. */
-void check_add_uses(check_kernel *, uint32_t hook, bool optional, bool second);
-quern_real *check_given(const check_kernel *, int name, uint32_t component);
-quern_real *check_found(const check_kernel *, int name, uint32_t component);
-void check_fill(const check_kernel *, int name, uint32_t count, uint64_t key, double low, double high);
+void quern_check_add_uses(check_kernel *, uint32_t hook, bool optional, bool second);
+quern_real *quern_check_given(const check_kernel *, int name, uint32_t component);
+quern_real *quern_check_found(const check_kernel *, int name, uint32_t component);
+void quern_check_fill(const check_kernel *, int name, uint32_t count, uint64_t key, double low, double high);
 /* Row's columns in a batch. */
-void check_columns(const check_kernel *, const check_batch *, const int *use, quern_column out[CHECK_ROWS]);
+void quern_check_columns(
+	const check_kernel *, const check_batch *, const int *use, quern_column out[CHECK_ROWS]);
 
 static inline void *check_at(const check_kernel *k, const check_batch *b, int name, uint32_t component) {
 	return k->at[name] < 0 ? NULL : b->at[k->at[name] + (int)component];
@@ -129,18 +132,18 @@ static inline void *check_at(const check_kernel *k, const check_batch *b, int na
 	for (uint32_t c_ = 0; c_ < (count); c_++) (member)[c_] = check_at(k, b, name, c_)
 
 /* Calls it on all entities, `cut` at a time, on several workers where `pool` is given. */
-void check_run(check_kernel *, uint32_t cut, quern_pool *pool);
+void quern_check_run(check_kernel *, uint32_t cut, quern_pool *pool);
 /* What was found becomes what is given, for columns that are changed in place: the next step. */
-void check_advance(check_kernel *);
+void quern_check_advance(check_kernel *);
 /* The same for fields of the same name of another kernel: from one hook to the next. */
-void check_carry(const check_kernel *from, check_kernel *to);
-bool check_finite(const check_kernel *, const char **column);
+void quern_check_carry(const check_kernel *from, check_kernel *to);
+bool quern_check_finite(const check_kernel *, const char **column);
 
 static inline uint32_t check_axial(uint32_t dim) { return dim == 3 ? 3 : 1; }
 static inline bool check_has_dim(const check *c, uint32_t dim) {
 	return (!c->dimension || c->dimension == dim) && c->file->plugin.dims & (dim == 2 ? QUERN_2D : QUERN_3D);
 }
-uint32_t check_components(uint8_t shape, uint32_t dim);
+uint32_t quern_check_components(uint8_t shape, uint32_t dim);
 
 /* ---- kinds ---- */
 typedef struct check_kind {
@@ -151,10 +154,11 @@ typedef struct check_kind {
 	void (*law)(const check *); /* what must hold for this kind */
 } check_kind;
 
-extern const check_kind check_contact, check_material, check_shape, check_transfer, check_coupling,
-	check_oracle, check_packer, check_body, check_integrator, check_neighbours, check_observer;
+extern const check_kind quern_check_contact, quern_check_material, quern_check_shape, quern_check_transfer,
+	quern_check_coupling, quern_check_oracle, quern_check_packer, quern_check_body, quern_check_integrator,
+	quern_check_neighbours, quern_check_observer;
 
-void check_table(const check *);
-void check_solver(const check *);
-void check_parameters(const check *, const check_kind *);
-void check_batches(const check *, const check_kind *);
+void quern_check_table(const check *);
+void quern_check_solver(const check *);
+void quern_check_parameters(const check *, const check_kind *);
+void quern_check_batches(const check *, const check_kind *);

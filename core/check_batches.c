@@ -1,4 +1,4 @@
-/* check_batches - what every kernel promises: results that depend neither on how entities are cut nor on threads, no byte
+/* quern_check_batches - what every kernel promises: results that depend neither on how entities are cut nor on threads, no byte
  * outside its columns, sensible numbers for any parameters */
 #include "check.h"
 #include "text.h"
@@ -47,27 +47,28 @@ typedef struct {
 
 static void try_kernel(check_kernel *k, batch_tallies *t, quern_pool *pool) {
 	static const uint32_t cuts[] = { 1, 7, 8, 64, 250 };
-	check_run(k, 512, NULL);
+	quern_check_run(k, 512, NULL);
 	results whole = keep(k);
 	for (size_t i = 0; i < sizeof cuts / sizeof *cuts; i++) {
-		check_run(k, cuts[i], NULL);
+		quern_check_run(k, cuts[i], NULL);
 		const char *column = differs(k, &whole);
-		check_expect(&t->batches, !column, "%s, %u-D: %s differs between batches of 512 and of %u", k->name,
-			k->dim, column, cuts[i]);
+		quern_check_expect(&t->batches, !column, "%s, %u-D: %s differs between batches of 512 and of %u",
+			k->name, k->dim, column, cuts[i]);
 	}
 	for (int turn = 0; turn < 8; turn++) {
-		check_run(k, 16, pool);
+		quern_check_run(k, 16, pool);
 		const char *column = differs(k, &whole);
-		check_expect(&t->threads, !column, "%s, %u-D: %s differs when several threads call it", k->name,
+		quern_check_expect(&t->threads, !column, "%s, %u-D: %s differs when several threads call it", k->name,
 			k->dim, column);
 	}
 	const char *culprit = k->culprit ? k->culprit : "";
-	check_expect(&t->guards, !k->overrun, "%s, %u-D: writes beyond cap of %s", k->name, k->dim, culprit);
-	check_expect(&t->inputs, !k->changed, "%s, %u-D: changes its input %s", k->name, k->dim, culprit);
-	check_expect(
+	quern_check_expect(
+		&t->guards, !k->overrun, "%s, %u-D: writes beyond cap of %s", k->name, k->dim, culprit);
+	quern_check_expect(&t->inputs, !k->changed, "%s, %u-D: changes its input %s", k->name, k->dim, culprit);
+	quern_check_expect(
 		&t->self, !k->altered, "%s, %u-D: changes self, which is read-only after init", k->name, k->dim);
-	check_expect(&t->environment, !k->environment, "%s, %u-D: changes rounding or another mode of arithmetic",
-		k->name, k->dim);
+	quern_check_expect(&t->environment, !k->environment,
+		"%s, %u-D: changes rounding or another mode of arithmetic", k->name, k->dim);
 	free(whole.bytes);
 }
 
@@ -76,28 +77,28 @@ static void try_instance(const check *c, const check_kind *kind, const check_ins
 	check_kernel *k = quern_take(1, sizeof *k);
 	for (uint32_t variant = 0; variant < 16 && kind->make(c, it, variant, 700, k); variant++) {
 		try_kernel(k, t, pool);
-		check_kernel_finish(k);
+		quern_check_kernel_finish(k);
 	}
 	free(k);
 	quern_pool_destroy(pool);
 }
 
-void check_batches(const check *c, const check_kind *kind) {
+void quern_check_batches(const check *c, const check_kind *kind) {
 	batch_tallies t = { { .name = "batches" }, { .name = "threads" }, { .name = "guards" },
 		{ .name = "inputs" }, { .name = "self" }, { .name = "arithmetic" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
-		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) try_instance(c, kind, &it, &t);
-		check_instance_finish(c, &it);
+		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) try_instance(c, kind, &it, &t);
+		quern_check_instance_finish(c, &it);
 	}
 	if (!t.batches.tried) return;
-	check_tell(c, &t.batches, "1, 7, 8, 64, 250 and 512 at a time give the same bits");
-	check_tell(c, &t.threads, "4 threads at once give the same bits");
-	check_tell(c, &t.guards, "nothing is written beyond cap");
-	check_tell(c, &t.inputs, "inputs are left alone");
-	check_tell(c, &t.self, "self is left alone");
-	check_tell(c, &t.environment, "modes of arithmetic are left alone");
+	quern_check_tell(c, &t.batches, "1, 7, 8, 64, 250 and 512 at a time give the same bits");
+	quern_check_tell(c, &t.threads, "4 threads at once give the same bits");
+	quern_check_tell(c, &t.guards, "nothing is written beyond cap");
+	quern_check_tell(c, &t.inputs, "inputs are left alone");
+	quern_check_tell(c, &t.self, "self is left alone");
+	quern_check_tell(c, &t.environment, "modes of arithmetic are left alone");
 }
 
 /* ---- parameters ---- */
@@ -108,29 +109,29 @@ static bool gives_sense(const check *c, const check_kind *kind, const check_inst
 	if (!kind->make) return true;
 	check_kernel *k = quern_take(1, sizeof *k);
 	for (uint32_t variant = 0; good && variant < 16 && kind->make(c, it, variant, 64, k); variant++) {
-		check_run(k, 64, NULL);
-		good = check_finite(k, why);
-		check_kernel_finish(k);
+		quern_check_run(k, 64, NULL);
+		good = quern_check_finite(k, why);
+		quern_check_kernel_finish(k);
 	}
 	free(k);
 	return good;
 }
 
-void check_parameters(const check *c, const check_kind *kind) {
+void quern_check_parameters(const check *c, const check_kind *kind) {
 	enum { MIXTURES = 60 };
 	check_tally ordinary = { .name = "set-up" }, polite = { .name = "parameters" },
 				finite = { .name = "finite" };
-	const uint64_t single = check_settings(c), n = c->file->n_params ? single + MIXTURES : 1;
+	const uint64_t single = quern_check_settings(c), n = c->file->n_params ? single + MIXTURES : 1;
 	uint32_t accepted = 0, refused = 0;
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (uint64_t setting = 0; check_has_dim(c, dim) && setting < n; setting++) {
 			check_instance it;
 			const char *why = "";
-			const check_outcome outcome = check_instance_create(c, dim, setting, &it);
+			const check_outcome outcome = quern_check_instance_create(c, dim, setting, &it);
 			if (!setting)
-				check_expect(&ordinary, outcome == CHECK_READY,
+				quern_check_expect(&ordinary, outcome == CHECK_READY,
 					"no instance in %u-D: %s; name what it needs with --set key=value", dim, it.why);
-			check_expect(&polite, outcome != CHECK_RUDE, "%s (%u-D)", it.why, dim);
+			quern_check_expect(&polite, outcome != CHECK_RUDE, "%s (%u-D)", it.why, dim);
 			accepted += outcome == CHECK_READY;
 			refused += outcome == CHECK_REFUSED;
 			if (outcome == CHECK_READY) {
@@ -141,12 +142,12 @@ void check_parameters(const check *c, const check_kind *kind) {
 				snprintf(what, sizeof what, "%s", quern_text_string(&text));
 				for (char *s = what; *s; s++)
 					if (*s == '\n') *s = ';';
-				check_expect(&finite, good, "%s is not finite in %u-D with %s", why, dim, what);
+				quern_check_expect(&finite, good, "%s is not finite in %u-D with %s", why, dim, what);
 				quern_text_finish(&text);
 			}
-			check_instance_finish(c, &it);
+			quern_check_instance_finish(c, &it);
 		}
-	check_tell(c, &ordinary, NULL);
-	check_tell(c, &polite, "%u settings accepted, %u refused with a reason", accepted, refused);
-	check_tell(c, &finite, NULL);
+	quern_check_tell(c, &ordinary, NULL);
+	quern_check_tell(c, &polite, "%u settings accepted, %u refused with a reason", accepted, refused);
+	quern_check_tell(c, &finite, NULL);
 }

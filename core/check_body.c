@@ -1,4 +1,4 @@
-/* check_body - geometry: unit normals, gaps that grow along them, surfaces that go with the pose */
+/* quern_check_body - geometry: unit normals, gaps that grow along them, surfaces that go with the pose */
 #include "check.h"
 #include <math.h>
 #include <stdlib.h>
@@ -34,26 +34,26 @@ static void range_of(const check_kernel *k, uint32_t a, double *low, double *hig
 
 static void create(
 	const check *c, const check_instance *it, const quern_pose *pose, uint32_t n, check_kernel *k) {
-	check_kernel_init(k, c, it, "closest", n);
+	quern_check_kernel_init(k, c, it, "closest", n);
 	k->call = call;
 	k->more = pose;
-	check_add(k, POSITION, "position", CHECK_IN, k->dim);
-	check_add(k, RADIUS, "radius", CHECK_IN, 1);
-	check_add(k, GAP, "gap", CHECK_OUT, 1);
-	check_add(k, NORMAL, "normal", CHECK_OUT, k->dim);
-	check_add(k, SPEED, "velocity", CHECK_OUT, k->dim);
+	quern_check_add(k, POSITION, "position", CHECK_IN, k->dim);
+	quern_check_add(k, RADIUS, "radius", CHECK_IN, 1);
+	quern_check_add(k, GAP, "gap", CHECK_OUT, 1);
+	quern_check_add(k, NORMAL, "normal", CHECK_OUT, k->dim);
+	quern_check_add(k, SPEED, "velocity", CHECK_OUT, k->dim);
 	for (uint32_t a = 0; a < k->dim; a++) {
 		double low, high;
 		range_of(k, a, &low, &high);
 		for (uint32_t i = 0; i < n; i++)
-			check_given(k, POSITION, a)[i] = check_uniform(130, (uint64_t)a << 32 | i, low, high);
+			quern_check_given(k, POSITION, a)[i] = quern_check_uniform(130, (uint64_t)a << 32 | i, low, high);
 	}
 }
 
 static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
 	if (variant >= VARIANTS) return false;
 	create(c, it, &still, n, k);
-	if (variant == GRAINS) check_fill(k, RADIUS, 1, 131, 1e-4, 1e-3);
+	if (variant == GRAINS) quern_check_fill(k, RADIUS, 1, 131, 1e-4, 1e-3);
 	return true;
 }
 
@@ -65,32 +65,35 @@ typedef struct {
 
 static void check_surface(check_kernel *k, check_kernel *moved, tallies *t) {
 	const double scale = 1e-4;
-	check_run(k, 64, NULL);
+	quern_check_run(k, 64, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
 		double length = 0;
-		for (uint32_t a = 0; a < k->dim; a++) length += pow(check_found(k, NORMAL, a)[i], 2);
-		check_measure(&t->normals, fabs(sqrt(length) - 1), 1e-12, "%u-D: a normal has the length %.15g",
+		for (uint32_t a = 0; a < k->dim; a++) length += pow(quern_check_found(k, NORMAL, a)[i], 2);
+		quern_check_measure(&t->normals, fabs(sqrt(length) - 1), 1e-12, "%u-D: a normal has the length %.15g",
 			k->dim, sqrt(length));
 		for (uint32_t a = 0; a < k->dim; a++)
-			check_given(moved, POSITION, a)[i] =
-				check_given(k, POSITION, a)[i] + scale * check_found(k, NORMAL, a)[i];
-		check_given(moved, RADIUS, 0)[i] = 2e-4;
+			quern_check_given(moved, POSITION, a)[i] =
+				quern_check_given(k, POSITION, a)[i] + scale * quern_check_found(k, NORMAL, a)[i];
+		quern_check_given(moved, RADIUS, 0)[i] = 2e-4;
 	}
-	check_run(moved, 64, NULL);
+	quern_check_run(moved, 64, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
-		const double was = check_found(k, GAP, 0)[i], is = check_found(moved, GAP, 0)[i] + 2e-4;
+		const double was = quern_check_found(k, GAP, 0)[i], is = quern_check_found(moved, GAP, 0)[i] + 2e-4;
 		if (was <= 0 && is > 0) continue; /* through the surface a corner may be nearer */
-		check_measure(&t->gaps, fabs(is - was - scale) / scale, 1e-9,
+		quern_check_measure(&t->gaps, fabs(is - was - scale) / scale, 1e-9,
 			"%u-D: %.3g m along the normal change the gap from %.9g to %.9g m", k->dim, scale, was, is);
 	}
-	memcpy(check_given(moved, POSITION, 0), check_given(k, POSITION, 0), k->n * sizeof(quern_real));
+	memcpy(
+		quern_check_given(moved, POSITION, 0), quern_check_given(k, POSITION, 0), k->n * sizeof(quern_real));
 	for (uint32_t a = 1; a < k->dim; a++)
-		memcpy(check_given(moved, POSITION, a), check_given(k, POSITION, a), k->n * sizeof(quern_real));
-	check_run(moved, 64, NULL);
+		memcpy(quern_check_given(moved, POSITION, a), quern_check_given(k, POSITION, a),
+			k->n * sizeof(quern_real));
+	quern_check_run(moved, 64, NULL);
 	for (uint32_t i = 0; i < k->n; i++)
-		check_measure(&t->radii, fabs(check_found(k, GAP, 0)[i] - check_found(moved, GAP, 0)[i] - 2e-4),
-			1e-15, "%u-D: a radius of 2e-4 m changes the gap from %.9g to %.9g m", k->dim,
-			check_found(k, GAP, 0)[i], check_found(moved, GAP, 0)[i]);
+		quern_check_measure(&t->radii,
+			fabs(quern_check_found(k, GAP, 0)[i] - quern_check_found(moved, GAP, 0)[i] - 2e-4), 1e-15,
+			"%u-D: a radius of 2e-4 m changes the gap from %.9g to %.9g m", k->dim,
+			quern_check_found(k, GAP, 0)[i], quern_check_found(moved, GAP, 0)[i]);
 }
 
 static void check_bounds(const check_kernel *k, tallies *t) {
@@ -98,8 +101,9 @@ static void check_bounds(const check_kernel *k, tallies *t) {
 	((const quern_body_ops *)k->ops)->bounds(k->instance->self, k->dim, lower, upper);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t a = 0; a < k->dim; a++) {
-			const double x = check_given(k, POSITION, a)[i];
-			check_expect(&t->bounds, check_found(k, GAP, 0)[i] > 0 || (x >= lower[a] && x <= upper[a]),
+			const double x = quern_check_given(k, POSITION, a)[i];
+			quern_check_expect(&t->bounds,
+				quern_check_found(k, GAP, 0)[i] > 0 || (x >= lower[a] && x <= upper[a]),
 				"%u-D: a place inside the body, at %.6g m along axis %u, lies outside bounds()", k->dim, x,
 				a);
 		}
@@ -118,30 +122,30 @@ static void check_pose(
 	posed->more = pose;
 	for (uint32_t i = 0; i < k->n; i++) {
 		double x[3] = { 0 }, out[3];
-		for (uint32_t a = 0; a < k->dim; a++) x[a] = check_given(k, POSITION, a)[i];
+		for (uint32_t a = 0; a < k->dim; a++) x[a] = quern_check_given(k, POSITION, a)[i];
 		pose_point(pose, k->dim, x, out);
-		for (uint32_t a = 0; a < k->dim; a++) check_given(posed, POSITION, a)[i] = out[a];
-		check_given(posed, RADIUS, 0)[i] = 0;
+		for (uint32_t a = 0; a < k->dim; a++) quern_check_given(posed, POSITION, a)[i] = out[a];
+		quern_check_given(posed, RADIUS, 0)[i] = 0;
 	}
-	check_run(posed, 64, NULL);
+	quern_check_run(posed, 64, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
-		const double gap = check_found(k, GAP, 0)[i], is = check_found(posed, GAP, 0)[i];
-		check_measure(t, fabs(gap - is), 1e-12,
+		const double gap = quern_check_found(k, GAP, 0)[i], is = quern_check_found(posed, GAP, 0)[i];
+		quern_check_measure(t, fabs(gap - is), 1e-12,
 			"%u-D: the gap to the body in its pose is %.9g m, should be %.9g", k->dim, is, gap);
 		if (fabs(gap) < 1e-9) continue;
 		double arm[3] = { 0 };
 		for (uint32_t a = 0; a < k->dim; a++)
-			arm[a] = check_given(posed, POSITION, a)[i] - is * check_found(posed, NORMAL, a)[i] -
+			arm[a] = quern_check_given(posed, POSITION, a)[i] - is * quern_check_found(posed, NORMAL, a)[i] -
 					 pose->position[a];
 		for (uint32_t a = 0; a < k->dim; a++) {
 			const uint32_t b = (a + 1) % 3, c = (a + 2) % 3;
 			double v = pose->velocity[a] + (spins ? pose->spin[b] * arm[c] - pose->spin[c] * arm[b] : 0);
 			for (uint32_t e = 0; e < k->dim;
 				 e++) /* the surface's own, as that of a drum, turns with the pose */
-				v += pose->turn[3 * a + e] * check_found(k, SPEED, e)[i];
-			check_measure(t, fabs(check_found(posed, SPEED, a)[i] - v), 1e-9,
+				v += pose->turn[3 * a + e] * quern_check_found(k, SPEED, e)[i];
+			quern_check_measure(t, fabs(quern_check_found(posed, SPEED, a)[i] - v), 1e-9,
 				"%u-D: the surface moves with %.9g m/s, should with %.9g", k->dim,
-				check_found(posed, SPEED, a)[i], v);
+				quern_check_found(posed, SPEED, a)[i], v);
 		}
 	}
 }
@@ -155,20 +159,20 @@ static void check_features(const check_kernel *k, tallies *t) {
 		enum { MOST = 64 };
 		int32_t feature[MOST];
 		double x[3] = { 0 }, nearest = INFINITY;
-		const double gap = check_found(k, GAP, 0)[i];
-		for (uint32_t a = 0; a < k->dim; a++) x[a] = check_given(k, POSITION, a)[i];
-		check_place(k->check, "features, %u-D", k->dim);
+		const double gap = quern_check_found(k, GAP, 0)[i];
+		for (uint32_t a = 0; a < k->dim; a++) x[a] = quern_check_given(k, POSITION, a)[i];
+		quern_check_place(k->check, "features, %u-D", k->dim);
 		const uint32_t n = ops->features(k->instance->self, &still, x, fabs(gap) + 1e-6, MOST, feature);
 		for (uint32_t f = 0; f < n && f < MOST; f++) {
 			create(k->check, k->instance, &still, 1, one);
-			check_add_integers(one, FEATURE, "feature", CHECK_IN);
+			quern_check_add_integers(one, FEATURE, "feature", CHECK_IN);
 			((int32_t *)one->column[one->at[FEATURE]].given)[0] = feature[f];
-			for (uint32_t a = 0; a < k->dim; a++) check_given(one, POSITION, a)[0] = x[a];
-			check_run(one, 8, NULL);
-			if (check_found(one, GAP, 0)[0] < nearest) nearest = check_found(one, GAP, 0)[0];
-			check_kernel_finish(one);
+			for (uint32_t a = 0; a < k->dim; a++) quern_check_given(one, POSITION, a)[0] = x[a];
+			quern_check_run(one, 8, NULL);
+			if (quern_check_found(one, GAP, 0)[0] < nearest) nearest = quern_check_found(one, GAP, 0)[0];
+			quern_check_kernel_finish(one);
 		}
-		check_expect(&t->features, n <= MOST && (gap < 0 || fabs(nearest - gap) < 1e-9),
+		quern_check_expect(&t->features, n <= MOST && (gap < 0 || fabs(nearest - gap) < 1e-9),
 			"%u-D: the nearest surface is %.9g m away, the nearest of %u features %.9g", k->dim, gap, n,
 			nearest);
 	}
@@ -193,8 +197,8 @@ static void try_dimension(const check *c, const check_instance *it, tallies *t) 
 	check_pose(&k[0], &k[1], &shifted, false, &t->shifts);
 	check_pose(&k[0], &k[1], &turned, true, &t->turns);
 	if (((const quern_body_ops *)c->file->plugin.ops)->features) check_features(&k[0], t);
-	check_kernel_finish(&k[0]);
-	check_kernel_finish(&k[1]);
+	quern_check_kernel_finish(&k[0]);
+	quern_check_kernel_finish(&k[1]);
 	free(k);
 }
 
@@ -205,16 +209,16 @@ static void law(const check *c) {
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
-		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, &t);
-		check_instance_finish(c, &it);
+		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, &t);
+		quern_check_instance_finish(c, &it);
 	}
-	check_tell(c, &t.normals, NULL);
-	check_tell(c, &t.gaps, NULL);
-	check_tell(c, &t.radii, NULL);
-	check_tell(c, &t.bounds, NULL);
-	check_tell(c, &t.shifts, NULL);
-	check_tell(c, &t.turns, NULL);
-	if (t.features.tried) check_tell(c, &t.features, NULL);
+	quern_check_tell(c, &t.normals, NULL);
+	quern_check_tell(c, &t.gaps, NULL);
+	quern_check_tell(c, &t.radii, NULL);
+	quern_check_tell(c, &t.bounds, NULL);
+	quern_check_tell(c, &t.shifts, NULL);
+	quern_check_tell(c, &t.turns, NULL);
+	if (t.features.tried) quern_check_tell(c, &t.features, NULL);
 }
 
-const check_kind check_body = { .make = make, .law = law };
+const check_kind quern_check_body = { .make = make, .law = law };

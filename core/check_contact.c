@@ -1,4 +1,4 @@
-/* check_contact - laws between two grains: action and reaction, silence when apart, no energy out of nothing */
+/* quern_check_contact - laws between two grains: action and reaction, silence when apart, no energy out of nothing */
 #include "check.h"
 #include <math.h>
 #include <stdlib.h>
@@ -42,22 +42,23 @@ static void call(const check_kernel *k, const check_batch *b) {
 	batch.sheared = check_at(k, b, SHEARED, 0);
 	batch.rubbed = check_at(k, b, RUBBED, 0);
 	CHECK_VECTOR(batch.drag_couple, k, b, DRAG_COUPLE, turns);
-	check_columns(k, b, k->use, use);
-	check_columns(k, b, k->use_second, use_second);
+	quern_check_columns(k, b, k->use, use);
+	quern_check_columns(k, b, k->use_second, use_second);
 	ops->force[dim - 2](k->instance->self, &batch);
 }
 
 static bool uses_field(const check *c, const check_instance *it, const char *field) {
 	for (const quern_use *row = c->file->uses; row->field; row++)
-		if (!strcmp(row->field, field) && check_counts(c, it, row)) return true;
+		if (!strcmp(row->field, field) && quern_check_counts(c, it, row)) return true;
 	return false;
 }
 
 static quern_real step_of(const check_kernel *k) {
 	const quern_contact_ops *ops = k->ops;
-	const quern_real period = ops->period ? ops->period(k->instance->self, k->dim, check_given(k, MASS, 0)[0],
-												check_given(k, RADIUS, 0)[0])
-										  : 0;
+	const quern_real period = ops->period
+								  ? ops->period(k->instance->self, k->dim, quern_check_given(k, MASS, 0)[0],
+										quern_check_given(k, RADIUS, 0)[0])
+								  : 0;
 	return period > 0 && isfinite(period) ? period / 50 : 1e-6;
 }
 
@@ -66,16 +67,17 @@ static void fill_pairs(const check_kernel *k, uint64_t key) {
 	for (uint32_t i = 0; i < k->n; i++) {
 		double m[2], r[2], n[3];
 		for (uint32_t s = 0; s < 2; s++) {
-			r[s] = check_uniform(key, 2 * i + s, 0.5e-3, 1.5e-3);
+			r[s] = quern_check_uniform(key, 2 * i + s, 0.5e-3, 1.5e-3);
 			m[s] = 2500 * 3.141592653589793 * r[s] * r[s] * (k->dim == 3 ? 4.0 / 3 * r[s] : 1);
 		}
-		check_given(k, RADIUS, 0)[i] = r[0] * r[1] / (r[0] + r[1]);
-		check_given(k, MASS, 0)[i] = m[0] * m[1] / (m[0] + m[1]);
-		check_given(k, OVERLAP, 0)[i] = (i % 5 ? 1 : -1) * check_uniform(key + 1, i, 0, 0.01) * r[0];
-		check_direction(k->dim, key + 2, i, n);
-		for (uint32_t c = 0; c < k->dim; c++) check_given(k, NORMAL, c)[i] = n[c];
+		quern_check_given(k, RADIUS, 0)[i] = r[0] * r[1] / (r[0] + r[1]);
+		quern_check_given(k, MASS, 0)[i] = m[0] * m[1] / (m[0] + m[1]);
+		quern_check_given(k, OVERLAP, 0)[i] =
+			(i % 5 ? 1 : -1) * quern_check_uniform(key + 1, i, 0, 0.01) * r[0];
+		quern_check_direction(k->dim, key + 2, i, n);
+		for (uint32_t c = 0; c < k->dim; c++) quern_check_given(k, NORMAL, c)[i] = n[c];
 	}
-	check_fill(k, VELOCITY, k->dim, key + 3, -0.1, 0.1);
+	quern_check_fill(k, VELOCITY, k->dim, key + 3, -0.1, 0.1);
 }
 
 /* Relative and mean spin, from each body's where the law reads it. */
@@ -84,16 +86,16 @@ static void fill_spins(const check_kernel *k, uint64_t key) {
 	const quern_use *rows = k->check->file->uses;
 	for (uint32_t c = 0; c < turns; c++)
 		for (uint32_t i = 0; i < k->n; i++) {
-			double first = check_uniform(key, c * 65536 + i, -20, 20),
-				   second = check_uniform(key + 1, c * 65536 + i, -20, 20);
+			double first = quern_check_uniform(key, c * 65536 + i, -20, 20),
+				   second = quern_check_uniform(key + 1, c * 65536 + i, -20, 20);
 			for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
 				if (k->use[r] < 0 || k->use_second[r] < 0 || strcmp(rows[r].field, "grain.spin") != 0)
 					continue;
 				((quern_real *)k->column[k->use[r] + (int)c].given)[i] = first;
 				((quern_real *)k->column[k->use_second[r] + (int)c].given)[i] = second;
 			}
-			check_given(k, SPIN, c)[i] = first - second;
-			if (k->dim == 3) check_given(k, TURN, c)[i] = 0.5 * (first + second);
+			quern_check_given(k, SPIN, c)[i] = first - second;
+			if (k->dim == 3) quern_check_given(k, TURN, c)[i] = 0.5 * (first + second);
 		}
 }
 
@@ -101,25 +103,25 @@ enum { WITH_SPIN = 1, WITH_ENERGY = 2, VARIANTS = 4 };
 
 static void add_columns(const check *c, const check_instance *it, uint32_t variant, check_kernel *k) {
 	const uint32_t dim = it->dim, turns = check_axial(dim);
-	check_add(k, OVERLAP, "overlap", CHECK_IN, 1);
-	check_add(k, NORMAL, "normal", CHECK_IN, dim);
-	check_add(k, VELOCITY, "velocity", CHECK_IN, dim);
-	check_add(k, RADIUS, "radius", CHECK_IN, 1);
-	check_add(k, MASS, "mass", CHECK_IN, 1);
-	check_add(k, FORCE, "force", CHECK_CHANGED, dim);
-	check_add_uses(k, 0, variant & WITH_SPIN, true);
+	quern_check_add(k, OVERLAP, "overlap", CHECK_IN, 1);
+	quern_check_add(k, NORMAL, "normal", CHECK_IN, dim);
+	quern_check_add(k, VELOCITY, "velocity", CHECK_IN, dim);
+	quern_check_add(k, RADIUS, "radius", CHECK_IN, 1);
+	quern_check_add(k, MASS, "mass", CHECK_IN, 1);
+	quern_check_add(k, FORCE, "force", CHECK_CHANGED, dim);
+	quern_check_add_uses(k, 0, variant & WITH_SPIN, true);
 	if (variant & WITH_SPIN || uses_field(c, it, "grain.spin")) {
-		check_add(k, SPIN, "spin", CHECK_IN, turns);
-		if (dim == 3) check_add(k, TURN, "turn", CHECK_IN, 3);
+		quern_check_add(k, SPIN, "spin", CHECK_IN, turns);
+		if (dim == 3) quern_check_add(k, TURN, "turn", CHECK_IN, 3);
 		fill_spins(k, 40);
 	}
-	if (uses_field(c, it, "contact.couple")) check_add(k, COUPLE, "couple", CHECK_CHANGED, turns);
+	if (uses_field(c, it, "contact.couple")) quern_check_add(k, COUPLE, "couple", CHECK_CHANGED, turns);
 	if (!(variant & WITH_ENERGY)) return;
-	if (k->at[COUPLE] >= 0) check_add(k, DRAG_COUPLE, "drag_couple", CHECK_CHANGED, turns);
-	check_add(k, DASHPOT, "dashpot", CHECK_CHANGED, dim);
-	check_add(k, STORED, "stored", CHECK_CHANGED, 1);
-	check_add(k, SHEARED, "sheared", CHECK_CHANGED, 1);
-	check_add(k, RUBBED, "rubbed", CHECK_CHANGED, 1);
+	if (k->at[COUPLE] >= 0) quern_check_add(k, DRAG_COUPLE, "drag_couple", CHECK_CHANGED, turns);
+	quern_check_add(k, DASHPOT, "dashpot", CHECK_CHANGED, dim);
+	quern_check_add(k, STORED, "stored", CHECK_CHANGED, 1);
+	quern_check_add(k, SHEARED, "sheared", CHECK_CHANGED, 1);
+	quern_check_add(k, RUBBED, "rubbed", CHECK_CHANGED, 1);
 }
 
 /* Forces and energies are added to; between steps they begin at zero again, while histories go on. */
@@ -130,19 +132,19 @@ static void clear_sums(const check_kernel *k) {
 							   : sums[s] == COUPLE || sums[s] == DRAG_COUPLE ? check_axial(k->dim)
 																			 : 1;
 		for (uint32_t c = 0; k->at[sums[s]] >= 0 && c < count; c++)
-			memset(check_given(k, sums[s], c), 0, k->n * sizeof(quern_real));
+			memset(quern_check_given(k, sums[s], c), 0, k->n * sizeof(quern_real));
 	}
 }
 
 static void next_step(check_kernel *k) {
-	check_run(k, 512, NULL);
-	check_advance(k);
+	quern_check_run(k, 512, NULL);
+	quern_check_advance(k);
 	clear_sums(k);
 }
 
 static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
 	if (variant >= VARIANTS) return false;
-	check_kernel_init(k, c, it, "force", n);
+	quern_check_kernel_init(k, c, it, "force", n);
 	k->call = call;
 	add_columns(c, it, variant, k);
 	fill_pairs(k, 20);
@@ -155,13 +157,13 @@ static bool make(const check *c, const check_instance *it, uint32_t variant, uin
 
 static double size_of(const check_kernel *k, int name, uint32_t count, uint32_t i) {
 	double sum = 0;
-	for (uint32_t c = 0; k->at[name] >= 0 && c < count; c++) sum += pow(check_found(k, name, c)[i], 2);
+	for (uint32_t c = 0; k->at[name] >= 0 && c < count; c++) sum += pow(quern_check_found(k, name, c)[i], 2);
 	return sqrt(sum);
 }
 
 static void negate(const check_kernel *k, int name, uint32_t count) {
 	for (uint32_t c = 0; k->at[name] >= 0 && c < count; c++)
-		for (uint32_t i = 0; i < k->n; i++) check_given(k, name, c)[i] *= -1;
+		for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, name, c)[i] *= -1;
 }
 
 /* The same pairs named the other way round. */
@@ -180,37 +182,39 @@ static void exchange(check_kernel *k) {
 static void reaction(check_kernel *k, check_kernel *other, check_tally *t) {
 	exchange(other);
 	for (int step = 0; step < 8; step++) {
-		check_run(k, 512, NULL);
-		check_run(other, 512, NULL);
+		quern_check_run(k, 512, NULL);
+		quern_check_run(other, 512, NULL);
 		for (uint32_t i = 0; i < k->n; i++) {
 			const double force = size_of(k, FORCE, k->dim, i) + 1e-30,
 						 couple = size_of(k, COUPLE, check_axial(k->dim), i) + 1e-30;
 			for (uint32_t c = 0; c < k->dim; c++)
-				check_measure(t, fabs(check_found(k, FORCE, c)[i] + check_found(other, FORCE, c)[i]) / force,
+				quern_check_measure(t,
+					fabs(quern_check_found(k, FORCE, c)[i] + quern_check_found(other, FORCE, c)[i]) / force,
 					1e-10,
 					"%u-D: the force on the second body is not minus that on the first: %.9g and %.9g N",
-					k->dim, check_found(k, FORCE, c)[i], check_found(other, FORCE, c)[i]);
+					k->dim, quern_check_found(k, FORCE, c)[i], quern_check_found(other, FORCE, c)[i]);
 			for (uint32_t c = 0; k->at[COUPLE] >= 0 && c < check_axial(k->dim); c++)
-				check_measure(t,
-					fabs(check_found(k, COUPLE, c)[i] + check_found(other, COUPLE, c)[i]) / couple, 1e-10,
-					"%u-D: the couple on the second body is not minus that on the first", k->dim);
+				quern_check_measure(t,
+					fabs(quern_check_found(k, COUPLE, c)[i] + quern_check_found(other, COUPLE, c)[i]) /
+						couple,
+					1e-10, "%u-D: the couple on the second body is not minus that on the first", k->dim);
 		}
-		check_advance(k), clear_sums(k);
-		check_advance(other), clear_sums(other);
+		quern_check_advance(k), clear_sums(k);
+		quern_check_advance(other), clear_sums(other);
 	}
 }
 
 /* A law adds: what stood there stays. */
 static void addition(check_kernel *k, check_tally *t) {
-	check_run(k, 512, NULL);
+	quern_check_run(k, 512, NULL);
 	quern_real *alone = malloc(k->n * sizeof(quern_real));
 	if (!alone) abort();
-	memcpy(alone, check_found(k, FORCE, 0), k->n * sizeof(quern_real));
-	for (uint32_t i = 0; i < k->n; i++) check_given(k, FORCE, 0)[i] = 3;
-	check_run(k, 512, NULL);
+	memcpy(alone, quern_check_found(k, FORCE, 0), k->n * sizeof(quern_real));
+	for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, FORCE, 0)[i] = 3;
+	quern_check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++)
-		check_measure(t, fabs(check_found(k, FORCE, 0)[i] - alone[i] - 3) / (fabs(alone[i]) + 3), 1e-14,
-			"%u-D: the force is written over what another law has added", k->dim);
+		quern_check_measure(t, fabs(quern_check_found(k, FORCE, 0)[i] - alone[i] - 3) / (fabs(alone[i]) + 3),
+			1e-14, "%u-D: the force is written over what another law has added", k->dim);
 	clear_sums(k);
 	free(alone);
 }
@@ -219,28 +223,29 @@ static void apart(check_kernel *k, check_tally *t) {
 	const quern_contact_ops *ops = k->ops;
 	const quern_use *rows = k->check->file->uses;
 	for (uint32_t i = 0; i < k->n; i++) {
-		const quern_real radius = check_given(k, RADIUS, 0)[i];
+		const quern_real radius = quern_check_given(k, RADIUS, 0)[i];
 		const quern_real reach = ops->reach ? ops->reach(k->instance->self, radius) : 0;
-		check_given(k, OVERLAP, 0)[i] = -reach - (i % 3 ? 1e-3 * radius : 0);
+		quern_check_given(k, OVERLAP, 0)[i] = -reach - (i % 3 ? 1e-3 * radius : 0);
 	}
 	next_step(k);
-	check_run(k, 512, NULL);
+	quern_check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
 		const bool silent =
 			size_of(k, FORCE, k->dim, i) == 0 && size_of(k, COUPLE, check_axial(k->dim), i) == 0;
-		check_expect(t, silent, "%u-D: a force of %.3g N, a couple of %.3g N m between bodies that are apart",
-			k->dim, size_of(k, FORCE, k->dim, i), size_of(k, COUPLE, check_axial(k->dim), i));
+		quern_check_expect(t, silent,
+			"%u-D: a force of %.3g N, a couple of %.3g N m between bodies that are apart", k->dim,
+			size_of(k, FORCE, k->dim, i), size_of(k, COUPLE, check_axial(k->dim), i));
 		const double energy = size_of(k, STORED, 1, i) + size_of(k, SHEARED, 1, i) + size_of(k, RUBBED, 1, i);
-		check_expect(
+		quern_check_expect(
 			t, energy == 0, "%u-D: an energy of %.3g J between bodies that are apart", k->dim, energy);
 	}
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
 		if (k->use[r] < 0 || rows[r].access == QUERN_READ || strncmp(rows[r].field, "contact.", 8) != 0)
 			continue;
-		for (uint32_t c = 0; c < check_components(rows[r].shape, k->dim); c++)
+		for (uint32_t c = 0; c < quern_check_components(rows[r].shape, k->dim); c++)
 			for (uint32_t i = 0; i < k->n; i++) {
 				const quern_real is = ((const quern_real *)k->column[k->use[r] + (int)c].found)[i];
-				check_expect(t, is == rows[r].initial || (c && is == 0),
+				quern_check_expect(t, is == rows[r].initial || (c && is == 0),
 					"%u-D: %s of bodies apart is %.3g, not as new", k->dim, rows[r].field, is);
 			}
 	}
@@ -248,21 +253,21 @@ static void apart(check_kernel *k, check_tally *t) {
 
 static void losses(check_kernel *k, check_tally *t) {
 	for (int step = 0; step < 8; step++) {
-		check_run(k, 512, NULL);
+		quern_check_run(k, 512, NULL);
 		for (uint32_t i = 0; i < k->n; i++) {
 			double power = 0, scale = 1e-300, speed = 0;
 			for (uint32_t c = 0; c < k->dim; c++) {
-				power += check_found(k, DASHPOT, c)[i] * check_given(k, VELOCITY, c)[i];
-				speed += fabs(check_given(k, VELOCITY, c)[i]);
+				power += quern_check_found(k, DASHPOT, c)[i] * quern_check_given(k, VELOCITY, c)[i];
+				speed += fabs(quern_check_given(k, VELOCITY, c)[i]);
 			}
 			scale += speed * (size_of(k, FORCE, k->dim, i) + size_of(k, DASHPOT, k->dim, i));
-			check_measure(
+			quern_check_measure(
 				t, power / scale, 1e-12, "%u-D: the dashpot drives the bodies, with %.3g W", k->dim, power);
 			/* what a normal spring stores may be negative: grains that attract each other */
-			check_expect(t, check_found(k, SHEARED, 0)[i] >= 0, "%u-D: a tangential spring stores %.3g J",
-				k->dim, check_found(k, SHEARED, 0)[i]);
+			quern_check_expect(t, quern_check_found(k, SHEARED, 0)[i] >= 0,
+				"%u-D: a tangential spring stores %.3g J", k->dim, quern_check_found(k, SHEARED, 0)[i]);
 		}
-		check_advance(k), clear_sums(k);
+		quern_check_advance(k), clear_sums(k);
 	}
 }
 
@@ -290,16 +295,16 @@ static void cross(const double a[3], const double b[3], double out[3]) {
 static void begin_impact(const check_kernel *k, uint32_t i, impact *p) {
 	double n[3];
 	*p = (impact) { .energy = 0 };
-	check_direction(k->dim, 70, i, n);
+	quern_check_direction(k->dim, 70, i, n);
 	for (uint32_t s = 0; s < 2; s++) {
-		p->r[s] = check_uniform(71 + s, i, 0.5e-3, 1.5e-3);
+		p->r[s] = quern_check_uniform(71 + s, i, 0.5e-3, 1.5e-3);
 		p->m[s] = 2500 * 3.141592653589793 * p->r[s] * p->r[s] * (k->dim == 3 ? 4.0 / 3 * p->r[s] : 1);
 		for (uint32_t c = k->dim == 3 ? 0 : 2; c < 3 && k->at[SPIN] >= 0; c++)
-			p->w[s][c] = check_uniform(73 + s, c * 65536 + i, -50, 50);
+			p->w[s][c] = quern_check_uniform(73 + s, c * 65536 + i, -50, 50);
 	}
 	for (uint32_t c = 0; c < k->dim; c++) {
 		p->x[c] = n[c] * (p->r[0] + p->r[1]) * (1 + 1e-9);
-		p->v[c] = -0.1 * n[c] + check_uniform(75, c * 65536 + i, -0.05, 0.05);
+		p->v[c] = -0.1 * n[c] + quern_check_uniform(75, c * 65536 + i, -0.05, 0.05);
 	}
 	p->energy = motion_energy(k, p);
 }
@@ -314,17 +319,17 @@ static void give_impact(const check_kernel *k, uint32_t i, const impact *p, doub
 	for (uint32_t s = 0; s < 2; s++) arm[s] = p->r[s] - 0.5 * overlap;
 	for (uint32_t c = 0; c < 3; c++) spin[c] = -arm[0] * p->w[0][c] - arm[1] * p->w[1][c];
 	cross(spin, n, drift);
-	check_given(k, OVERLAP, 0)[i] = overlap;
-	check_given(k, RADIUS, 0)[i] = p->r[0] * p->r[1] / (p->r[0] + p->r[1]);
-	check_given(k, MASS, 0)[i] = p->m[0] * p->m[1] / (p->m[0] + p->m[1]);
+	quern_check_given(k, OVERLAP, 0)[i] = overlap;
+	quern_check_given(k, RADIUS, 0)[i] = p->r[0] * p->r[1] / (p->r[0] + p->r[1]);
+	quern_check_given(k, MASS, 0)[i] = p->m[0] * p->m[1] / (p->m[0] + p->m[1]);
 	for (uint32_t c = 0; c < k->dim; c++) {
-		check_given(k, NORMAL, c)[i] = n[c];
-		check_given(k, VELOCITY, c)[i] = p->v[c] + drift[c];
+		quern_check_given(k, NORMAL, c)[i] = n[c];
+		quern_check_given(k, VELOCITY, c)[i] = p->v[c] + drift[c];
 	}
 	const uint32_t from = k->dim == 3 ? 0 : 2;
 	for (uint32_t c = from; c < 3 && k->at[SPIN] >= 0; c++) {
-		check_given(k, SPIN, c - from)[i] = p->w[0][c] - p->w[1][c];
-		if (k->dim == 3) check_given(k, TURN, c)[i] = 0.5 * (p->w[0][c] + p->w[1][c]);
+		quern_check_given(k, SPIN, c - from)[i] = p->w[0][c] - p->w[1][c];
+		if (k->dim == 3) quern_check_given(k, TURN, c)[i] = 0.5 * (p->w[0][c] + p->w[1][c]);
 	}
 }
 
@@ -333,11 +338,12 @@ static void take_impact(
 	const double m = p->m[0] * p->m[1] / (p->m[0] + p->m[1]), share = k->dim == 2 ? 0.5 : 0.4;
 	const uint32_t from = k->dim == 3 ? 0 : 2;
 	double f[3] = { 0 }, torque[3];
-	for (uint32_t c = 0; c < k->dim; c++) f[c] = check_found(k, FORCE, c)[i];
+	for (uint32_t c = 0; c < k->dim; c++) f[c] = quern_check_found(k, FORCE, c)[i];
 	cross(f, n, torque); /* b x f = -arm n x f */
 	for (uint32_t s = 0; s < 2; s++)
 		for (uint32_t c = from; c < 3 && k->at[SPIN] >= 0; c++) {
-			const double couple = k->at[COUPLE] < 0 ? 0 : (s ? -1 : 1) * check_found(k, COUPLE, c - from)[i];
+			const double couple =
+				k->at[COUPLE] < 0 ? 0 : (s ? -1 : 1) * quern_check_found(k, COUPLE, c - from)[i];
 			p->w[s][c] += k->dt * (arm[s] * torque[c] + couple) / (share * p->m[s] * p->r[s] * p->r[s]);
 		}
 	for (uint32_t c = 0; c < k->dim; c++) {
@@ -348,11 +354,11 @@ static void take_impact(
 
 /* Motion, springs, and what dashpots and sliding say that they have taken: together never more than at the start. */
 static void keep_books(const check_kernel *k, uint32_t i, impact *p) {
-	const double held =
-		motion_energy(k, p) + check_found(k, STORED, 0)[i] + check_found(k, SHEARED, 0)[i] + p->lost;
+	const double held = motion_energy(k, p) + quern_check_found(k, STORED, 0)[i] +
+						quern_check_found(k, SHEARED, 0)[i] + p->lost;
 	for (uint32_t c = 0; c < k->dim; c++)
-		p->lost -= k->dt * check_found(k, DASHPOT, c)[i] * check_given(k, VELOCITY, c)[i];
-	p->lost += check_found(k, RUBBED, 0)[i];
+		p->lost -= k->dt * quern_check_found(k, DASHPOT, c)[i] * quern_check_given(k, VELOCITY, c)[i];
+	p->lost += quern_check_found(k, RUBBED, 0)[i];
 	if (!(held <= p->most)) p->most = held;
 }
 
@@ -363,7 +369,7 @@ static void impacts(const check *c, const check_instance *it, check_tally *t, ch
 	impact *p = malloc(PAIRS * sizeof *p);
 	double(*n)[3] = malloc(PAIRS * sizeof *n), (*arm)[2] = malloc(PAIRS * sizeof *arm);
 	if (!k || !p || !n || !arm) abort();
-	check_kernel_init(k, c, it, "force in an impact", PAIRS);
+	quern_check_kernel_init(k, c, it, "force in an impact", PAIRS);
 	k->call = call;
 	add_columns(c, it, WITH_ENERGY, k);
 	for (uint32_t i = 0; i < PAIRS; i++) begin_impact(k, i, &p[i]), give_impact(k, i, &p[i], n[i], arm[i]);
@@ -377,12 +383,12 @@ static void impacts(const check *c, const check_instance *it, check_tally *t, ch
 		}
 	}
 	for (uint32_t i = 0; i < PAIRS; i++) {
-		check_measure(t, motion_energy(k, &p[i]) / p[i].energy - 1, 5e-3,
+		quern_check_measure(t, motion_energy(k, &p[i]) / p[i].energy - 1, 5e-3,
 			"%u-D: an impact ends with %.4f of its energy", it->dim, motion_energy(k, &p[i]) / p[i].energy);
-		check_measure(books, p[i].most / p[i].energy - 1, 0.02,
+		quern_check_measure(books, p[i].most / p[i].energy - 1, 0.02,
 			"%u-D: during an impact the books hold %.4f of its energy", k->dim, p[i].most / p[i].energy);
 	}
-	check_kernel_finish(k);
+	quern_check_kernel_finish(k);
 	free(k), free(p), free(n), free(arm);
 }
 
@@ -390,15 +396,16 @@ static void impacts(const check *c, const check_instance *it, check_tally *t, ch
 static void constants(const check_kernel *k, check_tally *t) {
 	const quern_contact_ops *ops = k->ops;
 	const void *self = k->instance->self;
-	const quern_real mass = check_given(k, MASS, 0)[0], radius = check_given(k, RADIUS, 0)[0];
+	const quern_real mass = quern_check_given(k, MASS, 0)[0], radius = quern_check_given(k, RADIUS, 0)[0];
 	const quern_real stiffness = ops->stiffness ? ops->stiffness(self, k->dim, radius, 1) : 0;
 	const quern_real period = ops->period ? ops->period(self, k->dim, mass, radius) : INFINITY;
 	const quern_real reach = ops->reach ? ops->reach(self, radius) : 0;
-	check_expect(t, stiffness >= 0 && isfinite(stiffness), "%u-D: stiffness is %.3g N/m", k->dim, stiffness);
-	check_expect(t, period > 0, "%u-D: period is %.3g s", k->dim, period);
-	check_expect(t, !(stiffness > 0) || isfinite(period),
+	quern_check_expect(
+		t, stiffness >= 0 && isfinite(stiffness), "%u-D: stiffness is %.3g N/m", k->dim, stiffness);
+	quern_check_expect(t, period > 0, "%u-D: period is %.3g s", k->dim, period);
+	quern_check_expect(t, !(stiffness > 0) || isfinite(period),
 		"%u-D: there is a spring of %.3g N/m and no period, so nothing limits the step", k->dim, stiffness);
-	check_expect(t, reach >= 0 && isfinite(reach), "%u-D: reach is %.3g m", k->dim, reach);
+	quern_check_expect(t, reach >= 0 && isfinite(reach), "%u-D: reach is %.3g m", k->dim, reach);
 }
 
 /* ---- the same with all masses, stiffnesses and other parameters that contain a mass in another proportion ---- */
@@ -407,13 +414,14 @@ enum { FACTOR = 64 }; /* its square and cube roots are whole, so that only a law
 
 static void scale_masses(const check_kernel *k) {
 	const quern_use *rows = k->check->file->uses;
-	for (uint32_t i = 0; i < k->n; i++) check_given(k, MASS, 0)[i] *= FACTOR;
+	for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, MASS, 0)[i] *= FACTOR;
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
 		const double factor =
 			pow(FACTOR, quern_units_mass(k->check->units, rows[r].unit ? rows[r].unit : "1"));
 		const int *uses[] = { k->use, k->use_second };
 		for (int side = 0; side < 2; side++)
-			for (uint32_t c = 0; uses[side][r] >= 0 && c < check_components(rows[r].shape, k->dim); c++) {
+			for (uint32_t c = 0; uses[side][r] >= 0 && c < quern_check_components(rows[r].shape, k->dim);
+				 c++) {
 				const check_column *column = &k->column[uses[side][r] + (int)c];
 				for (uint32_t i = 0; i < k->n && !column->integer; i++)
 					((quern_real *)column->given)[i] *= factor;
@@ -430,9 +438,9 @@ static void compare_scaled(const check_kernel *k, const check_kernel *big, check
 		for (uint32_t i = 0; k->at[sums[s]] >= 0 && i < k->n; i++) {
 			const double size = size_of(k, sums[s], count, i) + 1e-30;
 			for (uint32_t c = 0; c < count; c++) {
-				const double is = check_found(big, sums[s], c)[i] / FACTOR,
-							 was = check_found(k, sums[s], c)[i];
-				check_measure(t, fabs(is - was) / size, 1e-9,
+				const double is = quern_check_found(big, sums[s], c)[i] / FACTOR,
+							 was = quern_check_found(k, sums[s], c)[i];
+				quern_check_measure(t, fabs(is - was) / size, 1e-9,
 					"%u-D: with %d times all masses and stiffnesses %s is %.9g times as large", k->dim,
 					FACTOR, k->column[k->at[sums[s]]].name, FACTOR * is / was);
 			}
@@ -444,9 +452,9 @@ static void homogeneous(const check *c, const check_instance *it, check_tally *t
 	check_instance scaled;
 	check_kernel *k = malloc(2 * sizeof *k);
 	if (!k) abort();
-	if (check_instance_scaled(c, it, FACTOR, &scaled) == CHECK_READY) {
+	if (quern_check_instance_scaled(c, it, FACTOR, &scaled) == CHECK_READY) {
 		for (int i = 0; i < 2; i++) {
-			check_kernel_init(&k[i], c, i ? &scaled : it, "force", 500);
+			quern_check_kernel_init(&k[i], c, i ? &scaled : it, "force", 500);
 			k[i].call = call;
 			add_columns(c, &scaled, WITH_SPIN | WITH_ENERGY, &k[i]);
 			fill_pairs(&k[i], 30);
@@ -457,9 +465,9 @@ static void homogeneous(const check *c, const check_instance *it, check_tally *t
 			next_step(&k[0]), next_step(&k[1]);
 			compare_scaled(&k[0], &k[1], t);
 		}
-		check_kernel_finish(&k[0]), check_kernel_finish(&k[1]);
+		quern_check_kernel_finish(&k[0]), quern_check_kernel_finish(&k[1]);
 	}
-	check_instance_finish(c, &scaled);
+	quern_check_instance_finish(c, &scaled);
 	free(k);
 }
 
@@ -473,10 +481,10 @@ static void law(const check *c) {
 	if (!k) abort();
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
-		if (check_has_dim(c, dim) && check_instance_create(c, dim, 0, &it) == CHECK_READY) {
+		if (check_has_dim(c, dim) && quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) {
 			/* from the first touch on, since a history need not turn round with the pair */
 			for (int i = 0; i < 2; i++) {
-				check_kernel_init(&k[i], c, &it, "force", 500);
+				quern_check_kernel_init(&k[i], c, &it, "force", 500);
 				k[i].call = call;
 				add_columns(c, &it, WITH_ENERGY, &k[i]);
 				fill_pairs(&k[i], 30);
@@ -487,22 +495,22 @@ static void law(const check *c) {
 			addition(&k[0], &adds);
 			losses(&k[0], &lost);
 			apart(&k[0], &silent);
-			check_kernel_finish(&k[0]), check_kernel_finish(&k[1]);
+			quern_check_kernel_finish(&k[0]), quern_check_kernel_finish(&k[1]);
 			impacts(c, &it, &whole, &books);
 			homogeneous(c, &it, &scaled);
 		}
-		if (check_has_dim(c, dim)) check_instance_finish(c, &it);
+		if (check_has_dim(c, dim)) quern_check_instance_finish(c, &it);
 	}
-	check_tell(c, &limits, NULL);
-	check_tell(c, &reacts, NULL);
-	check_tell(c, &adds, NULL);
-	check_tell(c, &silent, NULL);
-	check_tell(c, &lost, NULL);
-	check_tell(c, &whole, NULL);
-	check_tell(c, &books, NULL);
-	check_tell(c, &scaled,
+	quern_check_tell(c, &limits, NULL);
+	quern_check_tell(c, &reacts, NULL);
+	quern_check_tell(c, &adds, NULL);
+	quern_check_tell(c, &silent, NULL);
+	quern_check_tell(c, &lost, NULL);
+	quern_check_tell(c, &whole, NULL);
+	quern_check_tell(c, &books, NULL);
+	quern_check_tell(c, &scaled,
 		scaled.tried ? NULL : "not tried: init refuses the parameters of %d times the mass", FACTOR);
 	free(k);
 }
 
-const check_kind check_contact = { .make = make, .law = law };
+const check_kind quern_check_contact = { .make = make, .law = law };

@@ -1,4 +1,4 @@
-/* check_integrator - steps in time: free flight is exact, a constant force gives its momentum, a spring keeps its energy */
+/* quern_check_integrator - steps in time: free flight is exact, a constant force gives its momentum, a spring keeps its energy */
 #include "check.h"
 #include <math.h>
 #include <stdlib.h>
@@ -39,36 +39,36 @@ static void call(const check_kernel *k, const check_batch *b) {
 	CHECK_VECTOR(batch.new_spin, k, b, NEW_SPIN, turns);
 	CHECK_VECTOR(batch.mean_velocity, k, b, MEAN_SPEED, dim);
 	CHECK_VECTOR(batch.mean_spin, k, b, MEAN_SPIN, turns);
-	check_columns(k, b, k->use, use);
+	quern_check_columns(k, b, k->use, use);
 	(k->hook == QUERN_INTEGRATOR_OPEN ? ops->open : ops->close)[dim - 2](k->instance->self, &batch);
 }
 
 static void create(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
 	const uint32_t dim = it->dim, turns = check_axial(dim);
 	const bool open = variant & OPENS, spin = variant & WITH_SPIN;
-	check_kernel_init(k, c, it, open ? "open" : "close", n);
+	quern_check_kernel_init(k, c, it, open ? "open" : "close", n);
 	k->call = call;
 	k->dt = 1e-4;
-	if (!open) check_add(k, FORCE, "force", CHECK_IN, dim);
-	if (!open && spin) check_add(k, TORQUE, "torque", CHECK_IN, turns);
-	if (!open) check_add(k, MASS, "mass", CHECK_IN, 1);
-	if (!open) check_add(k, INERTIA, "inertia", CHECK_IN, 1);
-	check_add(k, POSITION, "position", CHECK_IN, dim);
-	check_add(k, SPEED, "velocity", CHECK_IN, dim);
-	check_add(k, NEW_POSITION, "new_position", CHECK_OUT, dim);
-	check_add(k, NEW_SPEED, "new_velocity", CHECK_OUT, dim);
-	if (spin) check_add(k, SPIN, "spin", CHECK_IN, turns);
-	if (spin) check_add(k, NEW_SPIN, "new_spin", CHECK_OUT, turns);
-	if (!open && variant & WITH_MEAN) check_add(k, MEAN_SPEED, "mean_velocity", CHECK_OUT, dim);
-	if (!open && spin && variant & WITH_MEAN) check_add(k, MEAN_SPIN, "mean_spin", CHECK_OUT, turns);
-	check_add_uses(k, open ? QUERN_INTEGRATOR_OPEN : QUERN_INTEGRATOR_CLOSE, spin, false);
+	if (!open) quern_check_add(k, FORCE, "force", CHECK_IN, dim);
+	if (!open && spin) quern_check_add(k, TORQUE, "torque", CHECK_IN, turns);
+	if (!open) quern_check_add(k, MASS, "mass", CHECK_IN, 1);
+	if (!open) quern_check_add(k, INERTIA, "inertia", CHECK_IN, 1);
+	quern_check_add(k, POSITION, "position", CHECK_IN, dim);
+	quern_check_add(k, SPEED, "velocity", CHECK_IN, dim);
+	quern_check_add(k, NEW_POSITION, "new_position", CHECK_OUT, dim);
+	quern_check_add(k, NEW_SPEED, "new_velocity", CHECK_OUT, dim);
+	if (spin) quern_check_add(k, SPIN, "spin", CHECK_IN, turns);
+	if (spin) quern_check_add(k, NEW_SPIN, "new_spin", CHECK_OUT, turns);
+	if (!open && variant & WITH_MEAN) quern_check_add(k, MEAN_SPEED, "mean_velocity", CHECK_OUT, dim);
+	if (!open && spin && variant & WITH_MEAN) quern_check_add(k, MEAN_SPIN, "mean_spin", CHECK_OUT, turns);
+	quern_check_add_uses(k, open ? QUERN_INTEGRATOR_OPEN : QUERN_INTEGRATOR_CLOSE, spin, false);
 	for (uint32_t i = 0; i < n && !open; i++) {
-		check_given(k, MASS, 0)[i] = check_uniform(120, i, 0.5, 2);
-		check_given(k, INERTIA, 0)[i] = check_uniform(121, i, 0.1, 1);
+		quern_check_given(k, MASS, 0)[i] = quern_check_uniform(120, i, 0.5, 2);
+		quern_check_given(k, INERTIA, 0)[i] = quern_check_uniform(121, i, 0.1, 1);
 	}
-	check_fill(k, POSITION, dim, 122, -1, 1);
-	check_fill(k, SPEED, dim, 123, -1, 1);
-	if (spin) check_fill(k, SPIN, turns, 124, -10, 10);
+	quern_check_fill(k, POSITION, dim, 122, -1, 1);
+	quern_check_fill(k, SPEED, dim, 123, -1, 1);
+	if (spin) quern_check_fill(k, SPIN, turns, 124, -10, 10);
 }
 
 static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
@@ -77,8 +77,8 @@ static bool make(const check *c, const check_instance *it, uint32_t variant, uin
 	create(c, it, variant, n, k);
 	k->more = gravity;
 	if (variant & OPENS) return true;
-	check_fill(k, FORCE, k->dim, 125, -1, 1);
-	if (variant & WITH_SPIN) check_fill(k, TORQUE, check_axial(k->dim), 126, -1, 1);
+	quern_check_fill(k, FORCE, k->dim, 125, -1, 1);
+	if (variant & WITH_SPIN) quern_check_fill(k, TORQUE, check_axial(k->dim), 126, -1, 1);
 	return true;
 }
 
@@ -93,7 +93,8 @@ static void copy_state(const check_kernel *from, check_kernel *to) {
 	static const int old[] = { POSITION, SPEED, SPIN }, now[] = { NEW_POSITION, NEW_SPEED, NEW_SPIN };
 	for (int s = 0; s < 3; s++)
 		for (uint32_t a = 0; from->at[old[s]] >= 0 && a < (s == 2 ? check_axial(from->dim) : from->dim); a++)
-			memcpy(check_given(to, old[s], a), check_found(from, now[s], a), from->n * sizeof(quern_real));
+			memcpy(quern_check_given(to, old[s], a), quern_check_found(from, now[s], a),
+				from->n * sizeof(quern_real));
 }
 
 static void begin_flight(const check *c, const check_instance *it, uint32_t n, flight *f) {
@@ -104,21 +105,21 @@ static void begin_flight(const check *c, const check_instance *it, uint32_t n, f
 
 static void before_forces(flight *f) {
 	if (!f->opens) return;
-	check_carry(&f->close, &f->open);
-	check_run(&f->open, 128, NULL);
+	quern_check_carry(&f->close, &f->open);
+	quern_check_run(&f->open, 128, NULL);
 	copy_state(&f->open, &f->close);
 }
 
 static void after_forces(flight *f) {
-	check_run(&f->close, 128, NULL);
-	check_advance(&f->close);
+	quern_check_run(&f->close, 128, NULL);
+	quern_check_advance(&f->close);
 	copy_state(&f->close, &f->close);
 	if (f->opens) copy_state(&f->close, &f->open);
 }
 
 static void end_flight(flight *f) {
-	check_kernel_finish(&f->close);
-	if (f->opens) check_kernel_finish(&f->open);
+	quern_check_kernel_finish(&f->close);
+	if (f->opens) quern_check_kernel_finish(&f->open);
 }
 
 /* History of a step that has not been is as new. */
@@ -141,15 +142,15 @@ static void damped(const check *c, const check_instance *it, double force, check
 	check_kernel *k = &f->close;
 	for (uint32_t a = 0; a < k->dim; a++)
 		for (uint32_t i = 0; i < BODIES; i++)
-			check_given(k, FORCE, a)[i] = force * (a + 1), check_given(k, SPEED, a)[i] = 0;
+			quern_check_given(k, FORCE, a)[i] = force * (a + 1), quern_check_given(k, SPEED, a)[i] = 0;
 	first_history(f);
 	for (int step = 0; step < STEPS; step++) before_forces(f), after_forces(f);
 	for (uint32_t a = 0; a < k->dim; a++)
 		for (uint32_t i = 0; i < BODIES; i++) {
-			const double v = check_given(k, SPEED, a)[i];
-			const double most = force * (a + 1) / check_given(k, MASS, 0)[i] * STEPS * k->dt;
+			const double v = quern_check_given(k, SPEED, a)[i];
+			const double most = force * (a + 1) / quern_check_given(k, MASS, 0)[i] * STEPS * k->dt;
 			const double off = v > most ? v - most : v < 0 || (force > 0 && v == 0) ? 1 + fabs(v) : 0;
-			check_measure(t, off, 1e-12 * most,
+			quern_check_measure(t, off, 1e-12 * most,
 				"%u-D: from rest, a force of %.3g N gives %.15g m/s, at most %.15g", k->dim, force, v, most);
 		}
 	end_flight(f);
@@ -165,36 +166,37 @@ static void constant(const check *c, const check_instance *it, double force, che
 	if (!start) abort();
 	for (uint32_t a = 0; a < k->dim; a++)
 		for (uint32_t i = 0; i < BODIES; i++) {
-			check_given(k, FORCE, a)[i] = force * (a + 1);
-			start[a * BODIES + i] = check_given(k, POSITION, a)[i];
-			start[(3 + a) * BODIES + i] = check_given(k, SPEED, a)[i];
+			quern_check_given(k, FORCE, a)[i] = force * (a + 1);
+			start[a * BODIES + i] = quern_check_given(k, POSITION, a)[i];
+			start[(3 + a) * BODIES + i] = quern_check_given(k, SPEED, a)[i];
 		}
 	for (uint32_t a = 0; a < check_axial(k->dim); a++)
 		for (uint32_t i = 0; i < BODIES; i++) {
-			check_given(k, TORQUE, a)[i] = force;
-			start[(6 + a) * BODIES + i] = check_given(k, SPIN, a)[i];
+			quern_check_given(k, TORQUE, a)[i] = force;
+			start[(6 + a) * BODIES + i] = quern_check_given(k, SPIN, a)[i];
 		}
 	first_history(f);
 	for (int step = 0; step < STEPS; step++) before_forces(f), after_forces(f);
 	const double time = STEPS * k->dt;
 	for (uint32_t i = 0; i < BODIES; i++) {
-		const double m = check_given(k, MASS, 0)[i], inertia = check_given(k, INERTIA, 0)[i];
+		const double m = quern_check_given(k, MASS, 0)[i], inertia = quern_check_given(k, INERTIA, 0)[i];
 		for (uint32_t a = 0; a < k->dim; a++) {
 			const double kick = force * (a + 1) / m, v = start[(3 + a) * BODIES + i] + kick * time;
 			const double x =
 				start[a * BODIES + i] + start[(3 + a) * BODIES + i] * time + 0.5 * kick * time * time;
-			check_measure(t, fabs(check_given(k, SPEED, a)[i] - v), 1e-12 * (1 + fabs(v)),
+			quern_check_measure(t, fabs(quern_check_given(k, SPEED, a)[i] - v), 1e-12 * (1 + fabs(v)),
 				"%u-D: a force of %.3g N gives %.15g m/s, should give %.15g", k->dim, force,
-				check_given(k, SPEED, a)[i], v);
-			check_measure(t, fabs(check_given(k, POSITION, a)[i] - x), 1e-12 + fabs(kick) * time * k->dt,
+				quern_check_given(k, SPEED, a)[i], v);
+			quern_check_measure(t, fabs(quern_check_given(k, POSITION, a)[i] - x),
+				1e-12 + fabs(kick) * time * k->dt,
 				"%u-D: a force of %.3g N leads to %.15g m, should lead to %.15g", k->dim, force,
-				check_given(k, POSITION, a)[i], x);
+				quern_check_given(k, POSITION, a)[i], x);
 		}
 		for (uint32_t a = 0; a < check_axial(k->dim); a++) {
 			const double w = start[(6 + a) * BODIES + i] + force / inertia * time;
-			check_measure(t, fabs(check_given(k, SPIN, a)[i] - w), 1e-12 * (1 + fabs(w)),
+			quern_check_measure(t, fabs(quern_check_given(k, SPIN, a)[i] - w), 1e-12 * (1 + fabs(w)),
 				"%u-D: a torque of %.3g N m gives %.15g rad/s, should give %.15g", k->dim, force,
-				check_given(k, SPIN, a)[i], w);
+				quern_check_given(k, SPIN, a)[i], w);
 		}
 	}
 	free(start);
@@ -209,23 +211,23 @@ static void spring(const check *c, const check_instance *it, check_tally *t) {
 	if (!f) abort();
 	begin_flight(c, it, 1, f);
 	check_kernel *k = &f->close;
-	const double m = check_given(k, MASS, 0)[0],
+	const double m = quern_check_given(k, MASS, 0)[0],
 				 stiffness = m * pow(2 * 3.141592653589793 / (100 * k->dt), 2);
 	for (uint32_t a = 0; a < k->dim; a++)
-		before += 0.5 * m * pow(check_given(k, SPEED, a)[0], 2) +
-				  0.5 * stiffness * pow(check_given(k, POSITION, a)[0], 2);
+		before += 0.5 * m * pow(quern_check_given(k, SPEED, a)[0], 2) +
+				  0.5 * stiffness * pow(quern_check_given(k, POSITION, a)[0], 2);
 	first_history(f);
 	for (int step = 0; step < 1000; step++) {
 		before_forces(f);
 		for (uint32_t a = 0; a < k->dim; a++)
-			check_given(k, FORCE, a)[0] = -stiffness * check_given(k, POSITION, a)[0];
+			quern_check_given(k, FORCE, a)[0] = -stiffness * quern_check_given(k, POSITION, a)[0];
 		after_forces(f);
 	}
 	for (uint32_t a = 0; a < k->dim; a++)
-		after += 0.5 * m * pow(check_given(k, SPEED, a)[0], 2) +
-				 0.5 * stiffness * pow(check_given(k, POSITION, a)[0], 2);
+		after += 0.5 * m * pow(quern_check_given(k, SPEED, a)[0], 2) +
+				 0.5 * stiffness * pow(quern_check_given(k, POSITION, a)[0], 2);
 	const double gained = after / before - 1;
-	check_measure(t, damps(c) ? fmax(gained, 0) : fabs(gained), damps(c) ? 0 : 0.1,
+	quern_check_measure(t, damps(c) ? fmax(gained, 0) : fabs(gained), damps(c) ? 0 : 0.1,
 		"%u-D: ten periods of a spring turn %.6g J into %.6g", k->dim, before, after);
 	end_flight(f);
 	free(f);
@@ -237,16 +239,16 @@ static void law(const check *c) {
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
-		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) {
+		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) {
 			(damps(c) ? damped : constant)(c, &it, 0, &drift);
 			(damps(c) ? damped : constant)(c, &it, 3, &push);
 			spring(c, &it, &ring);
 		}
-		check_instance_finish(c, &it);
+		quern_check_instance_finish(c, &it);
 	}
-	check_tell(c, &drift, NULL);
-	check_tell(c, &push, NULL);
-	check_tell(c, &ring, NULL);
+	quern_check_tell(c, &drift, NULL);
+	quern_check_tell(c, &push, NULL);
+	quern_check_tell(c, &ring, NULL);
 }
 
-const check_kind check_integrator = { .make = make, .law = law };
+const check_kind quern_check_integrator = { .make = make, .law = law };

@@ -1,4 +1,4 @@
-/* check_material - constitutive models: stress and history belong together, yield is obeyed, rotation does not matter */
+/* quern_check_material - constitutive models: stress and history belong together, yield is obeyed, rotation does not matter */
 #include "check.h"
 #include <math.h>
 #include <stdlib.h>
@@ -30,30 +30,30 @@ static void call(const check_kernel *k, const check_batch *b) {
 	batch.density = check_at(k, b, DENSITY, 0);
 	batch.wave_speed = check_at(k, b, WAVE, 0);
 	batch.energy = check_at(k, b, ENERGY, 0);
-	check_columns(k, b, k->use, use);
+	quern_check_columns(k, b, k->use, use);
 	(update ? ops->update : ops->assign)[k->dim - 2](k->instance->self, &batch);
 }
 
 static void create(
 	const check *c, const check_instance *it, uint32_t hook, bool outputs, uint32_t n, check_kernel *k) {
 	const bool update = hook == QUERN_MATERIAL_UPDATE;
-	check_kernel_init(k, c, it, update ? "update" : "assign", n);
+	quern_check_kernel_init(k, c, it, update ? "update" : "assign", n);
 	k->call = call;
 	if (update) {
-		check_add(k, GRADIENT, "gradient", CHECK_IN, k->dim * k->dim);
-		check_add(k, GRID_DENSITY, "grid_density", CHECK_IN, 1);
+		quern_check_add(k, GRADIENT, "gradient", CHECK_IN, k->dim * k->dim);
+		quern_check_add(k, GRID_DENSITY, "grid_density", CHECK_IN, 1);
 	}
-	check_add(k, DENSITY, "density", CHECK_CHANGED, 1);
-	check_add(k, STRESS, "stress", CHECK_CHANGED, stresses(k));
+	quern_check_add(k, DENSITY, "density", CHECK_CHANGED, 1);
+	quern_check_add(k, STRESS, "stress", CHECK_CHANGED, stresses(k));
 	if (outputs) {
-		check_add(k, WAVE, "wave_speed", CHECK_OUT, 1);
-		check_add(k, ENERGY, "energy", CHECK_OUT, 1);
+		quern_check_add(k, WAVE, "wave_speed", CHECK_OUT, 1);
+		quern_check_add(k, ENERGY, "energy", CHECK_OUT, 1);
 	}
-	check_add_uses(k, hook, outputs, false);
+	quern_check_add_uses(k, hook, outputs, false);
 	const quern_real density = moduli_of(k).density;
 	for (uint32_t i = 0; i < n; i++) {
-		check_given(k, DENSITY, 0)[i] = density;
-		if (update) check_given(k, GRID_DENSITY, 0)[i] = density;
+		quern_check_given(k, DENSITY, 0)[i] = density;
+		if (update) quern_check_given(k, GRID_DENSITY, 0)[i] = density;
 	}
 }
 
@@ -61,14 +61,14 @@ static void create(
 static void fill_stress(const check_kernel *k, double most, double share, uint64_t key) {
 	const double bulk = moduli_of(k).bulk;
 	for (uint32_t i = 0; i < k->n; i++) {
-		const double p = check_uniform(key, i, 0.1, 1) * most * bulk;
+		const double p = quern_check_uniform(key, i, 0.1, 1) * most * bulk;
 		double mean = 0;
 		for (uint32_t c = 0; c < stresses(k); c++) {
-			const double x = check_uniform(key + 1, c * 65536 + i, -share, share) * p;
-			check_given(k, STRESS, c)[i] = x;
+			const double x = quern_check_uniform(key + 1, c * 65536 + i, -share, share) * p;
+			quern_check_given(k, STRESS, c)[i] = x;
 			if (c < k->dim) mean += x / k->dim;
 		}
-		for (uint32_t c = 0; c < k->dim; c++) check_given(k, STRESS, c)[i] -= mean + p;
+		for (uint32_t c = 0; c < k->dim; c++) quern_check_given(k, STRESS, c)[i] -= mean + p;
 	}
 }
 
@@ -76,10 +76,11 @@ static void fill_stress(const check_kernel *k, double most, double share, uint64
 static void hand_over(const check_kernel *from, check_kernel *to) {
 	const size_t n = from->n * sizeof(quern_real);
 	for (uint32_t c = 0; c < stresses(from); c++)
-		memcpy(check_given(to, STRESS, c), check_found(from, STRESS, c), n);
-	memcpy(check_given(to, DENSITY, 0), check_found(from, DENSITY, 0), n);
-	if (to->at[GRID_DENSITY] >= 0) memcpy(check_given(to, GRID_DENSITY, 0), check_found(from, DENSITY, 0), n);
-	check_carry(from, to);
+		memcpy(quern_check_given(to, STRESS, c), quern_check_found(from, STRESS, c), n);
+	memcpy(quern_check_given(to, DENSITY, 0), quern_check_found(from, DENSITY, 0), n);
+	if (to->at[GRID_DENSITY] >= 0)
+		memcpy(quern_check_given(to, GRID_DENSITY, 0), quern_check_found(from, DENSITY, 0), n);
+	quern_check_carry(from, to);
 }
 
 static void start(const check *c, const check_instance *it, check_kernel *k, double most, double share) {
@@ -87,9 +88,9 @@ static void start(const check *c, const check_instance *it, check_kernel *k, dou
 	if (!assign) abort();
 	create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n, assign);
 	fill_stress(assign, most, share, 60);
-	check_run(assign, 512, NULL);
+	quern_check_run(assign, 512, NULL);
 	hand_over(assign, k);
-	check_kernel_finish(assign);
+	quern_check_kernel_finish(assign);
 	free(assign);
 }
 
@@ -103,10 +104,10 @@ static bool make(const check *c, const check_instance *it, uint32_t variant, uin
 	}
 	start(c, it, k, 1e-3, 1);
 	k->dt = 1e-5;
-	check_fill(k, GRADIENT, k->dim * k->dim, 62, -30, 30);
+	quern_check_fill(k, GRADIENT, k->dim * k->dim, 62, -30, 30);
 	for (uint32_t i = 0; i < n; i++) {
-		check_given(k, DENSITY, 0)[i] *= check_uniform(63, i, 0.998, 1.002);
-		check_given(k, GRID_DENSITY, 0)[i] *= check_uniform(64, i, 0.9, 1.05);
+		quern_check_given(k, DENSITY, 0)[i] *= quern_check_uniform(63, i, 0.998, 1.002);
+		quern_check_given(k, GRID_DENSITY, 0)[i] *= quern_check_uniform(64, i, 0.9, 1.05);
 	}
 	return true;
 }
@@ -116,7 +117,7 @@ static bool make(const check *c, const check_instance *it, uint32_t variant, uin
 static double stress_size(const check_kernel *k, uint32_t i, bool found) {
 	double sum = 1e-30;
 	for (uint32_t c = 0; c < stresses(k); c++)
-		sum += fabs((found ? check_found : check_given)(k, STRESS, c)[i]);
+		sum += fabs((found ? quern_check_found : quern_check_given)(k, STRESS, c)[i]);
 	return sum;
 }
 
@@ -126,7 +127,7 @@ typedef struct {
 
 static void check_moduli(const check_kernel *assign, tallies *t) {
 	const moduli m = moduli_of(assign);
-	check_expect(&t->moduli,
+	quern_check_expect(&t->moduli,
 		m.bulk > 0 && m.shear >= 0 && m.density > 0 && isfinite(m.bulk + m.shear + m.density),
 		"%u-D: bulk %.3g Pa, shear %.3g Pa, density %.3g kg/m^3", assign->dim, m.bulk, m.shear, m.density);
 }
@@ -137,38 +138,39 @@ static void check_assign(const check *c, const check_instance *it, check_kernel 
 	if (!again) abort();
 	const moduli m = moduli_of(k);
 	fill_stress(k, 1e-4, 2, 65);
-	check_run(k, 512, NULL);
+	quern_check_run(k, 512, NULL);
 	create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n, again);
 	hand_over(k, again);
-	check_run(again, 512, NULL);
+	quern_check_run(again, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
 		double pressure = 0;
 		for (uint32_t s = 0; s < stresses(k); s++)
-			check_measure(&t->again,
-				fabs(check_found(again, STRESS, s)[i] - check_found(k, STRESS, s)[i]) /
+			quern_check_measure(&t->again,
+				fabs(quern_check_found(again, STRESS, s)[i] - quern_check_found(k, STRESS, s)[i]) /
 					stress_size(k, i, true),
 				1e-10, "%u-D: assign changes a stress that it has given back itself", k->dim);
-		for (uint32_t s = 0; s < k->dim; s++) pressure -= check_found(k, STRESS, s)[i] / k->dim;
-		const double strain = log(check_found(k, DENSITY, 0)[i] / m.density);
-		check_measure(&t->moduli, fabs(strain * m.bulk - pressure) / (0.01 * pressure + 1e-12 * m.bulk), 1,
-			"%u-D: a pressure of %.4g Pa goes with a density of %.6g kg/m^3, which moduli() does not say",
-			k->dim, pressure, check_found(k, DENSITY, 0)[i]);
+		for (uint32_t s = 0; s < k->dim; s++) pressure -= quern_check_found(k, STRESS, s)[i] / k->dim;
+		const double strain = log(quern_check_found(k, DENSITY, 0)[i] / m.density);
+		quern_check_measure(&t->moduli, fabs(strain * m.bulk - pressure) / (0.01 * pressure + 1e-12 * m.bulk),
+			1, "%u-D: a pressure of %.4g Pa goes with a density of %.6g kg/m^3, which moduli() does not say",
+			k->dim, pressure, quern_check_found(k, DENSITY, 0)[i]);
 	}
-	check_kernel_finish(again);
+	quern_check_kernel_finish(again);
 	free(again);
 }
 
 /* A point that does not deform keeps what assign gave it. */
 static void check_rest(check_kernel *k, tallies *t) {
-	check_fill(k, GRADIENT, k->dim * k->dim, 66, 0, 0);
+	quern_check_fill(k, GRADIENT, k->dim * k->dim, 66, 0, 0);
 	k->dt = 1e-12;
-	check_run(k, 512, NULL);
+	quern_check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t c = 0; c < stresses(k); c++)
-			check_measure(&t->held,
-				fabs(check_found(k, STRESS, c)[i] - check_given(k, STRESS, c)[i]) / stress_size(k, i, false),
+			quern_check_measure(&t->held,
+				fabs(quern_check_found(k, STRESS, c)[i] - quern_check_given(k, STRESS, c)[i]) /
+					stress_size(k, i, false),
 				1e-9, "%u-D: a point at rest turns a stress of %.9g Pa into %.9g", k->dim,
-				check_given(k, STRESS, c)[i], check_found(k, STRESS, c)[i]);
+				quern_check_given(k, STRESS, c)[i], quern_check_found(k, STRESS, c)[i]);
 }
 
 /* Volumes follow the gradient, V *= det(1 + dt L), before a material is asked. */
@@ -177,13 +179,13 @@ static void follow_volume(const check_kernel *k) {
 		double f[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, det = 0;
 		for (uint32_t a = 0; a < k->dim; a++)
 			for (uint32_t b = 0; b < k->dim; b++)
-				f[a][b] += k->dt * check_given(k, GRADIENT, a * k->dim + b)[i];
+				f[a][b] += k->dt * quern_check_given(k, GRADIENT, a * k->dim + b)[i];
 		for (int a = 0; a < 3; a++) {
 			const int b = (a + 1) % 3, c = (a + 2) % 3;
 			det += f[0][a] * (f[1][b] * f[2][c] - f[1][c] * f[2][b]);
 		}
-		check_given(k, DENSITY, 0)[i] /= det > 0.1 ? det : 0.1;
-		check_given(k, GRID_DENSITY, 0)[i] = check_given(k, DENSITY, 0)[i];
+		quern_check_given(k, DENSITY, 0)[i] /= det > 0.1 ? det : 0.1;
+		quern_check_given(k, GRID_DENSITY, 0)[i] = quern_check_given(k, DENSITY, 0)[i];
 	}
 }
 
@@ -195,27 +197,28 @@ static void check_yield(
 	if (!assign) abort();
 	create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n, assign);
 	k->dt = 1e-4;
-	check_fill(k, GRADIENT, k->dim * k->dim, 67, -strain / k->dt, strain / k->dt);
+	quern_check_fill(k, GRADIENT, k->dim * k->dim, 67, -strain / k->dt, strain / k->dt);
 	follow_volume(k);
-	check_run(k, 512, NULL);
-	check_expect(&t->violent, check_finite(k, &column),
+	quern_check_run(k, 512, NULL);
+	quern_check_expect(&t->violent, quern_check_finite(k, &column),
 		"%u-D: %s is not finite after a strain of %.2g in one step", k->dim, column, strain);
 	hand_over(k, assign);
-	check_run(assign, 512, NULL);
+	quern_check_run(assign, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t s = 0; s < stresses(k); s++)
-			check_measure(&t->yields,
-				fabs(check_found(assign, STRESS, s)[i] - check_found(k, STRESS, s)[i]) /
+			quern_check_measure(&t->yields,
+				fabs(quern_check_found(assign, STRESS, s)[i] - quern_check_found(k, STRESS, s)[i]) /
 					(stress_size(k, i, true) + 1e-12 * moduli_of(k).bulk),
 				1e-9,
 				"%u-D: update leaves a stress beyond yield or a tension: %.6g Pa, of which assign leaves "
 				"%.6g",
-				k->dim, check_found(k, STRESS, s)[i], check_found(assign, STRESS, s)[i]);
+				k->dim, quern_check_found(k, STRESS, s)[i], quern_check_found(assign, STRESS, s)[i]);
 	for (uint32_t i = 0; i < k->n && k->at[WAVE] >= 0; i++)
-		check_expect(&t->violent, check_found(k, WAVE, 0)[i] >= 0 && check_found(k, ENERGY, 0)[i] >= 0,
-			"%u-D: wave speed %.3g m/s, energy %.3g J/kg", k->dim, check_found(k, WAVE, 0)[i],
-			check_found(k, ENERGY, 0)[i]);
-	check_kernel_finish(assign);
+		quern_check_expect(&t->violent,
+			quern_check_found(k, WAVE, 0)[i] >= 0 && quern_check_found(k, ENERGY, 0)[i] >= 0,
+			"%u-D: wave speed %.3g m/s, energy %.3g J/kg", k->dim, quern_check_found(k, WAVE, 0)[i],
+			quern_check_found(k, ENERGY, 0)[i]);
+	quern_check_kernel_finish(assign);
 	free(assign);
 }
 
@@ -224,7 +227,8 @@ static void unpack(const check_kernel *k, uint32_t i, bool found, double s[3][3]
 	memset(s, 0, 9 * sizeof(double));
 	for (uint32_t c = 0; c < stresses(k); c++) {
 		const int at = (k->dim == 2 ? planar : spatial)[c];
-		s[at / 3][at % 3] = s[at % 3][at / 3] = (found ? check_found : check_given)(k, STRESS, c)[i];
+		s[at / 3][at % 3] = s[at % 3][at / 3] =
+			(found ? quern_check_found : quern_check_given)(k, STRESS, c)[i];
 	}
 }
 
@@ -234,27 +238,27 @@ static void check_rotation(check_kernel *k, tallies *t) {
 	k->dt = 1e-6;
 	for (uint32_t i = 0; i < k->n; i++) {
 		double axis[3], w[3][3];
-		check_direction(3, 68, i, axis);
+		quern_check_direction(3, 68, i, axis);
 		if (k->dim == 2) axis[0] = axis[1] = 0, axis[2] = 1;
 		for (int a = 0; a < 3; a++)
 			for (int b = 0; b < 3; b++) w[a][b] = a == b ? 0 : (b == (a + 1) % 3 ? -1 : 1) * axis[3 - a - b];
 		for (uint32_t a = 0; a < k->dim; a++)
 			for (uint32_t b = 0; b < k->dim; b++)
-				check_given(k, GRADIENT, a * k->dim + b)[i] = w[a][b] * angle / k->dt;
+				quern_check_given(k, GRADIENT, a * k->dim + b)[i] = w[a][b] * angle / k->dt;
 	}
-	check_run(k, 512, NULL);
+	quern_check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < k->n; i++) {
 		double s[3][3], now[3][3], w[3][3] = { { 0 } };
 		unpack(k, i, false, s);
 		unpack(k, i, true, now);
 		for (uint32_t a = 0; a < k->dim; a++)
 			for (uint32_t b = 0; b < k->dim; b++)
-				w[a][b] = check_given(k, GRADIENT, a * k->dim + b)[i] * k->dt;
+				w[a][b] = quern_check_given(k, GRADIENT, a * k->dim + b)[i] * k->dt;
 		for (int a = 0; a < 3; a++)
 			for (int b = 0; b < 3; b++) {
 				double turned = s[a][b];
 				for (int c = 0; c < 3; c++) turned += w[a][c] * s[c][b] - s[a][c] * w[c][b];
-				check_measure(&t->turned, fabs(now[a][b] - turned), 10 * angle * angle * scale,
+				quern_check_measure(&t->turned, fabs(now[a][b] - turned), 10 * angle * angle * scale,
 					"%u-D: after a turn by %.0e a stress of %.9g Pa should be %.9g, is %.9g", k->dim, angle,
 					s[a][b], turned, now[a][b]);
 			}
@@ -268,7 +272,7 @@ static void try_dimension(const check *c, const check_instance *it, tallies *t) 
 	create(c, it, QUERN_MATERIAL_ASSIGN, false, POINTS, k);
 	check_moduli(k, t);
 	check_assign(c, it, k, t);
-	check_kernel_finish(k);
+	quern_check_kernel_finish(k);
 	create(c, it, QUERN_MATERIAL_UPDATE, true, POINTS, k);
 	start(c, it, k, 1e-2, 0.1);
 	check_rest(k, t);
@@ -277,7 +281,7 @@ static void try_dimension(const check *c, const check_instance *it, tallies *t) 
 		start(c, it, k, 1e-3, 0.1);
 		check_yield(c, it, k, 0.3 * pow(10, e), t);
 	}
-	check_kernel_finish(k);
+	quern_check_kernel_finish(k);
 	free(k);
 }
 
@@ -288,15 +292,15 @@ static void law(const check *c) {
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
-		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, &t);
-		check_instance_finish(c, &it);
+		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, &t);
+		quern_check_instance_finish(c, &it);
 	}
-	check_tell(c, &t.moduli, NULL);
-	check_tell(c, &t.again, NULL);
-	check_tell(c, &t.held, NULL);
-	check_tell(c, &t.yields, NULL);
-	check_tell(c, &t.turned, NULL);
-	check_tell(c, &t.violent, "strains of 3e-6 to 0.3 in one step");
+	quern_check_tell(c, &t.moduli, NULL);
+	quern_check_tell(c, &t.again, NULL);
+	quern_check_tell(c, &t.held, NULL);
+	quern_check_tell(c, &t.yields, NULL);
+	quern_check_tell(c, &t.turned, NULL);
+	quern_check_tell(c, &t.violent, "strains of 3e-6 to 0.3 in one step");
 }
 
-const check_kind check_material = { .make = make, .law = law };
+const check_kind quern_check_material = { .make = make, .law = law };

@@ -1,4 +1,4 @@
-/* check_neighbours - searches: the same pairs as by looking at all of them, each once in its block */
+/* quern_check_neighbours - searches: the same pairs as by looking at all of them, each once in its block */
 #include "check.h"
 #include "text.h"
 #include <math.h>
@@ -31,7 +31,7 @@ static void create(const scenery *s, uint64_t key, grains *g) {
 	g->job =
 		(quern_neighbour_job) { .n = s->n, .dim = s->dim, .radius = g->radius, .reach = s->reach * diameter };
 	for (uint32_t i = 0; i < s->n; i++) {
-		g->radius[i] = 0.5 * diameter * (1 + check_uniform(key, i, -s->spread, s->spread));
+		g->radius[i] = 0.5 * diameter * (1 + quern_check_uniform(key, i, -s->spread, s->spread));
 		if (g->radius[i] > g->job.largest) g->job.largest = g->radius[i];
 	}
 	for (uint32_t a = 0; a < s->dim; a++) {
@@ -42,7 +42,7 @@ static void create(const scenery *s, uint64_t key, grains *g) {
 		g->job.periodic[a] = s->periodic >> a & 1;
 		for (uint32_t i = 0; i < s->n; i++)
 			g->position[a][i] =
-				check_uniform(key + 1, (uint64_t)a << 32 | i, g->job.lower[a], g->job.upper[a]);
+				quern_check_uniform(key + 1, (uint64_t)a << 32 | i, g->job.lower[a], g->job.upper[a]);
 	}
 }
 
@@ -70,7 +70,7 @@ static void sort_grains(const check *c, const check_instance *it, grains *g) {
 	uint64_t *key = quern_take((size_t)n + 1, sizeof *key);
 	place *order = quern_take((size_t)n + 1, sizeof *order);
 	quern_real *old = quern_take((size_t)n + 1, sizeof *old);
-	check_place(c, "keys, %u-D, while n = %u", g->job.dim, n);
+	quern_check_place(c, "keys, %u-D, while n = %u", g->job.dim, n);
 	const size_t wanted = ops->keys(it->self, &g->job, key);
 	for (uint32_t i = 0; i < n; i++) order[i] = (place) { key[i], i };
 	qsort(order, n, sizeof *order, by_key);
@@ -84,7 +84,7 @@ static void sort_grains(const check *c, const check_instance *it, grains *g) {
 	g->block[g->job.n_blocks] = n;
 	g->job.block = g->block;
 	g->job.memory = quern_take(wanted + 64, 1);
-	check_place(c, "index, %u-D, while n = %u", g->job.dim, n);
+	quern_check_place(c, "index, %u-D, while n = %u", g->job.dim, n);
 	if (ops->index) ops->index(it->self, &g->job);
 	free(key), free(order), free(old);
 }
@@ -134,15 +134,15 @@ static void compare(const search *s, tallies *t) {
 			const quern_pair p = s->pair[b][i];
 			const bool known =
 				p.first >= 0 && p.second >= 0 && (uint32_t)p.first < j->n && (uint32_t)p.second < j->n;
-			check_expect(&t->once,
+			quern_check_expect(&t->once,
 				known && (uint32_t)p.first >= begin && (uint32_t)p.first < end && p.first != p.second,
 				"%u-D: the pair (%d, %d) does not begin in its block", j->dim, p.first, p.second);
 			if (!known) continue;
 			const size_t low = (size_t)(p.first < p.second ? p.first : p.second),
 						 high = (size_t)(p.first < p.second ? p.second : p.first);
-			check_expect(
+			quern_check_expect(
 				&t->once, !seen[low * j->n + high], "%u-D: a pair stands twice in one block", j->dim);
-			check_expect(&t->pairs, is_near(j, (uint32_t)low, (uint32_t)high),
+			quern_check_expect(&t->pairs, is_near(j, (uint32_t)low, (uint32_t)high),
 				"%u-D: a pair is farther than its reach", j->dim);
 			seen[low * j->n + high] = true;
 		}
@@ -150,8 +150,8 @@ static void compare(const search *s, tallies *t) {
 			for (uint32_t k = 0; k < j->n; k++) {
 				const size_t low = a < k ? a : k, high = a < k ? k : a;
 				if (k == a || !is_near(j, a, k)) continue;
-				check_expect(&t->pairs, seen[low * j->n + high], "%u-D: %u grains: a near pair is not found",
-					j->dim, j->n);
+				quern_check_expect(&t->pairs, seen[low * j->n + high],
+					"%u-D: %u grains: a near pair is not found", j->dim, j->n);
 			}
 	}
 	free(seen);
@@ -169,7 +169,7 @@ static void try_scenery(const check *c, const check_instance *it, const scenery 
 	uint32_t *first = quern_take(g.job.n_blocks + 1, sizeof *first);
 	for (uint32_t b = 0; b < g.job.n_blocks; b++)
 		s.pair[b] = quern_take((size_t)g.job.n * 256 + 16, sizeof(quern_pair));
-	check_place(c, "pairs, %u-D, while n = %u", g.job.dim, g.job.n);
+	quern_check_place(c, "pairs, %u-D, while n = %u", g.job.dim, g.job.n);
 	for (uint32_t cap = 0; cap < 3; cap++) { /* too little room: counts are right all the same */
 		s.cap = cap;
 		for (uint32_t b = 0; b < g.job.n_blocks; b++) find(&s, b, 0), first[b] = s.found[b];
@@ -177,14 +177,14 @@ static void try_scenery(const check *c, const check_instance *it, const scenery 
 	s.cap = g.job.n * 256;
 	for (uint32_t b = 0; b < g.job.n_blocks; b++) {
 		find(&s, b, 0);
-		check_expect(&t->room, first[b] == s.found[b],
+		quern_check_expect(&t->room, first[b] == s.found[b],
 			"%u-D: %u pairs are counted with little room, %u with enough", g.job.dim, first[b], s.found[b]);
-		check_expect(&t->room, !s.overrun[b], "%u-D: pairs are written beyond cap", g.job.dim);
+		quern_check_expect(&t->room, !s.overrun[b], "%u-D: pairs are written beyond cap", g.job.dim);
 	}
 	compare(&s, t);
 	memcpy(first, s.found, g.job.n_blocks * sizeof *first);
 	quern_pool_each(pool, g.job.n_blocks, find, &s);
-	check_expect(&t->threads, !memcmp(first, s.found, g.job.n_blocks * sizeof *first),
+	quern_check_expect(&t->threads, !memcmp(first, s.found, g.job.n_blocks * sizeof *first),
 		"%u-D: several threads at once find other pairs", g.job.dim);
 	for (uint32_t b = 0; b < g.job.n_blocks; b++) free(s.pair[b]);
 	free(s.pair), free(s.found), free(s.overrun), free(first);
@@ -198,18 +198,18 @@ static void law(const check *c) {
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
-		if (check_instance_create(c, dim, 0, &it) == CHECK_READY)
+		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY)
 			for (size_t i = 0; i < sizeof sceneries / sizeof *sceneries; i++) {
 				scenery s = sceneries[i];
 				s.dim = dim;
 				try_scenery(c, &it, &s, &t);
 			}
-		check_instance_finish(c, &it);
+		quern_check_instance_finish(c, &it);
 	}
-	check_tell(c, &t.pairs, NULL);
-	check_tell(c, &t.once, NULL);
-	check_tell(c, &t.room, "counts do not depend on cap, and nothing is written beyond it");
-	check_tell(c, &t.threads, NULL);
+	quern_check_tell(c, &t.pairs, NULL);
+	quern_check_tell(c, &t.once, NULL);
+	quern_check_tell(c, &t.room, "counts do not depend on cap, and nothing is written beyond it");
+	quern_check_tell(c, &t.threads, NULL);
 }
 
-const check_kind check_neighbours = { .law = law };
+const check_kind quern_check_neighbours = { .law = law };

@@ -1,4 +1,4 @@
-/* check_packer - placing grains in a region: no overlap, nothing outside, the radius that waits, the same again */
+/* quern_check_packer - placing grains in a region: no overlap, nothing outside, the radius that waits, the same again */
 #include "check.h"
 #include "random.h"
 #include "text.h"
@@ -18,7 +18,9 @@ typedef struct {
 
 static const double mean = 1e-3, side = 12e-3;
 
-static double drawn(const packing *p) { return mean * check_uniform(150, p->n - p->job.n_seed, 0.8, 1.2); }
+static double drawn(const packing *p) {
+	return mean * quern_check_uniform(150, p->n - p->job.n_seed, 0.8, 1.2);
+}
 
 static quern_real radius(quern_pack_job *job) { return drawn((packing *)(void *)job); }
 
@@ -86,7 +88,7 @@ static void pack(const check *c, const check_instance *it, packing *p) {
 	quern_spot seed[3];
 	memcpy(seed, p->spot, sizeof seed);
 	p->job.seed = seed;
-	check_place(c, "pack, %u-D, in region %u", it->dim, p->shape);
+	quern_check_place(c, "pack, %u-D, in region %u", it->dim, p->shape);
 	ops->pack[it->dim - 2](it->self, &p->job);
 	p->job.seed = NULL;
 }
@@ -97,15 +99,15 @@ typedef struct {
 
 static void look(const packing *p, tallies *t) {
 	const uint32_t dim = p->job.dim, n = p->n - p->job.n_seed;
-	check_expect(&t->overlap, !p->overlaps,
+	quern_check_expect(&t->overlap, !p->overlaps,
 		"%u-D: %u of %u grains overlap others or a wall by more than 1e-9", dim, p->overlaps, n);
-	check_expect(&t->inside, !p->outside && !p->off_plane,
+	quern_check_expect(&t->inside, !p->outside && !p->off_plane,
 		"%u-D: %u of %u grains have their centre outside the region", dim, p->outside + p->off_plane, n);
-	check_expect(&t->radius, !p->other_radius,
+	quern_check_expect(&t->radius, !p->other_radius,
 		"%u-D: %u of %u grains have another radius than the one that waits", dim, p->other_radius, n);
-	check_expect(&t->end, !p->after_end, "%u-D: %u grains are placed after place() has said enough", dim,
-		p->after_end);
-	check_expect(&t->grains, n > 0, "%u-D: nothing is placed in an empty region", dim);
+	quern_check_expect(&t->end, !p->after_end, "%u-D: %u grains are placed after place() has said enough",
+		dim, p->after_end);
+	quern_check_expect(&t->grains, n > 0, "%u-D: nothing is placed in an empty region", dim);
 }
 
 static bool same(const packing *a, const packing *b) {
@@ -124,10 +126,10 @@ static void try_dimension(const check *c, const check_instance *it, packing p[2]
 				pack(c, it, &p[i]);
 			}
 			look(&p[0], t);
-			check_expect(&t->again, same(&p[0], &p[1]),
+			quern_check_expect(&t->again, same(&p[0], &p[1]),
 				"%u-D: the same seed and counter give another packing", it->dim);
 		}
-	check_expect(&t->self, !memcmp(before, it->self, size), "%u-D: self changes", it->dim);
+	quern_check_expect(&t->self, !memcmp(before, it->self, size), "%u-D: self changes", it->dim);
 	free(before);
 }
 
@@ -151,17 +153,17 @@ static void law(const check *c) {
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
-		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, p, &t);
-		check_instance_finish(c, &it);
+		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, p, &t);
+		quern_check_instance_finish(c, &it);
 	}
 	free(p);
-	check_tell(c, &t.grains, NULL);
-	check_tell(c, &t.overlap, "none above 1e-9 of a radius");
-	check_tell(c, &t.inside, NULL);
-	check_tell(c, &t.radius, NULL);
-	check_tell(c, &t.end, NULL);
-	check_tell(c, &t.again, NULL);
-	check_tell(c, &t.self, "self is left alone");
+	quern_check_tell(c, &t.grains, NULL);
+	quern_check_tell(c, &t.overlap, "none above 1e-9 of a radius");
+	quern_check_tell(c, &t.inside, NULL);
+	quern_check_tell(c, &t.radius, NULL);
+	quern_check_tell(c, &t.end, NULL);
+	quern_check_tell(c, &t.again, NULL);
+	quern_check_tell(c, &t.self, "self is left alone");
 }
 
-const check_kind check_packer = { .sane = sane, .law = law };
+const check_kind quern_check_packer = { .sane = sane, .law = law };

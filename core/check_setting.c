@@ -11,7 +11,7 @@ typedef enum { ORDINARY, LOW, HIGH, ANY, NEAR } choice;
 /* Settings from here on lie around the ordinary values, for what refuses these. */
 static const uint64_t nearby = 1u << 20;
 
-double check_ordinary(const check *c, const char *unit) {
+double quern_check_ordinary(const check *c, const char *unit) {
 	static const struct {
 		const char *unit;
 		double value;
@@ -43,7 +43,7 @@ static bool needs_a_value(const quern_param *row) {
 
 static double usual(const check *c, uint32_t dim, const quern_param *row) {
 	if (needs_a_value(row) || row->from || row->flags & QUERN_MAYBE)
-		return within(row, check_ordinary(c, row->unit));
+		return within(row, quern_check_ordinary(c, row->unit));
 	return quern_param_default(row, dim);
 }
 
@@ -59,9 +59,9 @@ static double anywhere(const check *c, uint32_t dim, const quern_param *row, uin
 	const double low = bound(c, dim, row, LOW), high = bound(c, dim, row, HIGH);
 	if (low >= 0 && high > 1e3 * (low + 1e-30)) {
 		const double least = log(low > 0 ? low : 1e-6 * fabs(usual(c, dim, row)) + 1e-30);
-		return within(row, exp(check_uniform(key, counter, least, log(high))));
+		return within(row, exp(quern_check_uniform(key, counter, least, log(high))));
 	}
-	return check_uniform(key, counter, low, high);
+	return quern_check_uniform(key, counter, low, high);
 }
 
 static void put_number(quern_node *map, const char *name, double value) {
@@ -73,14 +73,14 @@ static void put_number(quern_node *map, const char *name, double value) {
 /* Vectors that must be given: different for every row, so that corners are apart and normals have a length. */
 static void put_vector(const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how,
 	uint64_t key, quern_node *map) {
-	const double size = check_ordinary(c, row->unit);
+	const double size = quern_check_ordinary(c, row->unit);
 	if (!needs_a_value(row) && how == ORDINARY) return;
 	if (how != ORDINARY && how != ANY && !bounded(row)) return;
 	quern_node *list = quern_node_put_list(map, row->name);
 	for (uint32_t k = 0; k < dim; k++) {
 		char text[32];
 		double x = size * (index + 1) * (0.2 + 0.2 * k);
-		if (how == ANY) x = check_uniform(key, index * 8 + k, -size, size);
+		if (how == ANY) x = quern_check_uniform(key, index * 8 + k, -size, size);
 		else if (how != ORDINARY) x = bound(c, dim, row, how);
 		quern_number(within(row, x), text);
 		quern_node_append(list, text);
@@ -90,8 +90,8 @@ static void put_vector(const check *c, uint32_t dim, const quern_param *row, uin
 static void put_real(const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how,
 	uint64_t key, quern_node *map) {
 	if (how == NEAR) {
-		const double factor = exp(check_uniform(key, index, -2, 2));
-		if (needs_a_value(row) || check_uniform(key, 500 + index, 0, 1) < 0.7)
+		const double factor = exp(quern_check_uniform(key, index, -2, 2));
+		if (needs_a_value(row) || quern_check_uniform(key, 500 + index, 0, 1) < 0.7)
 			put_number(map, row->name, within(row, usual(c, dim, row) * factor));
 	} else if (how == ORDINARY) {
 		if (needs_a_value(row)) put_number(map, row->name, usual(c, dim, row));
@@ -105,7 +105,7 @@ static void put_choice(const quern_param *row, uint32_t index, choice how, uint6
 	uint32_t n = 0;
 	while (row->choices[n]) n++;
 	if (!n || (how == ORDINARY && !needs_a_value(row))) return;
-	const uint32_t any = (uint32_t)check_uniform(key, index, 0, n);
+	const uint32_t any = (uint32_t)quern_check_uniform(key, index, 0, n);
 	quern_node_put(map, row->name, row->choices[how == HIGH ? n - 1 : how == ANY && any < n ? any : 0]);
 }
 
@@ -122,7 +122,8 @@ static void put_row(const check *c, uint32_t dim, const quern_param *row, uint32
 	case QUERN_T_BOOL:
 		if (how != ORDINARY || needs_a_value(row))
 			quern_node_put(map, row->name,
-				how == HIGH || (how == ANY && check_uniform(key, index, 0, 1) < 0.5) ? "true" : "false");
+				how == HIGH || (how == ANY && quern_check_uniform(key, index, 0, 1) < 0.5) ? "true"
+																						   : "false");
 		break;
 	case QUERN_T_VECTOR: put_vector(c, dim, row, index, how, key, map); break;
 	case QUERN_T_TEXT:
@@ -143,13 +144,13 @@ static void put_rows(
 	for (uint32_t i = 0; i < n; i++) {
 		choice how = ORDINARY;
 		if (setting >= nearby) how = rows[i].type == QUERN_T_REAL ? NEAR : ORDINARY;
-		else if (setting > 2 * n) how = (choice)check_uniform(setting, 1000 + i, 0, 4);
+		else if (setting > 2 * n) how = (choice)quern_check_uniform(setting, 1000 + i, 0, 4);
 		else if (setting && (setting - 1) / 2 == i) how = (setting - 1) % 2 ? HIGH : LOW;
 		put_row(c, dim, &rows[i], i, how, setting, map);
 	}
 }
 
-uint64_t check_settings(const check *c) { return 2 * (uint64_t)(c->file->n_params) + 1; }
+uint64_t quern_check_settings(const check *c) { return 2 * (uint64_t)(c->file->n_params) + 1; }
 
 static void no_publish(const quern_setup *setup, const char *name, const char *unit, quern_real value) {
 	(void)setup, (void)name, (void)unit, (void)value;
@@ -179,9 +180,10 @@ static check_outcome call_init(const check *c, check_instance *it, uint64_t sett
 	quern_err err = { it->report, it->tree->root, { 0 }, c->file->plugin.id };
 	for (uint32_t k = 0; k < it->dim; k++) setup.upper[k] = 1;
 	setup.gravity[up] = -9.81;
-	check_place(c, "init, %u-D, with setting %llu of its parameters", it->dim, (unsigned long long)setting);
+	quern_check_place(
+		c, "init, %u-D, with setting %llu of its parameters", it->dim, (unsigned long long)setting);
 	const quern_status status = c->file->plugin.init(it->self, &setup, &err);
-	check_environment(c);
+	quern_check_environment(c);
 	const bool spoke = quern_report_errors(it->report) > 0;
 	it->ready = status == QUERN_OK;
 	if (it->ready && !spoke) return CHECK_READY;
@@ -226,29 +228,30 @@ static check_outcome create(
 	return CHECK_READY;
 }
 
-check_outcome check_instance_create(const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
+check_outcome quern_check_instance_create(
+	const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
 	check_instance other;
 	check_outcome outcome = create(c, dim, setting, 1, it);
 	for (uint64_t i = 0; !setting && outcome == CHECK_REFUSED && i < 200; i++) {
 		if (create(c, dim, nearby + i, 1, &other) == CHECK_READY) {
-			check_instance_finish(c, it);
+			quern_check_instance_finish(c, it);
 			*it = other;
 			return CHECK_READY;
 		}
-		check_instance_finish(c, &other);
+		quern_check_instance_finish(c, &other);
 	}
 	return outcome;
 }
 
-check_outcome check_instance_scaled(
+check_outcome quern_check_instance_scaled(
 	const check *c, const check_instance *base, double factor, check_instance *it) {
 	return create(c, base->dim, base->setting, factor, it);
 }
 
-void check_instance_finish(const check *c, check_instance *it) {
-	check_place(c, "finish, %u-D", it->dim);
+void quern_check_instance_finish(const check *c, check_instance *it) {
+	quern_check_place(c, "finish, %u-D", it->dim);
 	if (it->ready && c->file->plugin.finish) c->file->plugin.finish(it->self);
-	check_environment(c);
+	quern_check_environment(c);
 	if (it->self) quern_params_finish(c->file->params, it->self);
 	free(it->self);
 	quern_tree_destroy(it->tree);
@@ -256,7 +259,7 @@ void check_instance_finish(const check *c, check_instance *it) {
 	*it = (check_instance) { 0 };
 }
 
-bool check_counts(const check *c, const check_instance *it, const quern_use *row) {
+bool quern_check_counts(const check *c, const check_instance *it, const quern_use *row) {
 	const quern_param *when = row->when ? quern_param_find(c->file->params, row->when) : NULL;
 	return !row->when || (when && quern_param_number(when, it->self) != 0);
 }

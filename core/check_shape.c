@@ -1,4 +1,4 @@
-/* check_shape - shape functions: they sum to one, reproduce a line, know their slopes and stay inside walls */
+/* quern_check_shape - shape functions: they sum to one, reproduce a line, know their slopes and stay inside walls */
 #include "check.h"
 #include <math.h>
 #include <stdlib.h>
@@ -27,25 +27,25 @@ static void call(const check_kernel *k, const check_batch *b) {
 
 /* Everywhere, close to walls and on nodes. */
 static double place(uint64_t key, uint32_t i) {
-	const double whole = floor(check_uniform(key + 9, i, 0, CELLS + 0.999));
+	const double whole = floor(quern_check_uniform(key + 9, i, 0, CELLS + 0.999));
 	if (i % 16 == 0) return whole * cell;
-	if (i % 4 == 1) return check_uniform(key, i, 0, 0.6 * cell);
-	if (i % 4 == 2) return CELLS * cell - check_uniform(key, i, 0, 0.6 * cell);
-	return check_uniform(key, i, 0, CELLS * cell);
+	if (i % 4 == 1) return quern_check_uniform(key, i, 0, 0.6 * cell);
+	if (i % 4 == 2) return CELLS * cell - quern_check_uniform(key, i, 0, 0.6 * cell);
+	return quern_check_uniform(key, i, 0, CELLS * cell);
 }
 
 static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
 	if (variant >= sizeof walls / sizeof *walls) return false;
-	check_kernel_init(k, c, it, "weights", n);
+	quern_check_kernel_init(k, c, it, "weights", n);
 	k->call = call;
 	k->pass = variant;
-	check_add(k, POSITION, "position", CHECK_IN, k->dim);
+	quern_check_add(k, POSITION, "position", CHECK_IN, k->dim);
 	for (uint32_t a = 0; a < k->dim; a++) {
-		check_add_integers(k, FIRST_X + (int)a, "first", CHECK_OUT);
-		for (uint32_t i = 0; i < n; i++) check_given(k, POSITION, a)[i] = place(80 + a, i);
+		quern_check_add_integers(k, FIRST_X + (int)a, "first", CHECK_OUT);
+		for (uint32_t i = 0; i < n; i++) quern_check_given(k, POSITION, a)[i] = place(80 + a, i);
 	}
-	check_add(k, VALUE, "value", CHECK_OUT, 3 * k->dim);
-	check_add(k, SLOPE, "slope", CHECK_OUT, 3 * k->dim);
+	quern_check_add(k, VALUE, "value", CHECK_OUT, 3 * k->dim);
+	quern_check_add(k, SLOPE, "slope", CHECK_OUT, 3 * k->dim);
 	return true;
 }
 
@@ -54,40 +54,42 @@ typedef struct {
 } tallies;
 
 static void check_point(const check_kernel *k, uint32_t a, uint32_t i, tallies *t) {
-	const int32_t first = ((const int32_t *)(const void *)check_found(k, FIRST_X + (int)a, 0))[i];
-	const double x = check_given(k, POSITION, a)[i], at = x / cell;
+	const int32_t first = ((const int32_t *)(const void *)quern_check_found(k, FIRST_X + (int)a, 0))[i];
+	const double x = quern_check_given(k, POSITION, a)[i], at = x / cell;
 	double sum = 0, line = 0, slopes = 0, gradient = 0;
 	for (uint32_t node = 0; node < 3; node++) {
-		const double v = check_found(k, VALUE, 3 * a + node)[i], g = check_found(k, SLOPE, 3 * a + node)[i];
+		const double v = quern_check_found(k, VALUE, 3 * a + node)[i],
+					 g = quern_check_found(k, SLOPE, 3 * a + node)[i];
 		const int32_t index = first + (int32_t)node;
 		sum += v, slopes += g * cell;
 		line += v * (index - at), gradient += g * cell * (index - at);
 		const bool used = v != 0 || g != 0;
 		const bool beyond = (walls[k->pass][0] != INT32_MIN && index < 0) ||
 							(walls[k->pass][1] != INT32_MAX && index > CELLS);
-		check_expect(&t->support, !used || !beyond,
+		quern_check_expect(&t->support, !used || !beyond,
 			"%u-D: at x = %.6g cells node %d, behind a wall, has weight %.3g", k->dim, at, index, v);
-		check_expect(&t->support, !used || (index >= floor(at) - 1 && index <= floor(at) + 2),
+		quern_check_expect(&t->support, !used || (index >= floor(at) - 1 && index <= floor(at) + 2),
 			"%u-D: at x = %.6g cells node %d has weight: farther than a tile reaches", k->dim, at, index);
-		check_expect(&t->support, v >= -1e-12, "%u-D: at x = %.6g cells a weight of %.3g", k->dim, at, v);
+		quern_check_expect(
+			&t->support, v >= -1e-12, "%u-D: at x = %.6g cells a weight of %.3g", k->dim, at, v);
 	}
-	check_measure(
+	quern_check_measure(
 		&t->unity, fabs(sum - 1), 1e-13, "%u-D: at x = %.6g cells weights sum to %.15g", k->dim, at, sum);
-	check_measure(
+	quern_check_measure(
 		&t->line, fabs(line), 1e-13, "%u-D: at x = %.6g cells a line is off by %.3g", k->dim, at, line);
-	check_measure(&t->line, fabs(gradient - 1), 1e-12, "%u-D: at x = %.6g cells the slope of a line is %.15g",
-		k->dim, at, gradient);
-	check_measure(
+	quern_check_measure(&t->line, fabs(gradient - 1), 1e-12,
+		"%u-D: at x = %.6g cells the slope of a line is %.15g", k->dim, at, gradient);
+	quern_check_measure(
 		&t->slopes, fabs(slopes), 1e-12, "%u-D: at x = %.6g cells slopes sum to %.3g", k->dim, at, slopes);
 }
 
 /* Weight and slope of one node at one place. */
 static double weight_of(const check_kernel *k, uint32_t i, int32_t node, double *slope) {
-	const int32_t first = ((const int32_t *)(const void *)check_found(k, FIRST_X, 0))[i];
+	const int32_t first = ((const int32_t *)(const void *)quern_check_found(k, FIRST_X, 0))[i];
 	*slope = 0;
 	if (node < first || node > first + 2) return 0;
-	*slope = check_found(k, SLOPE, (uint32_t)(node - first))[i];
-	return check_found(k, VALUE, (uint32_t)(node - first))[i];
+	*slope = quern_check_found(k, SLOPE, (uint32_t)(node - first))[i];
+	return quern_check_found(k, VALUE, (uint32_t)(node - first))[i];
 }
 
 /* Integrals over the nodes at a wall, and slopes as the mean of derivatives: both by walking from node to node. */
@@ -98,25 +100,26 @@ static void check_walk(const check *c, const check_instance *it, tallies *t) {
 	const quern_shape_ops *ops = c->file->plugin.ops;
 	double sum[2] = { 0 }, before[CELLS + 1], share[2], slope;
 	make(c, it, 1, STEPS, k);
-	for (uint32_t i = 0; i < STEPS; i++) check_given(k, POSITION, 0)[i] = (i + 0.5) * CELLS * cell / STEPS;
-	check_run(k, 512, NULL);
+	for (uint32_t i = 0; i < STEPS; i++)
+		quern_check_given(k, POSITION, 0)[i] = (i + 0.5) * CELLS * cell / STEPS;
+	quern_check_run(k, 512, NULL);
 	for (uint32_t i = 0; i < STEPS; i++)
 		for (int32_t node = 0; node <= CELLS; node++) {
 			const double v = weight_of(k, i, node, &slope), way = CELLS * cell / STEPS;
 			if (node < 2) sum[node] += v * CELLS / STEPS;
 			if (i) /* a jump shows as a change that no slope within reach explains */
-				check_measure(&t->smooth, fabs(v - before[node]), 2.5 * way / cell,
+				quern_check_measure(&t->smooth, fabs(v - before[node]), 2.5 * way / cell,
 					"%u-D: the weight of node %d jumps by %.3g at x = %.6g cells", it->dim, node,
 					v - before[node], (double)i * CELLS / STEPS);
 			before[node] = v;
 		}
 	ops->shares(it->self, &share[0], &share[1]);
 	for (int i = 0; i < 2; i++)
-		check_measure(&t->shares, fabs(sum[i] - share[i]), 1e-4,
+		quern_check_measure(&t->shares, fabs(sum[i] - share[i]), 1e-4,
 			"%u-D: shares() says %.6g of a cell, the integral %.6g", it->dim, share[i], sum[i]);
-	check_expect(&t->shares, ops->stiffness(it->self) > 0 && isfinite(ops->stiffness(it->self)),
+	quern_check_expect(&t->shares, ops->stiffness(it->self) > 0 && isfinite(ops->stiffness(it->self)),
 		"stiffness is %.3g", ops->stiffness(it->self));
-	check_kernel_finish(k);
+	quern_check_kernel_finish(k);
 	free(k);
 }
 
@@ -129,24 +132,24 @@ static void law(const check *c) {
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		check_instance it;
 		if (!check_has_dim(c, dim)) continue;
-		if (check_instance_create(c, dim, 0, &it) == CHECK_READY) {
+		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) {
 			for (uint32_t variant = 0; make(c, &it, variant, 2000, k); variant++) {
-				check_run(k, 512, NULL);
+				quern_check_run(k, 512, NULL);
 				for (uint32_t a = 0; a < dim; a++)
 					for (uint32_t i = 0; i < k->n; i++) check_point(k, a, i, &t);
-				check_kernel_finish(k);
+				quern_check_kernel_finish(k);
 			}
 			check_walk(c, &it, &t);
 		}
-		check_instance_finish(c, &it);
+		quern_check_instance_finish(c, &it);
 	}
 	free(k);
-	check_tell(c, &t.unity, NULL);
-	check_tell(c, &t.line, NULL);
-	check_tell(c, &t.slopes, NULL);
-	check_tell(c, &t.support, NULL);
-	check_tell(c, &t.smooth, NULL);
-	check_tell(c, &t.shares, NULL);
+	quern_check_tell(c, &t.unity, NULL);
+	quern_check_tell(c, &t.line, NULL);
+	quern_check_tell(c, &t.slopes, NULL);
+	quern_check_tell(c, &t.support, NULL);
+	quern_check_tell(c, &t.smooth, NULL);
+	quern_check_tell(c, &t.shares, NULL);
 }
 
-const check_kind check_shape = { .make = make, .law = law };
+const check_kind quern_check_shape = { .make = make, .law = law };

@@ -1,11 +1,11 @@
-/* check_table - what a plugin's tables say of it beyond what the loader asks: docs, units, ranges, one meaning each */
+/* quern_check_table - what a plugin's tables say of it beyond what the loader asks: docs, units, ranges, one meaning each */
 #include "check_table.h"
 #include "check.h"
 #include "text.h"
 #include <math.h>
 #include <string.h>
 
-bool check_is_unit(const check *c, const char *unit) {
+bool quern_check_is_unit(const check *c, const char *unit) {
 	char text[96], why[160];
 	double value;
 	snprintf(text, sizeof text, "1 %s", unit ? unit : "?");
@@ -21,11 +21,12 @@ static void check_identity(const check *c, check_tally *t) {
 	const quern_library *lib = c->file->library;
 	const char *slash = strrchr(c->file->path, '/'), *name = slash ? slash + 1 : c->file->path;
 	const size_t n = strlen(p->id);
-	check_expect(t, !strncmp(name, p->id, n) && name[n] == '.', "the file is %s, the id %s", name, p->id);
-	check_expect(t, has_text(p->brief) && !strchr(p->brief, '\n'), "brief must be one line");
-	check_expect(t, has_text(lib->version), "the library has no version");
-	check_expect(t, has_text(lib->license), "the library has no licence");
-	check_expect(t, (p->init != NULL) || !p->finish, "there is finish, but no init");
+	quern_check_expect(
+		t, !strncmp(name, p->id, n) && name[n] == '.', "the file is %s, the id %s", name, p->id);
+	quern_check_expect(t, has_text(p->brief) && !strchr(p->brief, '\n'), "brief must be one line");
+	quern_check_expect(t, has_text(lib->version), "the library has no version");
+	quern_check_expect(t, has_text(lib->license), "the library has no licence");
+	quern_check_expect(t, (p->init != NULL) || !p->finish, "there is finish, but no init");
 }
 
 /* ---- parameters ---- */
@@ -38,7 +39,7 @@ static void check_default(check_tally *t, const quern_param *row) {
 		const double x = quern_param_default(row, dim);
 		const bool low = row->flags & QUERN_MIN_OPEN ? x > row->min : x >= row->min;
 		const bool high = row->flags & QUERN_MAX_OPEN ? x < row->max : x <= row->max;
-		check_expect(t, low && high, "%s: the default %g is outside its own range", row->name, x);
+		quern_check_expect(t, low && high, "%s: the default %g is outside its own range", row->name, x);
 	}
 }
 
@@ -47,12 +48,13 @@ static bool same_name(const char *a, const char *b) {
 	return !strcmp(a, b) || (!strncmp(a, b, n) && b[n] == '.');
 }
 
-void check_parameter_rows(const check *c, check_tally *t, const quern_param *rows) {
+void quern_check_parameter_rows(const check *c, check_tally *t, const quern_param *rows) {
 	for (const quern_param *row = rows; row && row->name; row++) {
 		const char *name = row->name;
-		check_expect(t, has_text(row->doc), "%s: no doc", name);
-		check_expect(t, !row->unit || check_is_unit(c, row->unit), "%s: '%s' is no unit", name, row->unit);
-		check_expect(
+		quern_check_expect(t, has_text(row->doc), "%s: no doc", name);
+		quern_check_expect(
+			t, !row->unit || quern_check_is_unit(c, row->unit), "%s: '%s' is no unit", name, row->unit);
+		quern_check_expect(
 			t, row->type != QUERN_T_REAL || row->unit, "%s: a number has a unit; \"1\" if it is pure", name);
 		check_default(t, row);
 		for (const quern_param *other = rows; other != row; other++) {
@@ -60,29 +62,30 @@ void check_parameter_rows(const check *c, check_tally *t, const quern_param *row
 			const bool both = !strcmp(other->name, name) ||
 							  (!row->choices && !other->choices &&
 								  (same_name(other->name, name) || same_name(name, other->name)));
-			check_expect(t, !both, "%s stands twice", name);
+			quern_check_expect(t, !both, "%s stands twice", name);
 		}
-		check_parameter_rows(c, t, row->rows);
+		quern_check_parameter_rows(c, t, row->rows);
 	}
 }
 
 /* ---- uses ---- */
 
-void check_use_rows(const check *c, check_tally *t, const quern_use *rows) {
+void quern_check_use_rows(const check *c, check_tally *t, const quern_use *rows) {
 	const bool solver = c->file->plugin.kind == QUERN_SOLVER;
 	for (const quern_use *row = rows; row && row->field; row++) {
 		const char *name = row->field;
 		bool told = false;
-		check_expect(t, row->unit && check_is_unit(c, row->unit), "%s: '%s' is no unit", name,
+		quern_check_expect(t, row->unit && quern_check_is_unit(c, row->unit), "%s: '%s' is no unit", name,
 			row->unit ? row->unit : "");
 		for (const quern_use *other = rows; other->field; other++) {
 			if (strcmp(other->field, name) != 0) continue;
 			told = told || has_text(other->doc);
-			check_expect(t, other->shape == row->shape, "%s has two shapes", name);
-			check_expect(t, !other->unit || !row->unit || quern_units_equal(c->units, other->unit, row->unit),
+			quern_check_expect(t, other->shape == row->shape, "%s has two shapes", name);
+			quern_check_expect(t,
+				!other->unit || !row->unit || quern_units_equal(c->units, other->unit, row->unit),
 				"%s has two units", name);
 		}
-		check_expect(
+		quern_check_expect(
 			t, solver || row->access == QUERN_READ || told, "%s: no doc, though it is changed here", name);
 	}
 }
@@ -95,9 +98,10 @@ static void compare_rows(const check *c, check_tally *t, const char *field, cons
 	for (const quern_stage *s = ops->stages; s && s->name; s++)
 		for (const quern_use *own = s->uses; own->field; own++) {
 			if (strcmp(own->field, field) != 0) continue;
-			check_expect(t, own->shape == row->shape, "%s is %s here, and %s to %s", row->field,
+			quern_check_expect(t, own->shape == row->shape, "%s is %s here, and %s to %s", row->field,
 				quern_shape_name(row->shape), quern_shape_name(own->shape), solver->plugin.id);
-			check_expect(t, !own->unit || !row->unit || quern_units_equal(c->units, own->unit, row->unit),
+			quern_check_expect(t,
+				!own->unit || !row->unit || quern_units_equal(c->units, own->unit, row->unit),
 				"%s is in %s here, and in %s to %s", row->field, row->unit, own->unit, solver->plugin.id);
 		}
 }
@@ -132,17 +136,17 @@ static void compare_with_solvers(const check *c, check_tally *t) {
 	quern_loader_destroy(loader);
 }
 
-void check_table(const check *c) {
+void quern_check_table(const check *c) {
 	const quern_plugin *p = &c->file->plugin;
 	check_tally identity = { .name = "identity" }, params = { .name = "parameter rows" },
 				uses = { .name = "uses" };
-	check_place(c, "its tables");
+	quern_check_place(c, "its tables");
 	check_identity(c, &identity);
-	check_tell(c, &identity, "%s %s, %s", p->id, c->file->library->version, c->file->library->license);
-	check_parameter_rows(c, &params, c->file->params);
-	check_tell(c, &params, "%zu rows, %u bytes", c->file->n_params, p->instance_size);
-	check_use_rows(c, &uses, c->file->uses);
-	check_place(c, "its tables, held against those of installed solvers");
+	quern_check_tell(c, &identity, "%s %s, %s", p->id, c->file->library->version, c->file->library->license);
+	quern_check_parameter_rows(c, &params, c->file->params);
+	quern_check_tell(c, &params, "%zu rows, %u bytes", c->file->n_params, p->instance_size);
+	quern_check_use_rows(c, &uses, c->file->uses);
+	quern_check_place(c, "its tables, held against those of installed solvers");
 	compare_with_solvers(c, &uses);
-	check_tell(c, &uses, "%zu rows", c->file->n_uses);
+	quern_check_tell(c, &uses, "%zu rows", c->file->n_uses);
 }

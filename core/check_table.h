@@ -1,7 +1,7 @@
-/* check_table - rows of parameters and uses, wherever a table holds them */
+/* quern_check_table - rows of parameters and uses, wherever a table holds them */
 #pragma once
 #include "check.h"
 
-bool check_is_unit(const check *, const char *unit);
-void check_parameter_rows(const check *, check_tally *, const quern_param *);
-void check_use_rows(const check *, check_tally *, const quern_use *);
+bool quern_check_is_unit(const check *, const char *unit);
+void quern_check_parameter_rows(const check *, check_tally *, const quern_param *);
+void quern_check_use_rows(const check *, check_tally *, const quern_use *);

@@ -1,4 +1,4 @@
-/* check_transfer - from grid to particles and back, on a line of nodes: uniform motion stays, momentum is kept */
+/* quern_check_transfer - from grid to particles and back, on a line of nodes: uniform motion stays, momentum is kept */
 #include "check.h"
 #include <math.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@ static void call(const check_kernel *k, const check_batch *b) {
 	CHECK_VECTOR(batch.echo, k, b, ECHO, k->dim);
 	CHECK_VECTOR(batch.send, k, b, SEND, k->dim);
 	CHECK_VECTOR(batch.velocity, k, b, VELOCITY, k->dim);
-	check_columns(k, b, k->use, use);
+	quern_check_columns(k, b, k->use, use);
 	ops->gather[k->dim - 2](k->instance->self, &batch);
 }
 
@@ -23,16 +23,16 @@ static void call(const check_kernel *k, const check_batch *b) {
 static void create(const check *c, const check_instance *it, uint32_t pass, uint32_t n, check_kernel *k) {
 	const quern_transfer_ops *ops = c->file->plugin.ops;
 	const bool last = pass == ops->passes;
-	check_kernel_init(k, c, it, last ? "gather, last pass" : "gather", n);
+	quern_check_kernel_init(k, c, it, last ? "gather, last pass" : "gather", n);
 	k->call = call;
 	k->pass = pass;
 	k->dt = 1e-3;
-	check_add(k, PIC, "pic", CHECK_IN, k->dim);
-	check_add(k, CHANGE, "change", CHECK_IN, k->dim);
-	if (pass) check_add(k, ECHO, "echo", CHECK_IN, k->dim);
-	if (!last) check_add(k, SEND, "send", CHECK_OUT, k->dim);
-	check_add(k, VELOCITY, "velocity", last ? CHECK_CHANGED : CHECK_IN, k->dim);
-	check_add_uses(k, 0, true, false);
+	quern_check_add(k, PIC, "pic", CHECK_IN, k->dim);
+	quern_check_add(k, CHANGE, "change", CHECK_IN, k->dim);
+	if (pass) quern_check_add(k, ECHO, "echo", CHECK_IN, k->dim);
+	if (!last) quern_check_add(k, SEND, "send", CHECK_OUT, k->dim);
+	quern_check_add(k, VELOCITY, "velocity", last ? CHECK_CHANGED : CHECK_IN, k->dim);
+	quern_check_add_uses(k, 0, true, false);
 }
 
 static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
@@ -41,7 +41,7 @@ static bool make(const check *c, const check_instance *it, uint32_t variant, uin
 	if (variant > ops->passes) return false;
 	create(c, it, variant, n, k);
 	for (int i = 0; i < 4; i++)
-		if (k->at[names[i]] >= 0) check_fill(k, names[i], k->dim, 90 + (uint64_t)i, -1, 1);
+		if (k->at[names[i]] >= 0) quern_check_fill(k, names[i], k->dim, 90 + (uint64_t)i, -1, 1);
 	return true;
 }
 
@@ -76,10 +76,10 @@ static double from_nodes(const line *l, double (*nodes)[3], int p, int c) {
 static void begin_line(line *l, bool uniform) {
 	memset(l, 0, sizeof *l);
 	for (int p = 0; p < PARTICLES; p++) {
-		l->x[p] = check_uniform(95, (uint64_t)p, 0, NODES - 1.001);
-		l->m[p] = check_uniform(96, (uint64_t)p, 0.5, 2);
+		l->x[p] = quern_check_uniform(95, (uint64_t)p, 0, NODES - 1.001);
+		l->m[p] = quern_check_uniform(96, (uint64_t)p, 0.5, 2);
 		for (int c = 0; c < 3; c++)
-			l->v[p][c] = uniform ? 1 + c : check_uniform(97, (uint64_t)(p * 4 + c), -1, 1);
+			l->v[p][c] = uniform ? 1 + c : quern_check_uniform(97, (uint64_t)(p * 4 + c), -1, 1);
 		const int i = (int)l->x[p];
 		l->mass[i] += (i + 1 - l->x[p]) * l->m[p];
 		l->mass[i + 1] += (l->x[p] - i) * l->m[p];
@@ -87,7 +87,7 @@ static void begin_line(line *l, bool uniform) {
 	to_nodes(l, l->v, l->old);
 	for (int i = 0; i < NODES; i++)
 		for (int c = 0; c < 3; c++) {
-			const double kick = uniform ? 0 : check_uniform(98, (uint64_t)(i * 4 + c), -0.5, 0.5);
+			const double kick = uniform ? 0 : quern_check_uniform(98, (uint64_t)(i * 4 + c), -0.5, 0.5);
 			l->now[i][c] = l->old[i][c] + kick;
 		}
 }
@@ -103,21 +103,21 @@ static void gather(const check *c, const check_instance *it, line *l) {
 		for (uint32_t a = 0; a < k->dim; a++)
 			for (int p = 0; p < PARTICLES; p++) {
 				const double pic = from_nodes(l, l->now, p, (int)a);
-				check_given(k, PIC, a)[p] = pic;
-				check_given(k, CHANGE, a)[p] = pic - from_nodes(l, l->old, p, (int)a);
-				check_given(k, VELOCITY, a)[p] = l->v[p][a];
-				if (k->at[ECHO] >= 0) check_given(k, ECHO, a)[p] = l->echo[p][a];
+				quern_check_given(k, PIC, a)[p] = pic;
+				quern_check_given(k, CHANGE, a)[p] = pic - from_nodes(l, l->old, p, (int)a);
+				quern_check_given(k, VELOCITY, a)[p] = l->v[p][a];
+				if (k->at[ECHO] >= 0) quern_check_given(k, ECHO, a)[p] = l->echo[p][a];
 			}
-		check_run(k, 64, NULL);
+		quern_check_run(k, 64, NULL);
 		for (uint32_t a = 0; a < k->dim; a++)
 			for (int p = 0; p < PARTICLES; p++) {
-				if (pass == ops->passes) l->v[p][a] = check_found(k, VELOCITY, a)[p];
-				else l->send[p][a] = check_found(k, SEND, a)[p];
+				if (pass == ops->passes) l->v[p][a] = quern_check_found(k, VELOCITY, a)[p];
+				else l->send[p][a] = quern_check_found(k, SEND, a)[p];
 			}
 		to_nodes(l, l->send, nodes);
 		for (int p = 0; p < PARTICLES; p++)
 			for (int a = 0; a < 3; a++) l->echo[p][a] = from_nodes(l, nodes, p, a);
-		check_kernel_finish(k);
+		quern_check_kernel_finish(k);
 	}
 	free(nodes);
 	free(k);
@@ -131,7 +131,7 @@ static void check_momentum(const check *c, const check_instance *it, line *l, ch
 		for (int i = 0; i < NODES; i++) nodes += l->mass[i] * l->now[i][a];
 		for (int p = 0; p < PARTICLES; p++)
 			particles += l->m[p] * l->v[p][a], scale += l->m[p] * fabs(l->v[p][a]);
-		check_measure(t, fabs(particles - nodes) / scale, 1e-12,
+		quern_check_measure(t, fabs(particles - nodes) / scale, 1e-12,
 			"%u-D: nodes carry a momentum of %.9g, particles take up %.9g kg m/s", it->dim, nodes, particles);
 	}
 }
@@ -143,23 +143,23 @@ static void law(const check *c) {
 	if (!l) abort();
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		if (!check_has_dim(c, dim)) continue;
-		for (uint64_t setting = 0; setting < check_settings(c); setting++) {
+		for (uint64_t setting = 0; setting < quern_check_settings(c); setting++) {
 			check_instance it;
-			if (check_instance_create(c, dim, setting, &it) == CHECK_READY) {
+			if (quern_check_instance_create(c, dim, setting, &it) == CHECK_READY) {
 				begin_line(l, true);
 				gather(c, &it, l);
 				for (int p = 0; p < PARTICLES; p++)
 					for (uint32_t a = 0; a < dim; a++)
-						check_measure(&uniform, fabs(l->v[p][a] - 1 - a), 1e-13,
+						quern_check_measure(&uniform, fabs(l->v[p][a] - 1 - a), 1e-13,
 							"%u-D: a uniform velocity of %u m/s becomes %.15g", dim, a + 1, l->v[p][a]);
 				check_momentum(c, &it, l, &momentum);
 			}
-			check_instance_finish(c, &it);
+			quern_check_instance_finish(c, &it);
 		}
 	}
 	free(l);
-	check_tell(c, &uniform, NULL);
-	check_tell(c, &momentum, "after %u extra round trips", ops->passes);
+	quern_check_tell(c, &uniform, NULL);
+	quern_check_tell(c, &momentum, "after %u extra round trips", ops->passes);
 }
 
-const check_kind check_transfer = { .make = make, .law = law };
+const check_kind quern_check_transfer = { .make = make, .law = law };

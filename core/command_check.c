@@ -6,21 +6,21 @@
 #include "options.h"
 #include <stdlib.h>
 
-static const check_kind *const kinds[QUERN_KINDS] = { [QUERN_CONTACT] = &check_contact,
-	[QUERN_NEIGHBOURS] = &check_neighbours,
-	[QUERN_INTEGRATOR] = &check_integrator,
-	[QUERN_BODY] = &check_body,
-	[QUERN_MATERIAL] = &check_material,
-	[QUERN_SHAPE] = &check_shape,
-	[QUERN_TRANSFER] = &check_transfer,
-	[QUERN_COUPLING] = &check_coupling,
-	[QUERN_ORACLE] = &check_oracle,
-	[QUERN_PACKER] = &check_packer,
-	[QUERN_OBSERVER] = &check_observer };
+static const check_kind *const kinds[QUERN_KINDS] = { [QUERN_CONTACT] = &quern_check_contact,
+	[QUERN_NEIGHBOURS] = &quern_check_neighbours,
+	[QUERN_INTEGRATOR] = &quern_check_integrator,
+	[QUERN_BODY] = &quern_check_body,
+	[QUERN_MATERIAL] = &quern_check_material,
+	[QUERN_SHAPE] = &quern_check_shape,
+	[QUERN_TRANSFER] = &quern_check_transfer,
+	[QUERN_COUPLING] = &quern_check_coupling,
+	[QUERN_ORACLE] = &quern_check_oracle,
+	[QUERN_PACKER] = &quern_check_packer,
+	[QUERN_OBSERVER] = &quern_check_observer };
 
-static void group_table(const check *c) { check_table(c); }
-static void group_parameters(const check *c) { check_parameters(c, kinds[c->file->plugin.kind]); }
-static void group_batches(const check *c) { check_batches(c, kinds[c->file->plugin.kind]); }
+static void group_table(const check *c) { quern_check_table(c); }
+static void group_parameters(const check *c) { quern_check_parameters(c, kinds[c->file->plugin.kind]); }
+static void group_batches(const check *c) { quern_check_batches(c, kinds[c->file->plugin.kind]); }
 static void group_law(const check *c) { kinds[c->file->plugin.kind]->law(c); }
 
 /* ---- groups of tests, each in a child ---- */
@@ -33,14 +33,14 @@ typedef struct {
 static void run_errand(void *arg) {
 	const errand *e = arg;
 	e->group(e->c);
-	check_environment(e->c);
+	quern_check_environment(e->c);
 }
 
 /* A group of tests takes a few seconds; one that goes on for ever is stopped. */
 static void run_group(const check *c, const char *name, void (*group)(const check *)) {
 	errand e = { c, group };
 	char what[80];
-	check_place(c, "its tables");
+	quern_check_place(c, "its tables");
 	const quern_child how = quern_child_run(run_errand, &e, c->seconds);
 	if (how.end == QUERN_CHILD_DONE) return;
 	quern_child_say(&how, c->seconds, what);
@@ -58,15 +58,15 @@ static int run_checks(check *c) {
 	c->home = &home;
 	printf("%s, %s\n", p->id, c->file->path);
 	run_group(c, "tables", group_table);
-	if (p->kind == QUERN_SOLVER) run_group(c, "solver", check_solver);
+	if (p->kind == QUERN_SOLVER) run_group(c, "solver", quern_check_solver);
 	else {
 		run_group(c, "parameters", group_parameters);
 		if (kinds[p->kind]->make) run_group(c, "batches", group_batches);
 		run_group(c, "law", group_law);
 	}
 	check_tally left = { .name = "environment" };
-	check_expect(&left, !*c->shared->left, "%s", c->shared->left);
-	check_tell(c, &left, "arithmetic and the working folder are as they were after every call");
+	quern_check_expect(&left, !*c->shared->left, "%s", c->shared->left);
+	quern_check_tell(c, &left, "arithmetic and the working folder are as they were after every call");
 	const uint32_t n = c->shared->properties, failed = c->shared->failed;
 	if (failed) printf("%s: %u of %u properties FAILED\n", p->id, failed, n);
 	else printf("%s: %u properties, all ok\n", p->id, n);

@@ -65,16 +65,16 @@ int quern_command_render(int argc, char **argv) {
 	quern_text why = { 0 };
 	int status = read_options(argc, argv, &o);
 	if (status != QUERN_OPTIONS_READ) return status;
-	status = render_frame_read(&frame, o.folder, o.frame, o.field, &why);
+	status = quern_render_frame_read(&frame, o.folder, o.frame, o.field, &why);
 	if (status == QUERN_EXIT_DONE) {
 		char *path = o.out ? quern_copy(o.out)
 						   : quern_format("%s/frame_%06lld.png", o.folder, (long long)frame.number);
-		cairo_surface_t *surface = render_page(&frame, (int)o.width);
+		cairo_surface_t *surface = quern_render_page(&frame, (int)o.width);
 		status = save(surface, path);
 		cairo_surface_destroy(surface);
 		free(path);
 	} else fprintf(stderr, "quern render: %s\n", quern_text_string(&why));
 	quern_text_finish(&why);
-	render_frame_finish(&frame);
+	quern_render_frame_finish(&frame);
 	return status;
 }

@@ -33,8 +33,9 @@ typedef struct render_frame {
 
 /* Reads frame `number` (negative: the last one) of a run. `field`: "point.pressure", "grain.velocity.x", a bare
  * "velocity" of all that have it, or NULL for the speed where it is known. On a fault returns an exit status and one sentence. */
-int render_frame_read(render_frame *, const char *folder, int64_t number, const char *field, quern_text *why);
-void render_frame_finish(render_frame *);
+int quern_render_frame_read(
+	render_frame *, const char *folder, int64_t number, const char *field, quern_text *why);
+void quern_render_frame_finish(render_frame *);
 
 /* ---- render_colour.c: numbers to colours, and numbers to read ---- */
 
@@ -43,8 +44,8 @@ typedef struct render_colour {
 } render_colour;
 
 /* From dark violet at 0 to yellow at 1, in steps that look equal. */
-render_colour render_map(double t);
-render_colour render_mix(render_colour a, render_colour b, double t);
+render_colour quern_render_map(double t);
+render_colour quern_render_mix(render_colour a, render_colour b, double t);
 
 typedef struct render_range {
 	double low, high, step; /* ends of the colour bar, and a round distance between its marks */
@@ -53,9 +54,9 @@ typedef struct render_range {
 	char label[128];        /* "|velocity| (mm/s)" */
 } render_range;
 
-render_range render_range_of(const render_frame *);
-double render_share(const render_range *, double value); /* into [0, 1] */
-double render_round_step(double wanted); /* 1, 2 or 5 times a power of ten, at most `wanted` */
+render_range quern_render_range_of(const render_frame *);
+double quern_render_share(const render_range *, double value); /* into [0, 1] */
+double quern_render_round_step(double wanted); /* 1, 2 or 5 times a power of ten, at most `wanted` */
 
 /* ---- render_view.c: where things lie in the picture ---- */
 
@@ -67,14 +68,14 @@ typedef struct render_view {
 	double width, height;    /* pixels */
 } render_view;
 
-render_view render_view_of(const render_frame *);
-void render_view_fit(render_view *, const render_frame *, double most_width, double most_height);
-void render_project(
+render_view quern_render_view_of(const render_frame *);
+void quern_render_view_fit(render_view *, const render_frame *, double most_width, double most_height);
+void quern_render_project(
 	const render_view *, const double x[3], double out[3]); /* pixels, and m away from the eye */
 /* False for what is left out: fixed grains beside what moves. */
-bool render_shown(const render_view *, const render_frame *, const render_cloud *, size_t i);
+bool quern_render_shown(const render_view *, const render_frame *, const render_cloud *, size_t i);
 
-/* ---- render_plane.c, render_space.c: what lies in the picture, with its upper left corner at the origin ---- */
+/* ---- quern_render_plane.c, quern_render_space.c: what lies in the picture, with its upper left corner at the origin ---- */
 
 typedef struct render_style {
 	const render_frame *frame;
@@ -83,16 +84,17 @@ typedef struct render_style {
 	double line; /* pixels, a hairline of the page */
 } render_style;
 
-extern const render_colour render_sand, render_sky, render_grey, render_rose, render_ink;
-render_colour render_colour_of(const render_style *, const render_cloud *, size_t i);
-bool render_has(const render_cloud *, int sort);
-void render_plane(cairo_t *, const render_style *);
-void render_space(cairo_t *, const render_style *);
+extern const render_colour quern_render_sand, quern_render_sky, quern_render_grey, quern_render_rose,
+	quern_render_ink;
+render_colour quern_render_colour_of(const render_style *, const render_cloud *, size_t i);
+bool quern_render_has(const render_cloud *, int sort);
+void quern_render_plane(cairo_t *, const render_style *);
+void quern_render_space(cairo_t *, const render_style *);
 /* Signs of the legend, also used for what they stand for. */
-void render_disc(cairo_t *, double x, double y, double radius, render_colour, int sort, double line);
-void render_hatch(cairo_t *, double line);
-void render_set(cairo_t *, render_colour, double alpha);
+void quern_render_disc(cairo_t *, double x, double y, double radius, render_colour, int sort, double line);
+void quern_render_hatch(cairo_t *, double line);
+void quern_render_set(cairo_t *, render_colour, double alpha);
 
-/* ---- render_page.c: the picture with its heading, colour bar, scale and legend ---- */
+/* ---- quern_render_page.c: the picture with its heading, colour bar, scale and legend ---- */
 
-cairo_surface_t *render_page(const render_frame *, int width);
+cairo_surface_t *quern_render_page(const render_frame *, int width);

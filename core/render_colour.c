@@ -3,11 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-const render_colour render_sand = { 0.87, 0.72, 0.48 }, render_sky = { 0.52, 0.68, 0.85 },
-					render_grey = { 0.72, 0.72, 0.72 }, render_rose = { 0.80, 0.24, 0.38 },
-					render_ink = { 0.13, 0.13, 0.15 };
+const render_colour quern_render_sand = { 0.87, 0.72, 0.48 }, quern_render_sky = { 0.52, 0.68, 0.85 },
+					quern_render_grey = { 0.72, 0.72, 0.72 }, quern_render_rose = { 0.80, 0.24, 0.38 },
+					quern_render_ink = { 0.13, 0.13, 0.15 };
 
-render_colour render_mix(render_colour a, render_colour b, double t) {
+render_colour quern_render_mix(render_colour a, render_colour b, double t) {
 	return (render_colour) { a.r + t * (b.r - a.r), a.g + t * (b.g - a.g), a.b + t * (b.b - a.b) };
 }
 
@@ -28,7 +28,7 @@ static render_colour from_oklab(double lightness, double a, double b) {
 
 /* Lightness rises evenly while the hue turns from violet over blue and green to yellow: it reads in print, and for
  * those who do not see all colours. The chroma is what a screen can show all along the way. */
-render_colour render_map(double t) {
+render_colour quern_render_map(double t) {
 	const double x = t < 0 ? 0 : t > 1 ? 1 : t, off = x - 0.45;
 	const double hue = (300 - 195 * x) * 0.017453292519943295, chroma = 0.10 + 0.28 * off * off;
 	return from_oklab(0.33 + 0.58 * x, chroma * cos(hue), chroma * sin(hue));
@@ -36,7 +36,7 @@ render_colour render_map(double t) {
 
 /* ---- the range of the values ---- */
 
-double render_round_step(double wanted) {
+double quern_render_round_step(double wanted) {
 	const double power = pow(10, floor(log10(wanted))), lead = wanted / power;
 	return (lead >= 5 ? 5 : lead >= 2 ? 2 : 1) * power;
 }
@@ -72,7 +72,7 @@ static void set_ends(render_range *range, const double *all, size_t n, bool sign
 		if (low < 0) low -= 0.5 * some;
 		high = low + some;
 	}
-	range->step = render_round_step((high - low) / 3);
+	range->step = quern_render_round_step((high - low) / 3);
 	const double half = 0.5 * range->step;
 	range->low = range->below ? low : half * floor(low / half + 1e-9);
 	range->high = range->above ? high : half * ceil(high / half - 1e-9);
@@ -127,7 +127,7 @@ static void set_label(render_range *range, const render_frame *f) {
 	if (*unit) snprintf(range->label + n, sizeof range->label - n, " (%s)", unit);
 }
 
-render_range render_range_of(const render_frame *f) {
+render_range quern_render_range_of(const render_frame *f) {
 	render_range range = { .high = 1, .step = 0.2, .factor = 1 };
 	size_t n;
 	double *all = gather(f, &n);
@@ -137,7 +137,7 @@ render_range render_range_of(const render_frame *f) {
 	return range;
 }
 
-double render_share(const render_range *range, double value) {
+double quern_render_share(const render_range *range, double value) {
 	const double t = (value - range->low) / (range->high - range->low);
 	return t > 0 ? (t < 1 ? t : 1) : 0;
 }

@@ -257,7 +257,7 @@ static quern_scene *scene_of(const char *folder) {
 	return NULL;
 }
 
-int render_frame_read(
+int quern_render_frame_read(
 	render_frame *f, const char *folder, int64_t number, const char *field, quern_text *why) {
 	int64_t first = 0, last = 0;
 	*f = (render_frame) { .number = number };
@@ -288,7 +288,7 @@ static void finish_cloud(render_cloud *cloud) {
 	free(cloud->sort);
 }
 
-void render_frame_finish(render_frame *f) {
+void quern_render_frame_finish(render_frame *f) {
 	finish_cloud(&f->grains);
 	finish_cloud(&f->points);
 	finish_cloud(&f->cells);

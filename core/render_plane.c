@@ -4,19 +4,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-void render_set(cairo_t *c, render_colour colour, double alpha) {
+void quern_render_set(cairo_t *c, render_colour colour, double alpha) {
 	cairo_set_source_rgba(c, colour.r, colour.g, colour.b, alpha);
 }
 
-render_colour render_colour_of(const render_style *s, const render_cloud *cloud, size_t i) {
+render_colour quern_render_colour_of(const render_style *s, const render_cloud *cloud, size_t i) {
 	const bool grains = cloud == &s->frame->grains;
-	if (grains && cloud->sort[i] == RENDER_FIXED) return render_grey;
-	if (cloud->value && isfinite(cloud->value[i])) return render_map(render_share(s->range, cloud->value[i]));
+	if (grains && cloud->sort[i] == RENDER_FIXED) return quern_render_grey;
+	if (cloud->value && isfinite(cloud->value[i]))
+		return quern_render_map(quern_render_share(s->range, cloud->value[i]));
 	if (*s->frame->field) return (render_colour) { 0.86, 0.86, 0.88 }; /* something else has the colours */
-	return grains ? render_sand : render_sky;
+	return grains ? quern_render_sand : quern_render_sky;
 }
 
-bool render_has(const render_cloud *cloud, int sort) {
+bool quern_render_has(const render_cloud *cloud, int sort) {
 	for (size_t i = 0; i < cloud->n; i++)
 		if ((cloud->sort ? cloud->sort[i] : 0) == sort) return true;
 	return false;
@@ -25,13 +26,14 @@ bool render_has(const render_cloud *cloud, int sort) {
 /* ---- grains and points ---- */
 
 /* A grain that shares its mass with the continuum has a white face. */
-void render_disc(cairo_t *c, double x, double y, double radius, render_colour colour, int sort, double line) {
+void quern_render_disc(
+	cairo_t *c, double x, double y, double radius, render_colour colour, int sort, double line) {
 	cairo_new_path(c);
 	cairo_arc(c, x, y, radius, 0, 2 * M_PI);
-	render_set(c, colour, 1);
+	quern_render_set(c, colour, 1);
 	cairo_fill_preserve(c);
 	if (radius > 2.5 * line) {
-		render_set(c, render_mix(colour, render_ink, 0.6), 0.8);
+		quern_render_set(c, quern_render_mix(colour, quern_render_ink, 0.6), 0.8);
 		cairo_set_line_width(c, fmin(line, 0.16 * radius));
 		cairo_stroke(c);
 	}
@@ -46,9 +48,10 @@ static void draw_grains(cairo_t *c, const render_style *s) {
 	const render_cloud *cloud = &s->frame->grains;
 	for (size_t i = 0; i < cloud->n; i++) {
 		double at[3];
-		render_project(s->view, cloud->position[i], at);
+		quern_render_project(s->view, cloud->position[i], at);
 		const double radius = fmax(cloud->size[i] * s->view->scale, 0.7);
-		render_disc(c, at[0], at[1], radius, render_colour_of(s, cloud, i), cloud->sort[i], s->line);
+		quern_render_disc(
+			c, at[0], at[1], radius, quern_render_colour_of(s, cloud, i), cloud->sort[i], s->line);
 	}
 }
 
@@ -56,9 +59,9 @@ static void draw_squares(cairo_t *c, const render_style *s, const render_cloud *
 	for (size_t i = 0; i < cloud->n; i++) {
 		double at[3];
 		if (cloud == &s->frame->cells && cloud->value[i] == 0) continue;
-		render_project(s->view, cloud->position[i], at);
+		quern_render_project(s->view, cloud->position[i], at);
 		const double edge = fmax(share * cloud->size[i] * s->view->scale, 1.2);
-		render_set(c, render_colour_of(s, cloud, i), 1);
+		quern_render_set(c, quern_render_colour_of(s, cloud, i), 1);
 		cairo_rectangle(c, at[0] - 0.5 * edge, at[1] - 0.5 * edge, edge, edge);
 		cairo_fill(c);
 	}
@@ -67,12 +70,12 @@ static void draw_squares(cairo_t *c, const render_style *s, const render_cloud *
 /* Where cells have the colours, grains and points are only hinted at. */
 static void draw_outlines(cairo_t *c, const render_style *s) {
 	const render_cloud *clouds[2] = { &s->frame->grains, &s->frame->points };
-	render_set(c, render_ink, 0.35);
+	quern_render_set(c, quern_render_ink, 0.35);
 	cairo_set_line_width(c, 0.7 * s->line);
 	for (int k = 0; k < 2; k++)
 		for (size_t i = 0; i < clouds[k]->n; i++) {
 			double at[3];
-			render_project(s->view, clouds[k]->position[i], at);
+			quern_render_project(s->view, clouds[k]->position[i], at);
 			const double radius = k == 0 ? clouds[k]->size[i] * s->view->scale : 0.7 * s->line;
 			cairo_new_sub_path(c);
 			cairo_arc(c, at[0], at[1], radius, 0, 2 * M_PI);
@@ -110,7 +113,7 @@ static uint8_t *zone_raster(const render_style *s, long size[2], double corner[2
 static void zone_corner(const render_style *s, const double corner[2], long x, long y, double out[3]) {
 	const double at[3] = { corner[0] + (double)x * s->frame->cell, corner[1] + (double)y * s->frame->cell,
 		0 };
-	render_project(s->view, at, out);
+	quern_render_project(s->view, at, out);
 }
 
 static void draw_tints(cairo_t *c, const render_style *s) {
@@ -124,7 +127,7 @@ static void draw_tints(cairo_t *c, const render_style *s) {
 			if (!is) continue;
 			zone_corner(s, corner, x, y, low);
 			zone_corner(s, corner, x + 1, y + 1, high);
-			render_set(c, is == 1 ? render_rose : render_sky, is == 1 ? 0.16 : 0.22);
+			quern_render_set(c, is == 1 ? quern_render_rose : quern_render_sky, is == 1 ? 0.16 : 0.22);
 			cairo_rectangle(c, low[0], high[1], high[0] - low[0], low[1] - high[1]);
 			cairo_fill(c);
 		}
@@ -152,7 +155,7 @@ static void draw_borders(cairo_t *c, const render_style *s) {
 	cairo_set_source_rgba(c, 1, 1, 1, 0.6);
 	cairo_stroke_preserve(c);
 	cairo_set_line_width(c, 1.6 * s->line);
-	render_set(c, render_rose, 0.95);
+	quern_render_set(c, quern_render_rose, 0.95);
 	cairo_stroke(c);
 	cairo_set_line_cap(c, CAIRO_LINE_CAP_BUTT);
 	free(zone);
@@ -212,7 +215,7 @@ static float *distances(const render_style *s, int width, int height) {
 	return nearest;
 }
 
-void render_hatch(cairo_t *c, double line) {
+void quern_render_hatch(cairo_t *c, double line) {
 	double x0, y0, x1, y1;
 	cairo_clip_extents(c, &x0, &y0, &x1, &y1);
 	cairo_set_source_rgb(c, 0.93, 0.93, 0.93);
@@ -221,7 +224,7 @@ void render_hatch(cairo_t *c, double line) {
 		cairo_move_to(c, x, y1);
 		cairo_line_to(c, x + (y1 - y0), y0);
 	}
-	render_set(c, render_ink, 0.35);
+	quern_render_set(c, quern_render_ink, 0.35);
 	cairo_set_line_width(c, 0.8 * line);
 	cairo_stroke(c);
 }
@@ -247,10 +250,10 @@ static void draw_bodies(cairo_t *c, const render_style *s) {
 	cairo_surface_t *solid = mask_of(gap, width, height, -1e9, 0);
 	cairo_surface_t *rim = mask_of(gap, width, height, -1.5 * s->line, 0);
 	cairo_push_group(c);
-	render_hatch(c, s->line);
+	quern_render_hatch(c, s->line);
 	cairo_pop_group_to_source(c);
 	cairo_mask_surface(c, solid, 0, 0);
-	render_set(c, render_ink, 0.9);
+	quern_render_set(c, quern_render_ink, 0.9);
 	cairo_mask_surface(c, rim, 0, 0);
 	cairo_surface_destroy(solid);
 	cairo_surface_destroy(rim);
@@ -262,15 +265,15 @@ static void draw_bodies(cairo_t *c, const render_style *s) {
 static void draw_domain(cairo_t *c, const render_style *s) {
 	double low[3], high[3];
 	if (!s->frame->scene) return;
-	render_project(s->view, s->frame->scene->general.lower, low);
-	render_project(s->view, s->frame->scene->general.upper, high);
+	quern_render_project(s->view, s->frame->scene->general.lower, low);
+	quern_render_project(s->view, s->frame->scene->general.upper, high);
 	cairo_rectangle(c, low[0], high[1], high[0] - low[0], low[1] - high[1]);
-	render_set(c, render_ink, 0.5);
+	quern_render_set(c, quern_render_ink, 0.5);
 	cairo_set_line_width(c, s->line);
 	cairo_stroke(c);
 }
 
-void render_plane(cairo_t *c, const render_style *s) {
+void quern_render_plane(cairo_t *c, const render_style *s) {
 	cairo_save(c);
 	cairo_rectangle(c, 0, 0, s->view->width, s->view->height);
 	cairo_clip(c);

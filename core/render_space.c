@@ -22,7 +22,7 @@ static render_colour lit(const raster *r, render_colour colour, const double nor
 				 haze = 0.20 * (depth - r->near) / fmax(r->far - r->near, 1e-300);
 	const render_colour shaded = { fmin(colour.r * light, 1), fmin(colour.g * light, 1),
 		fmin(colour.b * light, 1) };
-	return render_mix(shaded, (render_colour) { 1, 1, 1 }, fmin(fmax(haze, 0), 0.20));
+	return quern_render_mix(shaded, (render_colour) { 1, 1, 1 }, fmin(fmax(haze, 0), 0.20));
 }
 
 static void put(raster *r, int x, int y, double depth, render_colour colour) {
@@ -54,7 +54,7 @@ static void put_sphere(raster *r, const double at[3], double radius, render_colo
 			const double normal[3] = { u, v, -sqrt(rest) };
 			const bool face = sort == RENDER_SHARED && rest > 0.75;
 			const render_colour own = face ? (render_colour) { 0.97, 0.97, 0.97 } : colour;
-			const render_colour rim = render_mix(own, render_ink, rest < 0.12 ? 0.30 : 0);
+			const render_colour rim = quern_render_mix(own, quern_render_ink, rest < 0.12 ? 0.30 : 0);
 			const double depth = at[2] + radius * normal[2];
 			put(r, x, y, depth, lit(r, rim, normal, depth));
 		}
@@ -87,11 +87,11 @@ static void put_cloud(raster *r, const render_style *s, const render_cloud *clou
 	for (size_t i = 0; i < cloud->n; i++) {
 		double at[3];
 		if (cloud == &s->frame->cells && cloud->value[i] == 0) continue;
-		if (!render_shown(s->view, s->frame, cloud, i)) continue;
-		render_project(s->view, cloud->position[i], at);
+		if (!quern_render_shown(s->view, s->frame, cloud, i)) continue;
+		quern_render_project(s->view, cloud->position[i], at);
 		at[0] *= FINE;
 		at[1] *= FINE;
-		const render_colour colour = render_colour_of(s, cloud, i);
+		const render_colour colour = quern_render_colour_of(s, cloud, i);
 		if (cloud == &s->frame->grains) put_sphere(r, at, cloud->size[i], colour, cloud->sort[i]);
 		else put_cube(r, at, (cloud == &s->frame->points ? 0.42 : 0.5) * cloud->size[i], colour);
 	}
@@ -144,8 +144,8 @@ static cairo_surface_t *smooth(const raster *r, double reach) {
 
 static void line_between(cairo_t *c, const render_style *s, const double from[3], const double to[3]) {
 	double a[3], b[3];
-	render_project(s->view, from, a);
-	render_project(s->view, to, b);
+	quern_render_project(s->view, from, a);
+	quern_render_project(s->view, to, b);
 	cairo_move_to(c, a[0], a[1]);
 	cairo_line_to(c, b[0], b[1]);
 }
@@ -154,19 +154,19 @@ static void line_between(cairo_t *c, const render_style *s, const double from[3]
 static void draw_ground(cairo_t *c, const render_style *s) {
 	const render_view *v = s->view;
 	const double level = v->low[2], longest = fmax(v->high[0] - v->low[0], v->high[1] - v->low[1]);
-	const double step = render_round_step(longest / 6);
+	const double step = quern_render_round_step(longest / 6);
 	const double corner[4][2] = { { v->low[0], v->low[1] }, { v->high[0], v->low[1] },
 		{ v->high[0], v->high[1] }, { v->low[0], v->high[1] } };
 	for (int k = 0; k < 4; k++) {
 		double at[3];
-		render_project(v, (const double[3]) { corner[k][0], corner[k][1], level }, at);
+		quern_render_project(v, (const double[3]) { corner[k][0], corner[k][1], level }, at);
 		cairo_line_to(c, at[0], at[1]);
 	}
 	cairo_close_path(c);
 	cairo_set_source_rgb(c, 0.955, 0.955, 0.96);
 	cairo_fill_preserve(c);
 	cairo_set_line_width(c, s->line);
-	render_set(c, render_ink, 0.30);
+	quern_render_set(c, quern_render_ink, 0.30);
 	cairo_stroke(c);
 	for (int k = 0; k < 2; k++)
 		for (double x = ceil(v->low[k] / step) * step; x < v->high[k]; x += step) {
@@ -175,7 +175,7 @@ static void draw_ground(cairo_t *c, const render_style *s) {
 			line_between(c, s, from, to);
 		}
 	cairo_set_line_width(c, 0.8 * s->line);
-	render_set(c, render_ink, 0.14);
+	quern_render_set(c, quern_render_ink, 0.14);
 	cairo_stroke(c);
 }
 
@@ -185,7 +185,7 @@ static void set_depths(raster *r, const render_style *s) {
 	for (int corner = 0; corner < 8; corner++) {
 		double x[3], at[3];
 		for (int k = 0; k < 3; k++) x[k] = corner >> k & 1 ? s->view->high[k] : s->view->low[k];
-		render_project(s->view, x, at);
+		quern_render_project(s->view, x, at);
 		r->near = fmin(r->near, at[2]);
 		r->far = fmax(r->far, at[2]);
 	}
@@ -197,7 +197,7 @@ static double typical_size(const render_cloud *cloud) {
 	return cloud->n ? sum / (double)cloud->n : 0;
 }
 
-void render_space(cairo_t *c, const render_style *s) {
+void quern_render_space(cairo_t *c, const render_style *s) {
 	raster r = { .width = FINE * (int)ceil(s->view->width),
 		.height = FINE * (int)ceil(s->view->height),
 		.scale = FINE * s->view->scale,

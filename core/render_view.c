@@ -14,7 +14,7 @@ static void add(render_view *v, const double x[3], double half) {
 	}
 }
 
-bool render_shown(const render_view *v, const render_frame *f, const render_cloud *cloud, size_t i) {
+bool quern_render_shown(const render_view *v, const render_frame *f, const render_cloud *cloud, size_t i) {
 	for (int k = 0; k < f->dimension - 1 && is_fixed(cloud, f, i); k++)
 		if (cloud->position[i][k] < v->low[k] || cloud->position[i][k] > v->high[k]) return false;
 	return true;
@@ -22,8 +22,8 @@ bool render_shown(const render_view *v, const render_frame *f, const render_clou
 
 /* Grains that make up a rough floor do not widen the picture, unless there are no others. */
 static void add_clouds(render_view *v, const render_frame *f) {
-	const bool all =
-		!f->points.n && !render_has(&f->grains, RENDER_WHOLE) && !render_has(&f->grains, RENDER_SHARED);
+	const bool all = !f->points.n && !quern_render_has(&f->grains, RENDER_WHOLE) &&
+					 !quern_render_has(&f->grains, RENDER_SHARED);
 	for (int k = 0; k < 3; k++) v->low[k] = INFINITY, v->high[k] = -INFINITY;
 	for (size_t i = 0; i < f->grains.n; i++)
 		if (all || !is_fixed(&f->grains, f, i)) add(v, f->grains.position[i], f->grains.size[i]);
@@ -38,7 +38,7 @@ static void crop(render_view *v, const render_frame *f) {
 	for (int k = 0; k < f->dimension; k++) most = fmax(most, v->high[k] - v->low[k]);
 	if (f->scene) floor = f->scene->general.lower[up];
 	for (size_t i = 0; i < f->grains.n; i++)
-		if (is_fixed(&f->grains, f, i) && render_shown(v, f, &f->grains, i))
+		if (is_fixed(&f->grains, f, i) && quern_render_shown(v, f, &f->grains, i))
 			floor = fmin(floor, f->grains.position[i][up] - f->grains.size[i]);
 	if (floor < v->low[up] && floor > v->low[up] - 0.5 * most) v->low[up] = floor;
 	if (f->dimension == 2) v->low[2] = v->high[2] = 0;
@@ -51,7 +51,7 @@ static void crop(render_view *v, const render_frame *f) {
 	}
 }
 
-render_view render_view_of(const render_frame *f) {
+render_view quern_render_view_of(const render_frame *f) {
 	render_view v = { .right = { 1, 0, 0 }, .up = { 0, 1, 0 }, .away = { 0, 0, -1 } };
 	if (f->dimension == 3) {
 		const double turn = -0.45, lift = 0.40;
@@ -73,7 +73,7 @@ static void widen(const render_view *v, const double x[3], double half, double l
 	}
 }
 
-void render_view_fit(render_view *v, const render_frame *f, double most_width, double most_height) {
+void quern_render_view_fit(render_view *v, const render_frame *f, double most_width, double most_height) {
 	double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
 	const int corners = f->dimension == 3 ? 4 : 8; /* in 3-D of the ground alone: the upper ones are empty */
 	for (int corner = 0; corner < corners; corner++) {
@@ -91,7 +91,7 @@ void render_view_fit(render_view *v, const render_frame *f, double most_width, d
 	v->height = v->scale * (high[1] - low[1]);
 }
 
-void render_project(const render_view *v, const double x[3], double out[3]) {
+void quern_render_project(const render_view *v, const double x[3], double out[3]) {
 	out[0] = (dot(v->right, x) - v->left) * v->scale;
 	out[1] = (v->top - dot(v->up, x)) * v->scale;
 	out[2] = dot(v->away, x);

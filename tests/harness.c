@@ -93,3 +93,15 @@ quern_column harness_field(quern_run *run, const char *name) {
 	const quern_field *field = &run->plan->store.fields[i];
 	return quern_field_column(&run->plan->store, field, field->now);
 }
+
+double *harness_param(quern_run *run, const char *id, const char *name) {
+	for (size_t i = 0; i < run->scene->n_instances; i++) {
+		const quern_instance *one = run->scene->instances[i];
+		if (strcmp(one->file->plugin.id, id) != 0) continue;
+		const quern_param *row = quern_param_find(one->file->plugin.params, name);
+		assert_non_null(row);
+		return (double *)(void *)((char *)one->self + row->offset);
+	}
+	fail_msg("there is no %s", id);
+	return NULL;
+}

@@ -24,3 +24,5 @@ void harness_until(quern_run *, double time);
 uint32_t harness_count(quern_run *, const char *set);
 quern_column harness_field(quern_run *, const char *field);
 bool harness_has(quern_run *, const char *field);
+/* A number of a plugin's in the running scene, to be changed on the way: of the first instance of the plugin. */
+double *harness_param(quern_run *, const char *id, const char *name);

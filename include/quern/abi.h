@@ -40,6 +40,13 @@ extern "C" {
 
 typedef double quern_real;
 
+/* A struct's value in an expression: QUERN_VALUE(quern_vec, 1, 0, 0). Compound literals are no C++. */
+#ifdef __cplusplus
+#define QUERN_VALUE(type, ...) (type { __VA_ARGS__ })
+#else
+#define QUERN_VALUE(type, ...) ((type) { __VA_ARGS__ })
+#endif
+
 typedef enum {
 	QUERN_OK,
 	QUERN_E_PARAM,   /* a scene's value cannot be used */

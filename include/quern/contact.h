@@ -30,7 +30,7 @@ QUERN_INLINE quern_onset quern_first_touch(
 	const bool first =
 		(overlap > 0) & (overlap < approach * dt); /* a pair apart has no time that is finite */
 	const quern_real time = first ? overlap / (approach > 0 ? approach : 1) : dt;
-	return (quern_onset) { time, first ? 0.5 + time / ((1 + power) * dt) : 1 };
+	return QUERN_VALUE(quern_onset, time, first ? 0.5 + time / ((1 + power) * dt) : 1);
 }
 
 /* What the Coulomb cone leaves of an elastic force a and a dashpot's b: spring a + damper b, of size cap at most. */
@@ -55,7 +55,7 @@ QUERN_INLINE quern_cone quern_cone_shares(quern_vec a, quern_vec b, quern_real c
 	const bool slides = quern_vec_dot(sum, sum, 3) > cc, beyond = least2 >= cc;
 	const quern_real clip = cap / __builtin_sqrt(least2 > 0 ? least2 : 1);
 	const quern_real kept = share < 1 ? (share > part ? share : part) : 1;
-	return (quern_cone) { slides ? (beyond ? part * clip : kept) : 1, (slides & beyond) ? clip : 1 };
+	return QUERN_VALUE(quern_cone, slides ? (beyond ? part * clip : kept) : 1, (slides & beyond) ? clip : 1);
 }
 
 /* The same along one line, a and b of either sign; returns what is left of a + b, and of a alone in *spring. */

@@ -68,7 +68,8 @@ static inline int32_t quern_grid_entry(const quern_grid_view *g, const int32_t c
 QUERN_INLINE void quern_tile_load(
 	const quern_grid_view *g, const quern_row *rows, uint32_t b, quern_row *tile) {
 	const int32_t *entry = g->tile + (size_t)b * g->tile_size;
-	for (uint32_t i = 0; i < g->tile_size; i++) tile[i] = entry[i] < 0 ? (quern_row) { 0 } : rows[entry[i]];
+	for (uint32_t i = 0; i < g->tile_size; i++)
+		tile[i] = entry[i] < 0 ? QUERN_VALUE(quern_row, 0) : rows[entry[i]];
 }
 
 /* Adds a tile to its nodes; call it colour by colour, so that no two blocks add to one node at once. */

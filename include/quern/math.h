@@ -58,7 +58,7 @@ QUERN_INLINE quern_real quern_head(quern_real x) {
 /* a + b without error, for |a| >= |b| or a = 0 (Dekker 1971) */
 QUERN_INLINE quern_twofold quern_fast_sum(quern_real a, quern_real b) {
 	const quern_real sum = a + b;
-	return (quern_twofold) { sum, (a - sum) + b };
+	return QUERN_VALUE(quern_twofold, sum, (a - sum) + b);
 }
 
 /* c0 + c1 x + c2 x^2 + rest x^3, by Horner's rule */
@@ -133,8 +133,8 @@ QUERN_INLINE quern_twofold quern_log_split(quern_real x) {
 	const uint64_t one = 0x3ff0000000000000u, root_half = 0x3fe6a09e667f3bcdu;
 	const uint64_t above = bits + (one - root_half);
 	const quern_real biased = quern_from_bits(above >> 52 | 0x4330000000000000u);
-	return (quern_twofold) { quern_from_bits(bits - (above & 0xfff0000000000000u) + one),
-		biased - (tiny ? 0x1p52 + 1023.0 + 54.0 : 0x1p52 + 1023.0) };
+	return QUERN_VALUE(quern_twofold, quern_from_bits(bits - (above & 0xfff0000000000000u) + one),
+		biased - (tiny ? 0x1p52 + 1023.0 + 54.0 : 0x1p52 + 1023.0));
 }
 
 /* The values of log outside (0, infinity), and `inside` elsewhere */
@@ -177,7 +177,7 @@ QUERN_INLINE quern_twofold quern_log_twofold(quern_real x) {
 
 /* e^x. Error 0.75 ulp. Overflows to infinity, goes to zero through the subnormals; NaN for NaN. */
 QUERN_INLINE quern_real quern_exp(quern_real x) {
-	const quern_real power = quern_exp_twofold((quern_twofold) { x, 0.0 });
+	const quern_real power = quern_exp_twofold(QUERN_VALUE(quern_twofold, x, 0.0));
 	return x == x ? power : quern_nan();
 }
 
@@ -213,7 +213,7 @@ QUERN_INLINE quern_real quern_pow(quern_real x, quern_real y) {
 	const quern_real plain = y * quern_log_edges(x, log_x.hi);
 	const bool wide = !(quern_abs(plain) < 1000.0);
 	const quern_real power =
-		quern_exp_twofold((quern_twofold) { wide ? plain : product.hi, wide ? 0.0 : product.lo });
+		quern_exp_twofold(QUERN_VALUE(quern_twofold, wide ? plain : product.hi, wide ? 0.0 : product.lo));
 	const quern_real number = power == power ? power : quern_nan();
 	return ((x == 1.0) | (y == 0.0)) ? 1.0 : number;
 }
@@ -353,7 +353,7 @@ QUERN_INLINE quern_twofold quern_asin_twofold(quern_real size) {
 			quern_horner(z, 0x1.ca2133467a7e1p-7, 0x1.75781e413ced1p-7, 0x1.6187701d71c58p-7,
 				quern_horner(z, 0x1.e18e8782c6fa1p-9, 0x1.64f1fb1069d92p-6, -0x1.59df456184deap-6,
 					0x1.0bdcf78f6e799p-5))));
-	return (quern_twofold) { s, s * z * p + (s_low + s_low * (0.5 * z)) };
+	return QUERN_VALUE(quern_twofold, s, s * z * p + (s_low + s_low * (0.5 * z)));
 }
 
 /* Arc sine, in [-pi/2, pi/2]. Error 0.7 ulp. asin(-x) = -asin(x), also for zeros; NaN if |x| > 1 or NaN. */
@@ -385,7 +385,7 @@ QUERN_INLINE quern_real quern_acos(quern_real x) {
 /* hi + lo anew, so that hi has 26 bits; lo is then small against hi, but no longer below its last bit */
 QUERN_INLINE quern_twofold quern_headed(quern_real hi, quern_real lo) {
 	const quern_real head = quern_head(hi + lo);
-	return (quern_twofold) { head, (hi - head) + lo };
+	return QUERN_VALUE(quern_twofold, head, (hi - head) + lo);
 }
 
 /* The product of two headed numbers, headed: the first of its parts is exact. */
@@ -401,7 +401,7 @@ QUERN_INLINE quern_twofold quern_carlson_step(quern_twofold ratio) {
 	const quern_real left = ((ratio.hi - head * head) - (root - head) * (root + head)) + ratio.lo;
 	const quern_real root_low = left / quern_max(root + root, 0x1p-540);
 	const quern_real next = quern_head(0.5 + 0.5 * root);
-	return (quern_twofold) { next, ((0.5 - next) + 0.5 * root) + 0.5 * root_low };
+	return QUERN_VALUE(quern_twofold, next, ((0.5 - next) + 0.5 * root) + 0.5 * root_low);
 }
 
 /* R_C(x, y) = 1/2 integral from 0 to infinity of dt/((t + y) sqrt(t + x)), for x >= 0 and y > 0:
@@ -423,7 +423,8 @@ QUERN_INLINE quern_real quern_carlson_rc(quern_real x, quern_real y) {
 		quern_headed_product(quern_headed_product(ratio3, ratio4), quern_headed_product(ratio5, ratio6));
 	const quern_twofold last = quern_headed_product(first, rest);
 	/* the product is y after the last step; three times a is this times 2 + ratio */
-	const quern_twofold thrice = quern_headed_product(last, (quern_twofold) { 2.0 + ratio6.hi, ratio6.lo });
+	const quern_twofold thrice =
+		quern_headed_product(last, QUERN_VALUE(quern_twofold, 2.0 + ratio6.hi, ratio6.lo));
 	const quern_real ratio = ratio6.hi + ratio6.lo, s = (1.0 - ratio) / (2.0 + ratio);
 	const quern_real series = quern_horner(s, 3.0 / 10.0, 1.0 / 7.0, 3.0 / 8.0,
 		quern_horner(s, 9.0 / 22.0, 159.0 / 208.0, 9.0 / 8.0, 4275.0 / 2176.0));

@@ -5,7 +5,8 @@
 static const quern_real tolerance = 1e-12;
 
 typedef struct {
-	quern_real mass, carried, momentum[3], owed_momentum[3], speed; /* speed: sum of w m |v| */
+	quern_real mass, carried, momentum[3], owed_momentum[3];
+	quern_real speed, kinetic; /* sums of w m |v| and w m v^2/2 */
 } sums;
 
 typedef struct {
@@ -17,7 +18,7 @@ typedef struct {
 static bool add_cloud(const quern_step *s, const cloud *c, sums *out) {
 	const uint32_t dim = s->dim;
 	const size_t n = c->n;
-	quern_real *work = s->host->memory(s->run, (n + 1) * 5 * sizeof(quern_real));
+	quern_real *work = s->host->memory(s->run, (n + 1) * 6 * sizeof(quern_real));
 	if (!work) return false;
 	for (size_t i = 0; i < n; i++) {
 		const quern_real m = (c->fixed && c->fixed[i] ? 0 : 1) * c->weight->real[0][i] * c->mass->real[0][i];
@@ -29,10 +30,12 @@ static bool add_cloud(const quern_step *s, const cloud *c, sums *out) {
 		}
 		work[i] = m;
 		work[4 * n + i] = m * sqrt(v2);
+		work[5 * n + i] = 0.5 * m * v2;
 	}
 	out->carried += s->host->sum(s->run, n, work);
 	for (uint32_t k = 0; k < dim; k++) out->momentum[k] += s->host->sum(s->run, n, work + (1 + k) * n);
 	out->speed += s->host->sum(s->run, n, work + 4 * n);
+	out->kinetic += s->host->sum(s->run, n, work + 5 * n);
 	return true;
 }
 
@@ -109,19 +112,28 @@ static quern_status judge(const quern_step *s, const sums *now) {
 	return judge_momentum(s, now);
 }
 
+static void begin(const quern_step *s, const sums *now) {
+	const quern_column *u = s->use;
+	u[A_AUDITS].index[0] = 1;
+	u[A_MASS].real[0][0] = now->mass;
+	u[A_ENERGY].real[0][0] = now->kinetic + quern_hybrid_held(s);
+	u[A_WORK].real[0][0] = 0;
+	for (uint32_t k = 0; k < s->dim; k++) {
+		u[A_MOMENTUM].real[k][0] = now->momentum[k] + now->owed_momentum[k] - impulse(s, k);
+		u[A_LEFT].real[k][0] = 0;
+	}
+}
+
 quern_status quern_hybrid_audit(const void *self, const quern_step *s) {
 	const quern_column *u = s->use;
 	sums now = { .mass = 0 };
-	(void)self;
 	if (!take_sums(s, &now)) return QUERN_E_MEMORY;
-	if (!u[A_AUDITS].index[0]) {
-		u[A_AUDITS].index[0] = 1;
-		u[A_MASS].real[0][0] = now.mass;
+	if (!u[A_AUDITS].index[0]) begin(s, &now);
+	else
 		for (uint32_t k = 0; k < s->dim; k++) {
-			u[A_MOMENTUM].real[k][0] = now.momentum[k] + now.owed_momentum[k] - impulse(s, k);
-			u[A_LEFT].real[k][0] = 0;
+			u[A_GRAVITY].real[k][0] += now.carried * s->gravity[k] * s->dt;
+			u[A_WORK].real[0][0] += now.momentum[k] * s->gravity[k] * s->dt;
 		}
-	} else
-		for (uint32_t k = 0; k < s->dim; k++) u[A_GRAVITY].real[k][0] += now.carried * s->gravity[k] * s->dt;
-	return judge(s, &now);
+	const quern_status status = judge(s, &now);
+	return status == QUERN_OK ? quern_hybrid_judge_gain(self, s, now.kinetic, now.carried) : status;
 }

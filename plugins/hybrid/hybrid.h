@@ -7,7 +7,7 @@
 
 typedef struct hybrid {
 	int32_t substeps, update, samples; /* from the scene */
-	quern_real hysteresis, guard;
+	quern_real hysteresis, guard, gain;
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
@@ -97,7 +97,17 @@ enum {
 	A_LEFT,
 	A_AUDITS,
 	A_MASS_DEFECT,
-	A_MOMENTUM_DEFECT
+	A_MOMENTUM_DEFECT,
+	A_ENERGY,
+	A_WORK,
+	A_FORCE,
+	A_FIRST,
+	A_SECOND,
+	A_GRAIN_POSITION,
+	A_GRAIN_RADIUS,
+	A_GRAIN_SPIN,
+	A_POINT_VOLUME,
+	A_POINT_STRESS
 };
 
 /* Lanes of a mixture row: mass, momentum, change of velocity. */
@@ -109,6 +119,12 @@ quern_status quern_hybrid_raster(const void *self, const quern_step *);
 quern_status quern_hybrid_couple(const void *self, const quern_step *);
 quern_status quern_hybrid_back(const void *self, const quern_step *);
 quern_status quern_hybrid_audit(const void *self, const quern_step *);
+/* Rows of the audit: J that grains and points have in their springs and in turning, an upper bound. */
+quern_real quern_hybrid_held(const quern_step *);
+/* Rows of the audit: ends the run if grains and points, which carry so much mass, move with more energy than there was,
+ * gravity has given and `gain` allows. */
+quern_status quern_hybrid_judge_gain(
+	const hybrid *, const quern_step *, quern_real kinetic, quern_real carried);
 
 /* Weight of a grain or a point in a cell of that zone. */
 QUERN_INLINE quern_real grain_share(int32_t zone) {

@@ -14,8 +14,11 @@ import math
 import pathlib
 import statistics
 import subprocess
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import provenance  # noqa: E402
 MODELS = {"hybrid": [], "grains": ["model=grains"], "continuum": ["model=continuum"],
           "continuum, affine": ["model=continuum", "continuum.rasterise=affine"]}
 SCENES = {"column": 3, "column_3d": 2}  # seeds of each
@@ -77,7 +80,7 @@ def main():
     args = parser.parse_args()
     out = pathlib.Path(args.out).resolve()
     out.mkdir(parents=True, exist_ok=True)
-    lines = ["<!-- written by studies/column/study.py -->", ""]
+    lines = ["<!-- written by studies/column/study.py -->", "", f"Measured on {provenance.line(provenance.of())}.", ""]
     for scene in [args.only] if args.only else SCENES:
         runs = {model: [] for model in MODELS}
         for model in MODELS:

@@ -12,11 +12,14 @@ import math
 import pathlib
 import statistics
 import subprocess
+import sys
 
 import h5py
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import provenance  # noqa: E402
 WAYS = {"default": ("column_grains", []),
         "slow": ("settling_slow", ["grains.settle.step=0.02", "grains.settling={damped: {local: 0}}"])}
 BOX = (0.01, 0.15, 0.01, 0.2)  # m, away from the walls and the surface
@@ -81,6 +84,7 @@ def main():
             found[way].append((s, figures(out / f"{name}_{seed}", s)))
             print(row(way, seed, *found[way][-1]), flush=True)
     lines = ["<!-- written by studies/settling/study.py -->", "", "# Settling, quick and slow", "",
+             f"Measured on {provenance.line(provenance.of())}.", "",
              f"The grains of `configs/column.yaml`, {args.threads} threads. *Slow* is the step of a run and drag alone, without local",
              "damping. The packing fraction is that of a box away from walls and surface, at the release.", ""]
     (ROOT / "docs/validation/settling.md").write_text("\n".join(lines + report(found)) + "\n")

@@ -6,6 +6,9 @@ import sys
 
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent.parent / "tools"))
+import provenance  # noqa: E402
+
 DOCS = pathlib.Path(__file__).resolve().parent.parent.parent / "docs"
 BEGIN, END = "<!-- written by chart.py -->", "<!-- end -->"
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 900, 560, 80, 190, 40, 60
@@ -79,7 +82,8 @@ def draw(rows, scatter):
 def table(results, rows, scatter, cost):
     grains, repeats = results["grains"], results["repeats"]
     best = {n for _, _, n in front_of(rows)}
-    lines = ["| setting | cost | profile | run-out | height | share of grains | entries | carried mass | |", "|---|---|---|---|---|---|---|---|---|"]
+    lines = [f"Measured on {provenance.line(results['provenance'])}.", ""] if "provenance" in results else []
+    lines += ["| setting | cost | profile | run-out | height | share of grains | entries | carried mass | |", "|---|---|---|---|---|---|---|---|---|"]
     for n, r in sorted(rows.items(), key=lambda i: i[1][1]):
         s = results["settings"][n]
         lines.append(f"| {n} | {r[0]:.2f} | {100 * r[1]:.1f} % | {100 * r[2]:+.1f} % | {100 * r[3]:+.1f} % | {s['share']:.2f} | {s['entries']:.4f} | {s['carried']:+.4f} | {'front' if n in best else ''} |")

@@ -21,6 +21,9 @@ import yaml
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import provenance  # noqa: E402
+
 BIN = 0.02  # m, of the profile
 
 
@@ -103,7 +106,7 @@ def main():
     work.mkdir(parents=True, exist_ok=True)
     study = yaml.safe_load((HERE / "study.yaml").read_text())
     column = study["column"]
-    results = {"grains": [], "settings": {}, "repeats": []}
+    results = {"grains": [], "settings": {}, "repeats": [], "provenance": provenance.of()}
     for seed in range(1, args.seeds + 1):
         table = settle(work, seed, column)
         out = work / f"grains_{seed}"

@@ -8,10 +8,12 @@
 #include <cmocka.h>
 
 #include "material_kit.h"
+#include <level.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static void turn_columns(uint32_t dim, matrix r, quern_real *const *columns, uint32_t i) {
 	put(dim, columns, i, times(times(r, get(dim, columns, i)), transposed(r)));
@@ -237,32 +239,74 @@ static void pressure_rate(void **unused) {
 	}
 }
 
-/* One number for everything the materials compute on a fixed random set: the same for any compiler and processor. */
+static uint64_t hash_of_cloud(const cloud *c, uint64_t hash) {
+	for (uint32_t q = 0; q < c->n_columns; q++)
+		for (uint32_t i = 0; i < c->n; i++) {
+			uint64_t word;
+			const quern_real x = c->memory[q * c->cap + i];
+			assert_true(isfinite(x));
+			memcpy(&word, &x, sizeof word);
+			hash = (hash ^ word) * 1099511628211u;
+		}
+	return hash;
+}
+
+/* One number for everything that a material computes on a fixed random set. */
+static uint64_t hash_of(int which) {
+	uint64_t hash = 14695981039346656037u;
+	for (uint32_t dim = 2; dim <= 3; dim++)
+		for (int rate = 0; rate <= (which == MU_I); rate++) {
+			const alone_value values[] = { { "bulk_modulus", 1e8 }, { "diameter", 5e-3 },
+				{ "grain_density", 2450 }, { "critical_density", 1500 }, { "density", 1500 },
+				{ "pressure_rate", 10 * rate }, { NULL, 0 } };
+			law m = make_law(ids[which], dim, values);
+			cloud c = make_cloud(&m, POINTS);
+			state = 88172645463325252u + dim;
+			randomise(which, &m, &c, 0.1);
+			for (int step = 0; step < 3; step++) update(&m, &c, 1e-4);
+			hash = hash_of_cloud(&c, hash);
+			free_cloud(&c), free_law(&m);
+		}
+	return hash;
+}
+
+/* Objects of all instruction sets that this processor has and the folder holds give the same number as the first one; how
+ * many there are. */
+static int same_hash(int which, const char *folder, uint64_t *hash) {
+	int n = 0;
+	for (int level = 1; level <= quern_level_here(); level++) {
+		char name[16], path[4096];
+		snprintf(name, sizeof name, "v%d", level);
+		snprintf(path, sizeof path, level > 1 ? "%s/%s.%s.so" : "%s/%s.so", folder, ids[which], name);
+		if (access(path, R_OK)) continue;
+		setenv("QUERN_PLUGINS_DIR", folder, 1), setenv("QUERN_PLUGINS_LEVEL", name, 1);
+		const uint64_t found = hash_of(which);
+		printf("  %-24s %016llx %s\n", ids[which], (unsigned long long)found, path);
+		if (!*hash) *hash = found;
+		if (found != *hash) fail_msg("%s: other bits", path);
+		n++;
+	}
+	return n;
+}
+
+/* The plugins beside the program of another compiler, if QUERN_OTHER names one. */
+static const char *other_folder(char folder[4096]) {
+	const char *other = getenv("QUERN_OTHER"), *slash = other ? strrchr(other, '/') : NULL;
+	if (!slash) return NULL;
+	snprintf(folder, 4096, "%.*s/plugins", (int)(slash - other), other);
+	return folder;
+}
+
+/* The same bits for every instruction set of this processor, and for another compiler's objects. */
 static void bits(void **unused) {
 	(void)unused;
+	char folder[4096], other[4096];
+	snprintf(folder, sizeof folder, "%s", getenv("QUERN_PLUGINS_DIR"));
+	if (!other_folder(other)) printf("  QUERN_OTHER names no program of another compiler: not compared\n");
 	for (int which = 0; which < MATERIALS; which++) {
-		uint64_t hash = 14695981039346656037u;
-		for (uint32_t dim = 2; dim <= 3; dim++)
-			for (int rate = 0; rate <= (which == MU_I); rate++) {
-				const alone_value values[] = { { "bulk_modulus", 1e8 }, { "diameter", 5e-3 },
-					{ "grain_density", 2450 }, { "critical_density", 1500 }, { "density", 1500 },
-					{ "pressure_rate", 10 * rate }, { NULL, 0 } };
-				law m = make_law(ids[which], dim, values);
-				cloud c = make_cloud(&m, POINTS);
-				state = 88172645463325252u + dim;
-				randomise(which, &m, &c, 0.1);
-				for (int step = 0; step < 3; step++) update(&m, &c, 1e-4);
-				for (uint32_t q = 0; q < c.n_columns; q++)
-					for (uint32_t i = 0; i < c.n; i++) {
-						uint64_t word;
-						const quern_real x = c.memory[q * c.cap + i];
-						assert_true(isfinite(x));
-						memcpy(&word, &x, sizeof word);
-						hash = (hash ^ word) * 1099511628211u;
-					}
-				free_cloud(&c), free_law(&m);
-			}
-		printf("  %-24s %016llx\n", ids[which], (unsigned long long)hash);
+		uint64_t hash = 0;
+		assert_true(same_hash(which, folder, &hash) > 0);
+		if (other_folder(other)) assert_true(same_hash(which, other, &hash) > 0);
 	}
 }
 

@@ -8,6 +8,7 @@
 
 #include "plugin_alone.h"
 #include <dlfcn.h>
+#include <level.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,10 +27,27 @@ static quern_status complain(quern_err *err, quern_status status, const char *pa
 
 static const quern_host host = { .abi = QUERN_ABI, .fail = complain };
 
+enum { SKIPPED = 77 };
+
+/* Without a word the level that every processor has. */
+static int wanted_level(void) {
+	const char *level = getenv("QUERN_PLUGINS_LEVEL");
+	if (!level || !*level || !strcmp(level, "v1")) return 1;
+	if (!strcmp(level, "v3") || !strcmp(level, "v4")) return level[1] - '0';
+	fail_msg("QUERN_PLUGINS_LEVEL is v1, v3 or v4, not %s", level);
+	return 0;
+}
+
 const quern_plugin *alone_load(const char *id) {
-	const char *folder = getenv("QUERN_PLUGINS_DIR"), *level = getenv("QUERN_PLUGINS_LEVEL");
-	char path[4096];
-	snprintf(path, sizeof path, "%s/%s%s.so", folder ? folder : "plugins", id, level ? level : "");
+	const char *folder = getenv("QUERN_PLUGINS_DIR");
+	const int level = wanted_level();
+	char path[4096], suffix[16] = "";
+	if (level > quern_level_here()) {
+		printf("this processor has not all of x86-64-v%d\n", level);
+		exit(SKIPPED);
+	}
+	if (level > 1) snprintf(suffix, sizeof suffix, ".v%d", level);
+	snprintf(path, sizeof path, "%s/%s%s.so", folder ? folder : "plugins", id, suffix);
 	void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
 	if (!object) fail_msg("%s", dlerror());
 	const quern_library *library = dlsym(object, "quern_library_1");

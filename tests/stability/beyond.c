@@ -8,6 +8,7 @@
 
 #include "beyond.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static FILE *page;
@@ -25,7 +26,9 @@ bool beyond_begin(int argc, char **argv, const char *name) {
 	snprintf(path, sizeof path, "%s/stability-%s.md", folder, name);
 	page = fopen(path, "w");
 	if (!page) return perror(path), false;
+	const char *where = getenv("QUERN_PROVENANCE");
 	fprintf(page, "<!-- written by tests/stability/%s.c: tools/stability -->\n", name);
+	if (where && *where) fprintf(page, "\nMeasured on %s.\n", where);
 	return true;
 }
 

@@ -114,7 +114,8 @@ static void one_contact(void **unused) {
 typedef struct bed {
 	const char *name, *contact, *integrator;
 	uint32_t dim;
-	double sound, failing; /* up to this factor nothing may be gained; from this one on the run must end */
+	double sound,
+		failing; /* as in the page: up to this factor nothing is gained; from this one on the run ends */
 } bed;
 
 static quern_run *open_bed(const bed *b) {
@@ -153,28 +154,34 @@ static void bed_row(const bed *b, double factor) {
 	if (factor <= 0.1 && gained > 1e-6 * unit) fail_msg("%s: energy at the recommended step", b->name);
 	if (factor <= b->sound && (run->status != QUERN_OK || gained > 1e-5 * unit))
 		fail_msg("%s: energy below the hard limit", b->name);
-	if (factor >= b->failing) beyond_expect_culprit(run, "dem.forces", "grain");
+	if (factor >= b->failing) beyond_expect_culprit(run, "dem.", "grain");
 	harness_close(run);
 }
 
 #define LINEAR(e) "linear: {stiffness: 1e5, restitution: " #e ", friction: 0.5}"
-static const bed beds[] = { { "linear, e = 0.5", LINEAR(0.5), "symplectic_euler", 2, 1, 3 },
-	{ "linear, e = 0.1", LINEAR(0.1), "symplectic_euler", 2, 1, 2 },
-	{ "hertz, e = 0.5", "hertz: {young: 1e8, friction: 0.5}", "symplectic_euler", 2, 1, 4 } };
-static const bed more_beds[] = { { "linear, e = 0.9", LINEAR(0.9), "symplectic_euler", 2, 1, 4 },
-	{ "linear, e = 0.5, Verlet", LINEAR(0.5), "velocity_verlet", 2, 0.75, 4 },
+static const bed beds[] = { { "linear, e = 0.5", LINEAR(0.5), "symplectic_euler", 2, 1.25, 2 },
+	{ "linear, e = 0.1", LINEAR(0.1), "symplectic_euler", 2, 1.25, 2 },
+	{ "hertz, e = 0.5", "hertz: {young: 1e9, friction: 0.5}", "symplectic_euler", 2, 1.25, 8 } };
+static const bed more_beds[] = { { "linear, e = 0.9", LINEAR(0.9), "symplectic_euler", 2, 1.25, 4 },
+	{ "linear, e = 0.5, Verlet", LINEAR(0.5), "velocity_verlet", 2, 1, 3 },
 	{ "linear, e = 0.5, 3-D", LINEAR(0.5), "symplectic_euler", 3, 1, 4 } };
 
+/* Of most beds the shorter version looks at both sides alone. */
+static bool is_wanted(const bed *b, double factor) {
+	if (!beyond_is_long()) return factor == b->sound || factor == b->failing;
+	return b->dim == 2 || factor == floor(factor);
+}
+
 static void bed_at_rest(void **unused) {
-	static const double factors[] = { 0.1, 0.5, 0.75, 0.9, 1, 1.25, 1.5, 2, 2.5, 3, 4 };
+	static const double factors[] = { 0.1, 0.5, 0.75, 0.9, 1, 1.25, 1.5, 2, 2.5, 3, 4, 6, 8 };
 	(void)unused;
 	beyond_table("A bed at rest: energies over m g d of all grains",
 		"contact | step over hard limit | largest kinetic energy | energy gained | steps | what Quern says");
 	for (size_t k = 0; k < sizeof beds / sizeof *beds; k++)
 		for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) bed_row(&beds[k], factors[i]);
-	for (size_t k = 0; k < sizeof more_beds / sizeof *more_beds && beyond_is_long(); k++)
+	for (size_t k = 0; k < sizeof more_beds / sizeof *more_beds; k++)
 		for (size_t i = 0; i < sizeof factors / sizeof *factors; i++)
-			if (more_beds[k].dim == 2 || factors[i] == floor(factors[i])) bed_row(&more_beds[k], factors[i]);
+			if (is_wanted(&more_beds[k], factors[i])) bed_row(&more_beds[k], factors[i]);
 }
 
 int main(int argc, char **argv) {

@@ -22,10 +22,10 @@ static double step_limit(quern_run *run, const char *section, double *hard) {
 	return s->ops->limit(s->solver->self, &step, hard, reason);
 }
 
-held held_open(double width, double height, int substeps, const char *packer) {
+held held_open(double width, double height, int substeps, const char *packer, int seed) {
 	held h = { .width = width };
 	h.run = harness_open(1,
-		"quern: 1\ndimension: 2\nseed: 7\ngravity: [0, -9.81]\n"
+		"quern: 1\ndimension: 2\nseed: %d\ngravity: [0, -9.81]\n"
 		"domain: {lower: [0, 0], upper: [%g, 0.2]}\ntime: {end: 1000}\noutput: {every: 1000}\n"
 		"grains:\n  material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}}\n"
 		"  contact: {linear: {stiffness: 1e6, restitution: 0.5, friction: 0.4}}\n"
@@ -39,7 +39,7 @@ held held_open(double width, double height, int substeps, const char *packer) {
 		"critical_density: 1975}}\n"
 		"hybrid:\n  oracle: [{packing_fraction: {depth: 14 mm, half_width: 4 mm}}]\n"
 		"  substeps: %d\n  packer: %s\n",
-		width, width, width - 0.001, height, width, substeps, packer);
+		seed, width, width, width - 0.001, height, width, substeps, packer);
 	harness_settle(h.run);
 	h.weight = quern_run_account(h.run).mass * gravity;
 	h.unit = h.weight * diameter;

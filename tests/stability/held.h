@@ -10,7 +10,7 @@ typedef struct held {
 } held;
 
 /* Settled; a long step is `substeps` recommended grain steps from now on, whatever the continuum says of it. */
-held held_open(double width, double height, int substeps, const char *packer);
+held held_open(double width, double height, int substeps, const char *packer, int seed);
 /* Moving grains' and points' kinetic energy over m g d. */
 double held_kinetic(const held *);
 /* Height that 99 % of the carried mass lie below, m. */

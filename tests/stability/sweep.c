@@ -11,24 +11,19 @@
 #include "harness.h"
 #include "held.h"
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const double diameter = 2e-3, start = 14e-3;
 enum { CYCLES = 4, STRIDES = 20, STRIDE_UPDATES = 1 }; /* half a diameter per update */
 
-/* The oracle's parameter in the running scene. */
-static double *depth_of(quern_run *run) {
-	const quern_scene *scene = run->scene;
-	for (size_t i = 0; i < scene->n_instances; i++) {
-		const quern_instance *one = scene->instances[i];
-		if (strcmp(one->file->plugin.id, "oracle.packing_fraction") != 0) continue;
-		const quern_param *row = quern_param_find(one->file->plugin.params, "depth");
-		assert_non_null(row);
-		return (double *)(void *)((char *)one->self + row->offset);
-	}
-	fail_msg("there is no oracle");
-	return NULL;
-}
+/* The page's limits, which hold for any settled state: the columns of its summary. */
+typedef struct limits {
+	const char *packer;
+	double kinetic, lowest, highest, lost, carried, left; /* lost: diameters of height */
+} limits;
+static const limits of_packer[] = { { "two_point_tangent", 0.06, 0.5, 1.7, 2.5, 0.06, 0.015 },
+	{ "random", 0.15, 0.35, 1.8, 4, 0.14, 0.025 } };
 
 typedef struct book {
 	double kinetic, lowest,
@@ -61,23 +56,34 @@ static void go_on(const held *h, double mass, book *b) {
 	b->entries = fmax(b->entries, entries(h->run, mass));
 }
 
-static void put(const held *h, const char *packer, const char *when, const book *b, double top, double mass) {
+static void put(
+	const held *h, const char *packer, int seed, const char *when, const book *b, double top, double mass) {
 	const quern_account a = quern_run_account(h->run);
-	beyond_row("%s | %s | %.1e | %.2f ... %.2f | %+.2f | %+.4f | %+.4f | %.3f | %.0e | %u, %u", packer, when,
-		b->kinetic, b->lowest, b->highest, (held_top(h) - top) / diameter, b->carried, a.mass / mass - 1,
-		b->entries, a.defect, harness_count(h->run, "grain"), harness_count(h->run, "point"));
+	beyond_row("%s | %d | %s | %.1e | %.2f ... %.2f | %+.2f | %+.4f | %+.4f | %.3f | %.0e | %u, %u", packer,
+		seed, when, b->kinetic, b->lowest, b->highest, (held_top(h) - top) / diameter, b->carried,
+		a.mass / mass - 1, b->entries, a.defect, harness_count(h->run, "grain"),
+		harness_count(h->run, "point"));
 }
 
-static void sweep(const char *packer, double most_carried, double most_left) {
-	const held h = held_open(0.04, 0.06, 20, packer);
-	double *depth = depth_of(h.run);
+static void judge(const limits *l, const book *b, double lost, double defect) {
+	if (!(b->kinetic < l->kinetic)) fail_msg("%s: kinetic energy %g", l->packer, b->kinetic);
+	if (!(b->lowest > l->lowest && b->highest < l->highest)) fail_msg("%s: the floor feels it", l->packer);
+	if (!(fabs(b->carried) < l->carried)) fail_msg("%s: carried mass %g", l->packer, b->carried);
+	if (!(lost > -0.1 && lost < l->lost)) fail_msg("%s: the column loses %g diameters", l->packer, lost);
+	if (!(defect <= 1e-12)) fail_msg("%s: the ledger is off", l->packer);
+}
+
+static void sweep(const limits *l, int seed) {
+	const char *packer = l->packer;
+	const held h = held_open(0.04, 0.06, 20, packer, seed);
+	double *depth = harness_param(h.run, "oracle.packing_fraction", "depth");
 	assert_true(fabs(*depth - start) < 1e-12);
 	harness_steps(h.run, 2);
 	const double mass = h.weight / 9.81, top = held_top(&h);
 	const int strides = STRIDES, each = beyond_is_long() ? 5 : STRIDE_UPDATES;
 	book rest = { .lowest = INFINITY, .highest = -INFINITY };
 	for (int i = 0; i < 5 * each; i++) go_on(&h, mass, &rest);
-	put(&h, packer, "at rest", &rest, top, mass);
+	put(&h, packer, seed, "at rest", &rest, top, mass);
 	for (int cycle = 1; cycle <= CYCLES; cycle++) {
 		book b = { .lowest = INFINITY, .highest = -INFINITY };
 		char when[24];
@@ -86,17 +92,15 @@ static void sweep(const char *packer, double most_carried, double most_left) {
 			for (int i = 0; i < each; i++) go_on(&h, mass, &b);
 		}
 		snprintf(when, sizeof when, "cycle %d", cycle);
-		put(&h, packer, when, &b, top, mass);
-		if (!(b.kinetic < 0.1)) fail_msg("%s: kinetic energy %g", packer, b.kinetic);
-		if (!(b.lowest > 0.4 && b.highest < 1.8)) fail_msg("%s: the floor feels it", packer);
-		if (!(fabs(b.carried) < most_carried)) fail_msg("%s: carried mass %g", packer, b.carried);
-		if (!(quern_run_account(h.run).defect <= 1e-12)) fail_msg("%s: the ledger is off", packer);
+		put(&h, packer, seed, when, &b, top, mass);
+		judge(l, &b, (top - held_top(&h)) / diameter, quern_run_account(h.run).defect);
 	}
 	book last = { .lowest = INFINITY, .highest = -INFINITY };
 	for (int i = 0; i < 10 * each; i++) go_on(&h, mass, &last);
-	put(&h, packer, "at rest again", &last, top, mass);
-	if (!(last.kinetic < 2e-3)) fail_msg("%s: it does not come to rest", packer);
-	if (!(fabs(quern_run_account(h.run).mass / mass - 1) < most_left))
+	put(&h, packer, seed, "at rest again", &last, top, mass);
+	/* the shorter version gives it a fifth of the time */
+	if (!(last.kinetic < (beyond_is_long() ? 3e-4 : 2e-3))) fail_msg("%s: it does not come to rest", packer);
+	if (!(fabs(quern_run_account(h.run).mass / mass - 1) < l->left))
 		fail_msg("%s: carried mass does not come back", packer);
 	harness_close(h.run);
 }
@@ -104,10 +108,11 @@ static void sweep(const char *packer, double most_carried, double most_left) {
 static void zone_swept(void **unused) {
 	(void)unused;
 	beyond_table("A zone swept by ten diameters and back, four times",
-		"packer | when | largest kinetic energy over m g d | floor's push over the weight | top, diameters | "
+		"packer | settled state | when | largest kinetic energy over m g d | floor's push over the weight | "
+		"top, diameters | "
 		"carried mass, worst | carried mass, last | entries over the mass | ledger | grains, points");
-	sweep("two_point_tangent", 0.05, 0.01);
-	sweep("random", 0.12, 0.02);
+	for (size_t k = 0; k < 2; k++)
+		for (int seed = 1; seed <= (beyond_is_long() ? 5 : 1); seed++) sweep(&of_packer[k], seed);
 }
 
 int main(int argc, char **argv) {
