@@ -189,6 +189,8 @@ static const struct {
 	{ "grain/position.1", -1e300, 0, false },
 	{ "grain/position.0", 1, 0, false }, /* eighty domains away */
 	{ "grain/position.0", (double)NAN, 0, false },
+	{ "grain/radius.0", 180, 0, false }, /* every cell that it covers would be looked at */
+	{ "grain/radius.0", -0.001, 0, false },
 	{ "grain/velocity.0", (double)INFINITY, 0, false },
 	{ "total/damped.0", (double)INFINITY, 0, false },
 	{ "total/rubbed.0", (double)NAN, 0, false },
