@@ -297,6 +297,14 @@ static bool read_all(
 	return rejoin(run, why);
 }
 
+/* What is carried and owed is what the run began with, but for round-off. */
+static bool mass_holds(quern_run *run, quern_text *why) {
+	const quern_account a = quern_run_account(run);
+	const double defect = fabs(a.mass + a.owed - run->mass_initial);
+	return !(run->mass_initial > 0) || defect <= 1e-6 * run->mass_initial ||
+		   fault(why, "the masses", "the run");
+}
+
 quern_status quern_checkpoint_read(
 	quern_run *run, const char *path, bool force, int64_t *rows, quern_text *said, quern_text *why) {
 	quern_h5 h;
@@ -306,5 +314,5 @@ quern_status quern_checkpoint_read(
 	quern_h5_close(&h);
 	if (!good) return QUERN_E_IO;
 	quern_plan_refresh(run->plan);
-	return QUERN_OK;
+	return mass_holds(run, why) ? QUERN_OK : QUERN_E_IO;
 }

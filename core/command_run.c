@@ -249,6 +249,7 @@ static quern_status take_over(session *s, bool again) {
 	s->begun = true;
 	run->sidecars = quern_sidecars_create(run->folder, again ? run->clock.frame + 1 : 0, why);
 	if (!run->sidecars) return quern_run_stop(run, QUERN_E_IO, "%s", why);
+	if (*why) quern_log_add(run->log, 2, "%s", why);
 	if (!again && quern_series_init(&s->series, run, 0) != QUERN_OK) return run->status;
 	return check_log(run);
 }

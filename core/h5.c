@@ -197,6 +197,15 @@ hid_t quern_h5_find(hid_t parent, const char *name) {
 	return H5Gopen2(parent, name, H5P_DEFAULT);
 }
 
+/* Whether as much was stored as the sizes say: a damaged file may claim any, and memory is taken by what it claims. What
+ * is packed is at best a thousandth. */
+static bool is_stored(hid_t set, const hsize_t size[2]) {
+	const hid_t type = H5Dget_type(set);
+	const double claimed = (double)size[0] * (double)size[1] * (double)H5Tget_size(type);
+	H5Tclose(type);
+	return claimed <= 1100.0 * (double)H5Dget_storage_size(set);
+}
+
 static hid_t open_set(hid_t group, const char *name, size_t *rows, size_t *columns) {
 	hsize_t size[2] = { 0, 1 };
 	if (group < 0 || H5Lexists(group, name, H5P_DEFAULT) <= 0) return -1;
@@ -204,7 +213,8 @@ static hid_t open_set(hid_t group, const char *name, size_t *rows, size_t *colum
 	if (set < 0) return -1;
 	const hid_t space = H5Dget_space(set);
 	const int rank = H5Sget_simple_extent_ndims(space);
-	const bool good = (rank == 1 || rank == 2) && H5Sget_simple_extent_dims(space, size, NULL) == rank;
+	const bool good = (rank == 1 || rank == 2) && H5Sget_simple_extent_dims(space, size, NULL) == rank &&
+					  is_stored(set, size);
 	H5Sclose(space);
 	*rows = size[0];
 	*columns = size[1];

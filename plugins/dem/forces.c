@@ -244,7 +244,8 @@ quern_status quern_dem_observe(const void *self, const quern_step *s) {
 	if (!grains.n) return QUERN_OK;
 	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);
-	const quern_status status = quern_dem_judge_grains(&sh, grains.n_blocks);
+	quern_status status = quern_dem_judge_grains(&sh, grains.n_blocks);
+	if (status == QUERN_OK && sh.deep) status = quern_dem_judge_contacts(&sh, grains.n_blocks);
 	if (status != QUERN_OK) return status;
 	quern_real energy[N_ENERGIES] = { 0 };
 	for (uint32_t b = 0; b < grains.n_blocks; b++) {
