@@ -193,11 +193,15 @@ static void spread_grain(const update *d, uint32_t i, quern_real times, quern_re
 /* Fixed grains are walls: as densely as they may lie, they leave no room. Where nothing moves between them nothing will. */
 void quern_hybrid_fixed(update *d) {
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
-	if (!fixed) return;
+	quern_real *taken = fixed ? take(d, d->n_cells, sizeof(quern_real)) : NULL;
+	if (!taken) return;
 	for (uint32_t i = 0; i < d->n_grains; i++)
-		if (fixed[i]) spread_grain(d, i, -d->h->density / d->h->packed, d->open);
-	for (uint32_t c = 0; c < d->n_cells; c++)
-		if (d->open[c] < 0.25) d->open[c] = d->mass[c] > 0 ? 0.125 : 0;
+		if (fixed[i]) spread_grain(d, i, d->h->density / d->h->packed, taken);
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		if (!(taken[c] > 0)) continue;
+		const quern_real left = d->open[c] - taken[c];
+		d->open[c] = left >= 0.25 ? left : d->mass[c] > 0 ? 0.125 : 0;
+	}
 }
 
 /* Of the room that bodies and fixed grains leave. A cell with a tenth of the mass that fills it in points is full: so is what
