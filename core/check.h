@@ -18,6 +18,7 @@ typedef struct check {
 	const quern_plugin_file *file;
 	const quern_node *given; /* parameters of --set */
 	uint32_t dimension;      /* 0: all that the plugin has */
+	unsigned seconds;        /* for a group of tests */
 	quern_units *units;
 	check_shared *shared;
 	quern_environment *home; /* what every call is to leave as it is */

@@ -63,6 +63,7 @@ static void write_run(quern_h5 *h, quern_run *run, int64_t rows) {
 	for (size_t i = 0; i < N_NUMBERS; i++) quern_h5_number(h, h->file, numbers[i].name, *number(run, i));
 	write_text(h, "scene", quern_run_identity(run));
 	write_text(h, "replaced", run->replaced ? run->replaced : "");
+	write_text(h, "limited_by", run->limit_reason);
 	write_plugins(h, run);
 	if (!run->has_grid) return;
 	const uint32_t n = run->grid.view.n_blocks;
@@ -98,17 +99,43 @@ static bool fault(quern_text *why, const char *what, const char *name) {
 	return false;
 }
 
-static bool read_set(quern_run *run, quern_h5 *h, int s, quern_text *why) {
-	quern_store *store = &run->plan->store;
+/* Rows are scratch, unless somebody looks at them between steps. */
+static bool is_in_file(const quern_store *store, int set) {
+	bool any = !store->sets[set].rows;
+	for (size_t k = 0; k < store->n_fields && !any; k++)
+		any = store->fields[k].set == set && store->fields[k].kept;
+	return any;
+}
+
+static bool give_room(quern_run *run, quern_h5 *h, int s, bool *had, quern_text *why) {
+	quern_set_store *set = &run->plan->store.sets[s];
 	quern_state_group g;
-	bool kept_any = false;
-	for (size_t k = 0; k < store->n_fields; k++)
-		kept_any = kept_any || (store->fields[k].set == s && store->fields[k].kept);
-	if (store->sets[s].rows && !kept_any) return true;
+	if (set->rows || !is_in_file(&run->plan->store, s)) return true;
 	if (!quern_state_find(run, h->file, s, kept, &g, why)) return false;
-	const bool room = store->sets[s].rows || quern_store_fill(store, s, g.n) == QUERN_OK;
-	const bool good =
-		room ? quern_state_read(run, &g, s, kept, why) : fault(why, "the memory", store->sets[s].name);
+	quern_state_leave(&g);
+	if (set->n == g.n) return true;
+	*had = false;
+	return quern_store_fill(&run->plan->store, s, g.n) == QUERN_OK || fault(why, "the memory", set->name);
+}
+
+/* What points into a set goes when that is made anew, so that a solver's sets may have to be made in another order than
+ * it names them: as often as there are sets. */
+static bool make_room(quern_run *run, quern_h5 *h, quern_text *why) {
+	const int n = (int)run->plan->store.n_sets;
+	bool had = false;
+	for (int pass = 0; pass <= n && !had; pass++) {
+		had = true;
+		for (int s = 0; s < n; s++)
+			if (!give_room(run, h, s, &had, why)) return false;
+	}
+	return had || fault(why, "the size", "sets that point into each other");
+}
+
+static bool read_set(quern_run *run, quern_h5 *h, int s, quern_text *why) {
+	quern_state_group g;
+	if (!is_in_file(&run->plan->store, s)) return true;
+	if (!quern_state_find(run, h->file, s, kept, &g, why)) return false;
+	const bool good = quern_state_read(run, &g, s, kept, why);
 	quern_state_leave(&g);
 	return good;
 }
@@ -172,6 +199,12 @@ static char *read_text(quern_h5 *h, const char *name) {
 	if (quern_h5_read(h->file, name, H5T_NATIVE_UINT8, n, 1, text)) return text;
 	free(text);
 	return NULL;
+}
+
+static void read_reason(quern_run *run, quern_h5 *h) {
+	char *reason = read_text(h, "limited_by");
+	snprintf(run->limit_reason, sizeof run->limit_reason, "%s", reason ? reason : "");
+	free(reason);
 }
 
 /* ---- whether it is this run's ---- */
@@ -252,7 +285,7 @@ static bool read_all(
 	quern_run *run, quern_h5 *h, bool force, int64_t *rows, quern_text *said, quern_text *why) {
 	quern_store *store = &run->plan->store;
 	if (!is_checkpoint(h, why) || !read_scene(run, h, said, why) || !read_clock(run, h, rows, why) ||
-		!read_plugins(run, h, force, said, why) || !read_grid(run, h, why))
+		!read_plugins(run, h, force, said, why) || !read_grid(run, h, why) || !make_room(run, h, why))
 		return false;
 	for (int s = 0; s < (int)store->n_sets; s++)
 		if (!read_set(run, h, s, why)) return false;
@@ -260,7 +293,16 @@ static bool read_all(
 		const char *wrong = quern_state_fault(run, &store->fields[k]);
 		if (wrong) return fault(why, wrong, store->fields[k].name);
 	}
+	read_reason(run, h);
 	return rejoin(run, why);
+}
+
+/* What is carried and owed is what the run began with, but for round-off. */
+static bool mass_holds(quern_run *run, quern_text *why) {
+	const quern_account a = quern_run_account(run);
+	const double defect = fabs(a.mass + a.owed - run->mass_initial);
+	return !(run->mass_initial > 0) || defect <= 1e-6 * run->mass_initial ||
+		   fault(why, "the masses", "the run");
 }
 
 quern_status quern_checkpoint_read(
@@ -272,5 +314,5 @@ quern_status quern_checkpoint_read(
 	quern_h5_close(&h);
 	if (!good) return QUERN_E_IO;
 	quern_plan_refresh(run->plan);
-	return QUERN_OK;
+	return mass_holds(run, why) ? QUERN_OK : QUERN_E_IO;
 }

@@ -6,9 +6,6 @@
 #include "options.h"
 #include <stdlib.h>
 
-/* A group of tests takes a few seconds; one that goes on for ever is stopped. */
-static int64_t seconds = 120;
-
 static const check_kind *const kinds[QUERN_KINDS] = { [QUERN_CONTACT] = &quern_check_contact,
 	[QUERN_NEIGHBOURS] = &quern_check_neighbours,
 	[QUERN_INTEGRATOR] = &quern_check_integrator,
@@ -39,13 +36,14 @@ static void run_errand(void *arg) {
 	quern_check_environment(e->c);
 }
 
+/* A group of tests takes a few seconds; one that goes on for ever is stopped. */
 static void run_group(const check *c, const char *name, void (*group)(const check *)) {
 	errand e = { c, group };
 	char what[80];
 	quern_check_place(c, "its tables");
-	const quern_child how = quern_child_run(run_errand, &e, (unsigned)seconds);
+	const quern_child how = quern_child_run(run_errand, &e, c->seconds);
 	if (how.end == QUERN_CHILD_DONE) return;
-	quern_child_say(&how, (unsigned)seconds, what);
+	quern_child_say(&how, c->seconds, what);
 	printf("  FAILED  %s: %s: %s %s %s.%s\n", name, c->file->plugin.id, what,
 		how.end == QUERN_CHILD_LATE ? "from" : "in", quern_id_name(c->file->plugin.id), c->shared->place);
 	c->shared->properties++;
@@ -95,7 +93,7 @@ static const quern_plugin_file *open_plugin(
 
 int quern_command_check(int argc, char **argv) {
 	quern_texts sets = { 0 };
-	int64_t dimension = 0;
+	int64_t dimension = 0, seconds = 120;
 	quern_words words = { .missing = "a plugin is missing", .least = 1, .most = 1 };
 	const quern_option options[] = { QUERN_TEXTS(&sets, "set", "KEY=VALUE",
 										 "a parameter of the plugin; may stand several times"),
@@ -108,7 +106,10 @@ int quern_command_check(int argc, char **argv) {
 	quern_tree *tree = quern_tree_parse("--set", "{}", 2, report);
 	for (size_t i = 0; i < sets.n; i++) quern_tree_set(tree, sets.at[i], report);
 	quern_loader *loader = quern_loader_create();
-	check c = { .given = tree->root, .dimension = (uint32_t)dimension, .units = quern_units_create() };
+	check c = { .given = tree->root,
+		.dimension = (uint32_t)dimension,
+		.seconds = (unsigned)seconds,
+		.units = quern_units_create() };
 	quern_loader_beware(loader);
 	if (!quern_report_errors(report)) c.file = open_plugin(loader, words.at[0], dimension, report);
 	quern_report_print(report, stderr);

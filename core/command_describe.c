@@ -1,8 +1,9 @@
-/* quern list, quern describe - what is installed, from the plugins' own tables */
+/* quern list, quern describe - what is installed and what a scene may say, from the tables of plugins and core */
 #include "command.h"
 #include "loader.h"
 #include "options.h"
 #include "param.h"
+#include "scene.h"
 #include "text.h"
 #include <jansson.h>
 #include <math.h>
@@ -60,15 +61,28 @@ int quern_command_list(int argc, char **argv) {
 
 /* ---- describe ---- */
 
+static json_t *params_json(const quern_param *);
+
+static json_t *default_json(const quern_param *row) {
+	if (row->flags & (QUERN_REQUIRED | QUERN_MAYBE) || row->from) return NULL;
+	if (row->choices) return json_string(row->choices[(int)row->def]);
+	if (row->type == QUERN_T_BOOL) return json_boolean(row->def != 0);
+	if (row->type == QUERN_T_TEXT) return row->text ? json_string(row->text) : NULL;
+	return row->type == QUERN_T_REAL || row->type == QUERN_T_INT ? json_real(row->def) : NULL;
+}
+
 static json_t *param_json(const quern_param *row) {
+	char range[96];
 	json_t *one = json_pack(
 		"{s:s, s:s, s:s}", "name", row->name, "type", type_names[row->type], "doc", row->doc ? row->doc : "");
 	if (row->unit) json_object_set_new(one, "unit", json_string(row->unit));
 	json_object_set_new(one, "required", json_boolean(row->flags & QUERN_REQUIRED));
+	json_object_set_new(one, "advanced", json_boolean(row->flags & QUERN_ADVANCED));
+	quern_param_range(row, range);
+	if (*range) json_object_set_new(one, "range", json_string(range));
 	if (row->from) json_object_set_new(one, "from", json_string(row->from));
+	json_object_set_new(one, "default", default_json(row)); /* NULL sets nothing */
 	if (row->type == QUERN_T_REAL || row->type == QUERN_T_INT) {
-		if (!(row->flags & (QUERN_REQUIRED | QUERN_MAYBE)) && !row->from && !row->choices)
-			json_object_set_new(one, "default", json_real(row->def));
 		if (row->flags & QUERN_PLANAR) json_object_set_new(one, "default_2d", json_real(row->planar));
 		if (row->min != row->max) {
 			json_object_set_new(one, "min", json_real(row->min));
@@ -80,12 +94,14 @@ static json_t *param_json(const quern_param *row) {
 		for (const char *const *c = row->choices; *c; c++) json_array_append_new(choices, json_string(*c));
 		json_object_set_new(one, "choices", choices);
 	}
-	if (row->rows) {
-		json_t *rows = json_array();
-		for (const quern_param *r = row->rows; r->name; r++) json_array_append_new(rows, param_json(r));
-		json_object_set_new(one, "rows", rows);
-	}
+	if (row->rows) json_object_set_new(one, "rows", params_json(row->rows));
 	return one;
+}
+
+static json_t *params_json(const quern_param *row) {
+	json_t *rows = json_array();
+	for (; row && row->name; row++) json_array_append_new(rows, param_json(row));
+	return rows;
 }
 
 static void print_param(const quern_param *row, int indent) {
@@ -103,6 +119,7 @@ static void print_param(const quern_param *row, int indent) {
 	else if (row->flags & QUERN_REQUIRED) printf("; required");
 	else if (row->choices) printf("; default: %s", row->choices[(int)row->def]);
 	else if (row->type == QUERN_T_BOOL) printf("; default: %s", row->def != 0 ? "true" : "false");
+	else if (row->type == QUERN_T_TEXT && row->text) printf("; default: %s", row->text);
 	else if (row->type == QUERN_T_REAL || row->type == QUERN_T_INT) {
 		if (row->flags & QUERN_MAYBE) printf("; may be left out");
 		else {
@@ -127,6 +144,25 @@ static void print_uses(const quern_use *row) {
 	}
 }
 
+static void print_solver(const quern_solver_ops *ops) {
+	puts("\nslots");
+	for (const quern_slot *s = ops->slots; s && s->name; s++) {
+		if (s->same_as) continue;
+		printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", quern_kind_name(s->kind),
+			s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "");
+		for (const quern_param *row = s->rows; row && row->name; row++) print_param(row, 6);
+	}
+	puts("\nstages");
+	for (const quern_stage *s = ops->stages; s && s->name; s++)
+		printf("  %-20s %s\n", s->name, s->doc ? s->doc : "");
+}
+
+static void print_outputs(const quern_observer_ops *ops) {
+	puts("\ncolumns of series.csv");
+	for (const quern_output *o = ops->outputs; o && o->name; o++)
+		printf("  %-14s %-8s %s\n", o->name, o->unit ? o->unit : "1", o->doc ? o->doc : "");
+}
+
 static void print_plugin(const quern_plugin_file *f) {
 	const quern_plugin *p = &f->plugin;
 	printf("%s %s - %s\n", p->id, f->library->version, p->brief ? p->brief : "");
@@ -147,35 +183,80 @@ static void print_plugin(const quern_plugin_file *f) {
 		}
 	if (p->uses->field) puts("\nfields");
 	print_uses(p->uses);
-	if (p->kind != QUERN_SOLVER) return;
-	const quern_solver_ops *ops = p->ops;
-	puts("\nslots");
+	if (p->kind == QUERN_SOLVER) print_solver(p->ops);
+	if (p->kind == QUERN_OBSERVER) print_outputs(p->ops);
+}
+
+/* The keys of a scene that belong to no section. */
+static void print_scene(void) {
+	puts("scene - the keys of a scene that belong to no section\n\nkeys");
+	for (const quern_param *row = quern_general_rows; row->name; row++) print_param(row, 2);
+	for (const quern_general_list *l = quern_general_lists; l->name; l++)
+		printf("  %-24s  list of %s\n      %s\n", l->name, l->item, l->doc);
+	puts("\nsections");
+	for (const quern_section_name *n = quern_section_names; n->section; n++)
+		printf("  %-24s  quern describe %s\n", n->section, n->section);
+	printf("  %-24s  observers, one or a list; each takes `label`\n", quern_observe_slot.name);
+}
+
+static json_t *slots_json(const quern_solver_ops *ops) {
+	json_t *slots = json_array();
 	for (const quern_slot *s = ops->slots; s && s->name; s++)
 		if (!s->same_as)
-			printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", quern_kind_name(s->kind),
-				s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "");
-	puts("\nstages");
-	for (const quern_stage *s = ops->stages; s && s->name; s++)
-		printf("  %-20s %s\n", s->name, s->doc ? s->doc : "");
+			json_array_append_new(slots,
+				json_pack("{s:s, s:s, s:s, s:b, s:b, s:s*, s:o}", "name", s->name, "kind",
+					quern_kind_name(s->kind), "doc", s->doc ? s->doc : "", "list", (int)s->list, "required",
+					!s->def && (!s->list || s->required), "default", s->def, "rows", params_json(s->rows)));
+	return slots;
+}
+
+static json_t *outputs_json(const quern_observer_ops *ops) {
+	json_t *outputs = json_array();
+	for (const quern_output *o = ops->outputs; o && o->name; o++)
+		json_array_append_new(outputs, json_pack("{s:s, s:s, s:s}", "name", o->name, "unit",
+										   o->unit ? o->unit : "1", "doc", o->doc ? o->doc : ""));
+	return outputs;
+}
+
+static json_t *scene_json(void) {
+	json_t *keys = params_json(quern_general_rows), *sections = json_object();
+	for (const quern_general_list *l = quern_general_lists; l->name; l++)
+		json_array_append_new(keys, json_pack("{s:s, s:s+, s:s, s:b, s:b}", "name", l->name, "type",
+										"list of ", l->item, "doc", l->doc, "required", 0, "advanced", 0));
+	for (const quern_section_name *n = quern_section_names; n->section; n++)
+		json_object_set_new(sections, n->section, json_sprintf("solver.%s", n->solver));
+	return json_pack("{s:s, s:o, s:o, s:o}", "id", "scene", "params", keys, "sections", sections, "observe",
+		params_json(quern_observe_slot.rows));
 }
 
 static json_t *plugin_json(const quern_plugin_file *f) {
 	const quern_plugin *p = &f->plugin;
-	json_t *params = json_array(), *uses = json_array();
-	for (const quern_param *row = p->params; row->name; row++) json_array_append_new(params, param_json(row));
+	json_t *params = params_json(p->params), *uses = json_array();
 	for (const quern_use *row = p->uses; row->field; row++)
 		json_array_append_new(uses, json_pack("{s:s, s:s, s:s}", "field", row->field, "access",
 										access_names[row->access], "unit", row->unit ? row->unit : "1"));
-	return json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:i, s:o, s:o}", "id", p->id, "brief",
+	json_t *all = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:i, s:o, s:o}", "id", p->id, "brief",
 		p->brief ? p->brief : "", "doc", p->doc ? p->doc : "", "cite", p->cite ? p->cite : "", "version",
 		f->library->version, "license", f->library->license, "file", f->path, "dims", (int)p->dims, "params",
 		params, "uses", uses);
+	if (p->kind == QUERN_SOLVER) json_object_set_new(all, "slots", slots_json(p->ops));
+	if (p->kind == QUERN_OBSERVER) json_object_set_new(all, "outputs", outputs_json(p->ops));
+	return all;
+}
+
+/* The section's solver, or NULL. */
+static const char *solver_of(const char *section) {
+	for (const quern_section_name *n = quern_section_names; n->section; n++)
+		if (!strcmp(n->section, section)) return n->solver;
+	return NULL;
 }
 
 /* A bare name is enough where only one kind has it. */
 static const quern_plugin_file *find(quern_loader *loader, const char *name, quern_report *report) {
 	if (strchr(name, '/')) return quern_loader_open(loader, name, report, (quern_mark) { 0 });
 	if (strchr(name, '.')) return load(loader, name, report);
+	const char *solver = solver_of(name);
+	if (solver) return quern_loader_find(loader, QUERN_SOLVER, solver, report, (quern_mark) { 0 });
 	char **ids = quern_loader_ids(loader);
 	const quern_plugin_file *found = NULL;
 	size_t n = 0;
@@ -198,21 +279,23 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 
 int quern_command_describe(int argc, char **argv) {
 	bool json = false;
-	quern_words words = { .missing = "a plugin is missing", .least = 1, .most = 1 };
+	quern_words words = { .missing = "a plugin, a section or `scene` is missing", .least = 1, .most = 1 };
 	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
 	const int status = quern_options_read("describe", options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
 	quern_loader_beware(loader);
-	const quern_plugin_file *f = find(loader, words.at[0], report);
-	if (f && json) {
-		json_t *root = plugin_json(f);
+	const bool scene = !strcmp(words.at[0], "scene");
+	const quern_plugin_file *f = scene ? NULL : find(loader, words.at[0], report);
+	if (json && (f || scene)) {
+		json_t *root = scene ? scene_json() : plugin_json(f);
 		json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 		json_decref(root);
-	} else if (f) print_plugin(f);
+	} else if (scene) print_scene();
+	else if (f) print_plugin(f);
 	quern_report_print(report, stderr);
 	quern_report_destroy(report);
 	quern_loader_destroy(loader);
-	return f ? QUERN_EXIT_DONE : QUERN_EXIT_SCENE;
+	return f || scene ? QUERN_EXIT_DONE : QUERN_EXIT_SCENE;
 }

@@ -32,6 +32,7 @@ typedef struct {
 	double start, saved; /* on the clock */
 	double until;        /* s; negative: to the end */
 	bool begun;          /* the folder is this run's: what happens is noted there */
+	char *alike;         /* runs of this key settle to the same state; NULL: it is neither taken nor kept */
 	int64_t saved_step;  /* of the last checkpoint; -1: none */
 } session;
 
@@ -91,10 +92,13 @@ static char *folder_of(const options *o) {
 
 /* ---- progress and checkpoints ---- */
 
+/* s on the clock, of all that has led here: the start moves on with each checkpoint. */
+static double wall_of(const session *s) { return s->run->wall_before + quern_wall() - s->start; }
+
 static void progress(session *s, bool settling) {
 	quern_run *run = s->run;
 	if (!quern_log_due(run->log)) return;
-	const double wall = quern_wall() - s->start, t = quern_run_time(run), end = run->scene->general.end;
+	const double wall = wall_of(s), t = quern_run_time(run), end = run->scene->general.end;
 	if (settling)
 		quern_log_progress(
 			run->log, false, "settling: %lld steps, %.0f s", (long long)run->clock.settle_step, wall);
@@ -134,10 +138,10 @@ static bool due(const session *s) {
 
 /* ---- the run ---- */
 
-static quern_status settle(session *s, bool cache) {
+static quern_status settle(session *s) {
 	quern_run *run = s->run;
 	const double begin = quern_wall();
-	if (cache && !run->clock.settled && !run->clock.settle_step) quern_settled_take(run);
+	if (s->alike) quern_settled_take(run, s->alike);
 	const int warnings = quern_log_warnings(run->log); /* what was cut off would be taken for settled */
 	const bool settles = !run->clock.settled;
 	while (!run->clock.settled && !interrupted && run->status == QUERN_OK) {
@@ -146,7 +150,7 @@ static quern_status settle(session *s, bool cache) {
 		if (due(s)) checkpoint(s);
 	}
 	const bool rests = settles && run->clock.settled && run->status == QUERN_OK;
-	if (cache && rests && quern_log_warnings(run->log) == warnings) quern_settled_keep(run);
+	if (s->alike && rests && quern_log_warnings(run->log) == warnings) quern_settled_keep(run, s->alike);
 	run->settle_wall += quern_wall() - begin;
 	if (settles && run->clock.settled && run->clock.settle_step)
 		quern_log_add(run->log, 1, "settled in %lld steps, %.1f s", (long long)run->clock.settle_step,
@@ -202,7 +206,7 @@ static int exit_status(const quern_run *run) {
 
 static void report_end(session *s, const char *status) {
 	quern_run *run = s->run;
-	const double wall = run->wall_before + quern_wall() - s->start;
+	const double wall = wall_of(s);
 	quern_log_add(run->log, 1, "%s: t = %.6g s, %lld steps, %.1f s (settling %.1f s), %s", status,
 		quern_run_time(run), (long long)run->clock.step, wall, run->settle_wall, run->folder);
 	if (run->status == QUERN_OK && !quern_run_over(run))
@@ -245,6 +249,7 @@ static quern_status take_over(session *s, bool again) {
 	s->begun = true;
 	run->sidecars = quern_sidecars_create(run->folder, again ? run->clock.frame + 1 : 0, why);
 	if (!run->sidecars) return quern_run_stop(run, QUERN_E_IO, "%s", why);
+	if (*why) quern_log_add(run->log, 2, "%s", why);
 	if (!again && quern_series_init(&s->series, run, 0) != QUERN_OK) return run->status;
 	return check_log(run);
 }
@@ -262,6 +267,8 @@ static quern_status begin_anew(session *s, const options *o) {
 	quern_run_identity(run); /* of the files as they are now */
 	if (quern_run_setup(run) != QUERN_OK) return run->status;
 	run->mass_initial = quern_run_account(run).mass;
+	/* what goes on from a checkpoint may have begun with other plugins, or another file of grains */
+	if (!o->no_cache) s->alike = quern_settled_key(run);
 	quern_run_folder_clear(&s->folder, run->scene);
 	return take_over(s, false);
 }
@@ -335,8 +342,7 @@ static int drive(session *s, const options *o) {
 	quern_text_finish(&why);
 	if (s->begun) tell_what_stays(s);
 	if (s->begun && run->status == QUERN_OK) say_estimate(run);
-	if (s->begun && run->status == QUERN_OK && settle(s, !o->no_cache) == QUERN_OK && !interrupted)
-		step_on(s);
+	if (s->begun && run->status == QUERN_OK && settle(s) == QUERN_OK && !interrupted) step_on(s);
 	return finish(s);
 }
 
@@ -373,6 +379,7 @@ int quern_command_run(int argc, char **argv) {
 		status = drive(&s, &o);
 	}
 	quern_series_finish(&s.series);
+	free(s.alike);
 	quern_run_folder_give_back(&s.folder);
 	if (run) quern_sidecars_destroy(run->sidecars);
 	if (run) quern_run_destroy(run);

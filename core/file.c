@@ -30,14 +30,20 @@ static bool hash_rest(int fd, uint64_t *hash) {
 	return true;
 }
 
-bool quern_hash_file(const char *path, size_t from, uint64_t *hash) {
-	struct stat is;
-	/* a pipe or a device would wait for ever */
+int quern_open_file(const char *path) {
+	struct stat is = { 0 };
 	const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+	if (fd < 0) return -1;
+	if (!fstat(fd, &is) && S_ISREG(is.st_mode)) return fd;
+	close(fd);
+	errno = S_ISDIR(is.st_mode) ? EISDIR : EINVAL;
+	return -1;
+}
+
+bool quern_hash_file(const char *path, size_t from, uint64_t *hash) {
+	const int fd = quern_open_file(path);
 	if (fd < 0) return false;
-	bool good = !fstat(fd, &is);
-	if (good && !S_ISREG(is.st_mode)) good = false, errno = S_ISDIR(is.st_mode) ? EISDIR : EINVAL;
-	good = good && lseek(fd, (off_t)from, SEEK_SET) >= 0 && hash_rest(fd, hash);
+	const bool good = lseek(fd, (off_t)from, SEEK_SET) >= 0 && hash_rest(fd, hash);
 	const int why = errno;
 	close(fd);
 	errno = why;

@@ -8,6 +8,8 @@
 uint64_t quern_hash(const void *data, size_t length);
 /* Goes on with a hash, so that parts give the hash of the whole; begin with quern_hash("", 0). */
 uint64_t quern_hash_more(uint64_t hash, const void *data, size_t length);
+/* A regular file, to be read; -1, with errno set: a pipe or a device would wait for ever, or never end. */
+int quern_open_file(const char *path);
 /* Of a regular file from byte `from` on; false, with errno set, if it cannot be read. */
 bool quern_hash_file(const char *path, size_t from, uint64_t *hash);
 

@@ -20,7 +20,6 @@ bool quern_h5_create(quern_h5 *, bool compress, size_t user_block);
 /* Puts it on the disk under `path`, or leaves there what was there before; on a fault `why` says what went wrong.
  * Ends the file in memory in any case. Takes no more memory than the file itself. */
 bool quern_h5_save(quern_h5 *, const char *path, char why[256]);
-void quern_h5_discard(quern_h5 *);
 /* Writes the checksum into the first 512 bytes of a file's image. */
 void quern_h5_seal(void *image, size_t size);
 

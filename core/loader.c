@@ -2,6 +2,7 @@
 #include "child.h"
 #include "config.h"
 #include "environment.h"
+#include "file.h"
 #include "level.h"
 #include "watch.h"
 #include <dirent.h>
@@ -125,18 +126,6 @@ const quern_plugin_file *quern_loader_at(const quern_loader *loader, size_t i) {
 
 /* ---- reading one library ---- */
 
-static uint64_t hash_file(const char *path) {
-	uint64_t hash = 1469598103934665603u;
-	FILE *file = fopen(path, "rb");
-	unsigned char buffer[65536];
-	size_t n;
-	if (!file) return 0;
-	while ((n = fread(buffer, 1, sizeof buffer, file)) > 0)
-		for (size_t i = 0; i < n; i++) hash = (hash ^ buffer[i]) * 1099511628211u;
-	fclose(file);
-	return hash;
-}
-
 static const char *no_library(void *handle, char why[160]) {
 	for (unsigned v = 2; v < 10; v++) {
 		char symbol[32];
@@ -188,7 +177,7 @@ static const quern_plugin_file *add_file(quern_loader *loader, const char *path,
 		return NULL;
 	}
 	note_place(file, handle);
-	file->hash = hash_file(path);
+	quern_hash_file(path, 0, &file->hash);
 	file->level = level;
 	file->library = &t->library;
 	file->plugin = t->plugin;

@@ -15,7 +15,7 @@ static const struct {
 	{ "run", "SCENE.yaml [OPTION]...", "runs a scene", quern_command_run },
 	{ "plan", "SCENE.yaml [OPTION]...", "everything short of running", quern_command_plan },
 	{ "list", "[--json]", "installed plugins", quern_command_list },
-	{ "describe", "PLUGIN [--json]", "a plugin's parameters, units, ranges, sources",
+	{ "describe", "NAME [--json]", "keys, units, ranges, sources of a plugin, a section (grains), or `scene`",
 		quern_command_describe },
 	{ "schema", "[-o FILE]", "JSON Schema of scenes, for editors", quern_command_schema },
 	{ "new", "KIND NAME [-o DIR]", "a plugin of your own from a template", quern_command_new },

@@ -51,6 +51,18 @@ static char *header_of(const quern_series *s) {
 	return text.data;
 }
 
+/* One row into the statistics; false if it is not what a run writes: a finite number for each column, and no more. */
+static bool read_row(quern_series *s, char *line) {
+	char *rest = line, *end;
+	for (size_t c = 0; c < s->n; c++) {
+		const char *word = strsep(&rest, ",");
+		const double value = word ? strtod(word, &end) : NAN;
+		if (!isfinite(value) || end == word || *end != (c + 1 < s->n ? 0 : '\n')) return false;
+		note(&s->column[c], value);
+	}
+	return !rest;
+}
+
 /* Header and rows as far as they are wanted, read back into the statistics; returns where they end, -1 if they do not
  * stand there. */
 static long read_back(quern_series *s, FILE *file, int64_t rows) {
@@ -58,13 +70,8 @@ static long read_back(quern_series *s, FILE *file, int64_t rows) {
 	size_t size = 0;
 	bool good = getline(&line, &size, file) > 0 && !strcmp(line, header);
 	for (int64_t k = 0; good && k < rows; k++) {
-		good = getline(&line, &size, file) > 0 && strchr(line, '\n');
-		char *rest = line, *word;
-		for (size_t c = 0; good && c < s->n; c++) {
-			word = strsep(&rest, ",");
-			good = word != NULL;
-			if (good) note(&s->column[c], strtod(word, NULL));
-		}
+		const ssize_t length = getline(&line, &size, file);
+		good = length > 0 && (size_t)length == strlen(line) && read_row(s, line);
 	}
 	free(line);
 	free(header);

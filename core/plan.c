@@ -290,6 +290,7 @@ static void miss_asked(quern_plan *p, size_t k) {
 	const char **known = quern_take(p->n_uses + 1, sizeof(char *));
 	for (size_t i = 0; i < p->n_uses; i++) known[i] = p->uses[i].field;
 	const char *near = quern_nearest(s->fields[k], known);
+	if (near && !strcmp(near, s->fields[k])) near = NULL; /* somebody could make it, and nobody asks for it */
 	quern_report_add(s->report, s->field_marks[k],
 		"scene: output.fields: nothing in this scene makes '%s'%s%s%s", s->fields[k],
 		near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
@@ -517,15 +518,7 @@ static void mark_kept(quern_plan *p) {
 	}
 }
 
-/* What a settled state consists of. */
-static void mark_settles(quern_plan *p) {
-	for (size_t i = 0; i < p->n_uses; i++) {
-		const quern_plan_use *u = &p->uses[i];
-		if (u->target < 0 || u->stage < 0 || p->stages[u->stage].phase != QUERN_GRAINS) continue;
-		quern_field *field = &p->store.fields[u->target];
-		if (changes(u->row) && !(u->row->flags & QUERN_RELEASED) && field->state) field->settles = true;
-	}
-}
+bool quern_plan_settles(const quern_use *row) { return changes(row) && !(row->flags & QUERN_RELEASED); }
 
 static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(const quern_use *)) {
 	for (size_t i = 0; i < p->n_uses; i++)
@@ -535,6 +528,24 @@ static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(co
 static bool reads_others(const quern_use *row) { return row->flags & QUERN_OTHERS; }
 static bool renews(const quern_use *row) { return row->access == QUERN_UPDATE || row->access == QUERN_WRITE; }
 static bool adds(const quern_use *row) { return row->access == QUERN_ADD; }
+
+/* Before the first frame, whoever looks at it finds it as the grains' own phase has left it. */
+static bool is_looked_at(const quern_plan *p, int field) {
+	bool renewed = false;
+	for (int i = 0; i < (int)p->n_stages; i++)
+		renewed = renewed || (p->stages[i].phase == QUERN_OUTPUT && stage_has(p, i, field, renews));
+	return p->store.fields[field].kept && !renewed;
+}
+
+/* What a settled state consists of. */
+static void mark_settles(quern_plan *p) {
+	for (size_t i = 0; i < p->n_uses; i++) {
+		const quern_plan_use *u = &p->uses[i];
+		if (u->target < 0 || u->stage < 0 || p->stages[u->stage].phase != QUERN_GRAINS) continue;
+		quern_field *field = &p->store.fields[u->target];
+		if (quern_plan_settles(u->row) && (field->state || is_looked_at(p, u->target))) field->settles = true;
+	}
+}
 
 static void mark_swaps_and_zeros(quern_plan *p) {
 	bool *zeroed = quern_take(p->store.n_fields, sizeof(bool));

@@ -60,5 +60,7 @@ void quern_plan_destroy(quern_plan *);
 void quern_plan_refresh(quern_plan *);
 
 extern const char *const quern_phase_names[];
-/* bytes of one entry of a set; with `scratch` false only what is stored */
+/* Whether a use by a stage of grains changes its field while they settle. */
+bool quern_plan_settles(const quern_use *);
+/* Bytes of one entry of a set, of what is stored. */
 size_t quern_plan_entry_bytes(const quern_plan *, int set);

@@ -6,6 +6,7 @@
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 enum { PAUSES = 2000, YIELDS = 200 }; /* some 50 us of each */
@@ -31,7 +32,7 @@ struct quern_pool {
 	_Alignas(64) _Atomic uint32_t n;
 	void (*_Atomic body)(void *, uint32_t, uint32_t);
 	void *_Atomic arg;
-	_Atomic bool stop, caller_waits;
+	_Atomic bool stop, caller_waits, busy;
 	_Atomic uint32_t asleep;
 	pthread_mutex_t lock;
 	pthread_cond_t work, end;
@@ -68,7 +69,13 @@ static void take_part(quern_pool *p, uint32_t round, uint32_t worker) {
 		else sched_yield();                                                                                  \
 	}
 
+/* Where an endless recursion leaves no stack, a handler needs one of its own: the thread's own first bytes. */
 static void *help(void *arg) {
+#ifndef QUERN_SANITIZED
+	_Alignas(64) char crash[1 << 16];
+	const stack_t own = { .ss_sp = crash, .ss_size = sizeof crash };
+	sigaltstack(&own, NULL);
+#endif
 	const helper *h = arg;
 	quern_pool *p = h->pool;
 	uint32_t round = 0;
@@ -163,11 +170,7 @@ static void wait_for_all(quern_pool *p, uint32_t n) {
 	pthread_mutex_unlock(&p->lock);
 }
 
-void quern_pool_each(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, uint32_t), void *arg) {
-	if (p->workers == 1 || n < 2) {
-		for (uint32_t i = 0; i < n; i++) body(arg, i, 0);
-		return;
-	}
+static void run_round(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, uint32_t), void *arg) {
 	const uint32_t round = round_of(atomic_load(&p->ticket)) + 1;
 	atomic_store(&p->done, 0);
 	atomic_store(&p->body, body);
@@ -177,6 +180,18 @@ void quern_pool_each(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, u
 	wake(p);
 	take_part(p, round, 0);
 	wait_for_all(p, n);
+}
+
+/* A call within a call would do its work on one thread, and wait for ever on more: nobody shall rely on it. */
+void quern_pool_each(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, uint32_t), void *arg) {
+	if (atomic_exchange(&p->busy, true)) {
+		fputs("quern: parallel() was called within parallel()\n", stderr);
+		abort();
+	}
+	if (p->workers > 1 && n > 1) run_round(p, n, body, arg);
+	else
+		for (uint32_t i = 0; i < n; i++) body(arg, i, 0);
+	atomic_store(&p->busy, false);
 }
 
 void *quern_pool_scratch(quern_pool *p, uint32_t worker, size_t bytes) {

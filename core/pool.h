@@ -12,7 +12,8 @@ void quern_pool_destroy(quern_pool *);
 uint32_t quern_pool_workers(const quern_pool *);
 
 /* Calls body(arg, i, worker) once for every i < n. Which worker gets which i is not determined, so a body writes
- * nothing that another i reads or writes. Only one thread may call it, and no body. */
+ * nothing that another i reads or writes. Only one thread may call it, and no body: that ends the
+ * program. */
 void quern_pool_each(
 	quern_pool *, uint32_t n, void (*body)(void *arg, uint32_t i, uint32_t worker), void *arg);
 

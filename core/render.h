@@ -15,7 +15,7 @@ typedef struct render_cloud {
 	double *size;          /* m, radius of a grain, edge of a point or cell */
 	double *value;         /* what colours it; NULL: nothing does */
 	uint8_t *sort;         /* RENDER_*, or a cell's zone; NULL: all zero */
-	bool unreadable;       /* there are positions, and they cannot be used */
+	bool unreadable;       /* there are positions or sizes, and they cannot be used */
 } render_cloud;
 
 typedef struct render_frame {
@@ -35,7 +35,13 @@ typedef struct render_frame {
  * "velocity" of all that have it, or NULL for the speed where it is known. On a fault returns an exit status and one sentence. */
 int quern_render_frame_read(
 	render_frame *, const char *folder, int64_t number, const char *field, quern_text *why);
+/* The same of one file, without the run's scene. */
+int quern_render_frame_read_file(
+	render_frame *, const char *path, int64_t number, const char *field, quern_text *why);
 void quern_render_frame_finish(render_frame *);
+
+/* m, what no place and no size in a run can be: a domain ends within a tenth of it. */
+#define RENDER_FAR 1e10
 
 /* ---- render_colour.c: numbers to colours, and numbers to read ---- */
 
@@ -55,6 +61,8 @@ typedef struct render_range {
 } render_range;
 
 render_range quern_render_range_of(const render_frame *);
+/* The least and greatest that colours stand for lie within it; what is beyond has none. */
+#define RENDER_MOST_VALUE 1e150
 double quern_render_share(const render_range *, double value); /* into [0, 1] */
 double quern_render_round_step(double wanted); /* 1, 2 or 5 times a power of ten, at most `wanted` */
 

@@ -46,7 +46,10 @@ static int by_value(const void *a, const void *b) {
 	return (x > y) - (x < y);
 }
 
-/* All finite values but those of fixed grains, which are not coloured; sorted. */
+/* Values that can be drawn. */
+static bool has_colour(double value) { return fabs(value) <= RENDER_MOST_VALUE; }
+
+/* All of them but those of fixed grains, which are not coloured; sorted. */
 static double *gather(const render_frame *f, size_t *n) {
 	const render_cloud *clouds[3] = { &f->grains, &f->points, &f->cells };
 	double *all = quern_take(f->grains.n + f->points.n + f->cells.n + 1, sizeof(double));
@@ -54,7 +57,7 @@ static double *gather(const render_frame *f, size_t *n) {
 	for (int k = 0; k < 3; k++)
 		for (size_t i = 0; clouds[k]->value && i < clouds[k]->n; i++) {
 			const bool shown = k != 0 || clouds[k]->sort[i] != RENDER_FIXED;
-			if (shown && isfinite(clouds[k]->value[i])) all[(*n)++] = clouds[k]->value[i];
+			if (shown && has_colour(clouds[k]->value[i])) all[(*n)++] = clouds[k]->value[i];
 		}
 	qsort(all, *n, sizeof(double), by_value);
 	return all;
@@ -67,8 +70,9 @@ static void set_ends(render_range *range, const double *all, size_t n, bool sign
 	if (high - middle > 2 * (most - middle) && most > middle) high = most, range->above = true;
 	if (middle - low > 2 * (middle - least) && middle > least) low = least, range->below = true;
 	if (!signs || (low > 0 && low < 0.5 * high)) low = 0, range->below = false;
-	if (!(high > low)) { /* one value: some range around it */
-		const double some = fabs(high) > 0 ? fabs(high) : 1;
+	/* one value, or too close to tell apart by marks that are numbers: some range around it */
+	if (!(high - low > fmax(1e-9 * fmax(fabs(high), fabs(low)), 1 / RENDER_MOST_VALUE))) {
+		const double some = fabs(high) > 1 / RENDER_MOST_VALUE ? fabs(high) : 1;
 		if (low < 0) low -= 0.5 * some;
 		high = low + some;
 	}

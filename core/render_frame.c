@@ -1,3 +1,4 @@
+#include "child.h"
 #include "command.h"
 #include "h5.h"
 #include "render.h"
@@ -48,13 +49,24 @@ static double *read_table(hid_t group, const char *name, size_t rows, size_t *co
 	return table;
 }
 
+/* One number for each, or NULL; one that is there and cannot be used is damage. */
+static double *read_column(hid_t group, const char *name, render_cloud *cloud) {
+	size_t columns = 0;
+	if (!cloud->n || H5Lexists(group, name, H5P_DEFAULT) <= 0) return NULL;
+	double *table = read_table(group, name, cloud->n, &columns);
+	cloud->unreadable |= !table || columns != 1;
+	return table;
+}
+
 /* Positions, and nothing else yet; an empty cloud if the group is missing. */
 static void read_positions(hid_t group, render_cloud *cloud) {
 	size_t rows, columns;
-	if (group < 0 || !quern_h5_read_size(group, "position", &rows, &columns) || columns != 3) return;
-	double *table = read_table(group, "position", rows, &columns);
+	if (group < 0 || H5Lexists(group, "position", H5P_DEFAULT) <= 0) return;
+	double *table = NULL;
+	if (quern_h5_read_size(group, "position", &rows, &columns) && columns == 3)
+		table = read_table(group, "position", rows, &columns);
 	cloud->unreadable = !table;
-	for (size_t i = 0; table && i < 3 * rows; i++) cloud->unreadable |= !isfinite(table[i]);
+	for (size_t i = 0; table && i < 3 * rows; i++) cloud->unreadable |= !(fabs(table[i]) <= RENDER_FAR);
 	if (cloud->unreadable) {
 		free(table);
 		return;
@@ -65,14 +77,14 @@ static void read_positions(hid_t group, render_cloud *cloud) {
 }
 
 static void read_grains(hid_t group, render_cloud *cloud) {
-	size_t columns;
 	read_positions(group, cloud);
-	double *radius = cloud->n ? read_table(group, "radius", cloud->n, &columns) : NULL;
-	double *weight = cloud->n ? read_table(group, "weight", cloud->n, &columns) : NULL;
-	double *fixed = cloud->n ? read_table(group, "fixed", cloud->n, &columns) : NULL;
+	double *radius = read_column(group, "radius", cloud);
+	double *weight = read_column(group, "weight", cloud);
+	double *fixed = read_column(group, "fixed", cloud);
 	cloud->sort = quern_take(cloud->n + 1, 1);
 	for (size_t i = 0; i < cloud->n; i++) {
 		cloud->size[i] = radius ? radius[i] : 0;
+		cloud->unreadable |= !(cloud->size[i] >= 0 && cloud->size[i] <= RENDER_FAR);
 		if (weight && weight[i] < 1) cloud->sort[i] = RENDER_SHARED;
 		if (fixed && fixed[i] != 0) cloud->sort[i] = RENDER_FIXED;
 	}
@@ -98,21 +110,21 @@ static void limit_sizes(render_cloud *cloud) {
 }
 
 static void read_points(hid_t group, render_cloud *cloud, int dimension) {
-	size_t columns;
 	read_positions(group, cloud);
-	double *volume = cloud->n ? read_table(group, "volume", cloud->n, &columns) : NULL;
-	for (size_t i = 0; i < cloud->n; i++)
+	double *volume = read_column(group, "volume", cloud);
+	for (size_t i = 0; i < cloud->n; i++) {
 		cloud->size[i] = volume ? (dimension == 2 ? sqrt(volume[i]) : cbrt(volume[i])) : 0;
-	if (volume) limit_sizes(cloud);
+		cloud->unreadable |= !(cloud->size[i] >= 0 && cloud->size[i] <= RENDER_FAR);
+	}
+	if (volume && !cloud->unreadable) limit_sizes(cloud);
 	free(volume);
 }
 
 /* Cells follow each other along x inside a block: the smallest step is a cell's edge. */
 static double read_cells(hid_t group, render_cloud *cloud) {
-	size_t columns;
 	double edge = INFINITY;
 	read_positions(group, cloud);
-	double *zone = cloud->n ? read_table(group, "zone", cloud->n, &columns) : NULL;
+	double *zone = read_column(group, "zone", cloud);
 	if (zone) cloud->sort = quern_take(cloud->n + 1, 1);
 	for (size_t i = 0; i + 1 < cloud->n; i++) {
 		const double step = cloud->position[i + 1][0] - cloud->position[i][0];
@@ -151,6 +163,19 @@ static wanted_field parse_field(const char *text) {
 	return w;
 }
 
+/* A byte that is no UTF-8 would end all drawing. */
+static void make_legible(char *text) {
+	for (unsigned char *c = (unsigned char *)text; *c;) {
+		const int more = *c < 0x80 ? 0 : *c >= 0xc2 && *c < 0xe0 ? 1 : *c >= 0xe0 && *c < 0xf0 ? 2 : 3;
+		bool good = *c >= 0x20 && *c != 0x7f && *c < 0xf5 && (*c < 0x80 || *c >= 0xc2);
+		for (int k = 1; good && k <= more; k++) good = (c[k] & 0xc0) == 0x80;
+		good = good && !(*c == 0xe0 && c[1] < 0xa0) && !(*c == 0xed && c[1] >= 0xa0) &&
+			   !(*c == 0xf0 && c[1] < 0x90) && !(*c == 0xf4 && c[1] >= 0x90);
+		if (!good) *c = '?';
+		c += good ? more + 1 : 1;
+	}
+}
+
 /* True if the group has the field and its values were taken. */
 static bool take_values(hid_t group, const wanted_field *w, render_cloud *cloud, render_frame *f) {
 	size_t columns;
@@ -171,6 +196,7 @@ static bool take_values(hid_t group, const wanted_field *w, render_cloud *cloud,
 	f->signs = columns == 1 || w->component >= 0;
 	const hid_t set = H5Dopen2(group, w->name, H5P_DEFAULT);
 	if (!quern_h5_read_text(set, "unit", f->unit, sizeof f->unit)) snprintf(f->unit, sizeof f->unit, "1");
+	make_legible(f->unit);
 	H5Dclose(set);
 	free(table);
 	return true;
@@ -218,10 +244,11 @@ static bool read_head(hid_t file, render_frame *f) {
 	int64_t dimension = 0;
 	const bool good = quern_h5_read_text(file, "format", format, sizeof format) &&
 					  !strncmp(format, "quern-frame ", 12) && quern_h5_read_number(file, "time", &f->time) &&
-					  quern_h5_read_integer(file, "dimension", &dimension) && dimension >= 2 &&
-					  dimension <= 3;
+					  isfinite(f->time) && quern_h5_read_integer(file, "dimension", &dimension) &&
+					  dimension >= 2 && dimension <= 3;
 	f->dimension = (int)dimension;
 	quern_h5_read_text(file, "name", f->name, sizeof f->name);
+	make_legible(f->name);
 	return good;
 }
 
@@ -233,7 +260,7 @@ static int read_clouds(render_frame *f, hid_t file, const char *path, const char
 	read_points(group[1], &f->points, f->dimension);
 	f->cell = read_cells(group[2], &f->cells);
 	if (f->grains.unreadable || f->points.unreadable || f->cells.unreadable) {
-		quern_text_add(why, "%s is damaged: its positions cannot be read, or are no numbers", path);
+		quern_text_add(why, "%s is damaged: its positions or sizes cannot be read, or are none", path);
 		status = QUERN_EXIT_SCENE;
 	} else if (!f->grains.n && !f->points.n) {
 		quern_text_add(why, "%s holds neither grains nor points", path);
@@ -257,6 +284,49 @@ static quern_scene *scene_of(const char *folder) {
 	return NULL;
 }
 
+int quern_render_frame_read_file(
+	render_frame *f, const char *path, int64_t number, const char *field, quern_text *why) {
+	*f = (render_frame) { .number = number };
+	const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+	int status = QUERN_EXIT_SCENE;
+	if (file < 0) quern_text_add(why, "%s cannot be read: it is missing or damaged", path);
+	else if (!read_head(file, f)) quern_text_add(why, "%s is no frame of this program, or is damaged", path);
+	else status = read_clouds(f, file, path, field, why);
+	if (file >= 0) H5Fclose(file);
+	return status;
+}
+
+/* ---- damage ---- */
+
+typedef struct {
+	const char *path, *field;
+} trial;
+
+/* What the library prints as it crashes is nobody's sentence. */
+static void try_reading(void *arg) {
+	const trial *t = arg;
+	render_frame f;
+	quern_text why = { 0 };
+	if (!freopen("/dev/null", "w", stderr)) return;
+	quern_render_frame_read_file(&f, t->path, 0, t->field, &why);
+	quern_text_finish(&why);
+	quern_render_frame_finish(&f);
+}
+
+/* Frames have no checksum, and a damaged one can crash the library that reads it: so a child reads it first. */
+static bool is_readable(const char *path, const char *field, quern_text *why) {
+	enum { SECONDS = 600 };
+	char what[80];
+	trial t = { path, field };
+	const quern_child how = quern_child_run(try_reading, &t, SECONDS);
+	if (how.end != QUERN_CHILD_CRASHED && how.end != QUERN_CHILD_LATE) return true;
+	quern_child_say(&how, SECONDS, what);
+	quern_text_add(why, "%s is damaged: reading it %s", path, what);
+	return false;
+}
+
+/* ---- a run's ---- */
+
 int quern_render_frame_read(
 	render_frame *f, const char *folder, int64_t number, const char *field, quern_text *why) {
 	int64_t first = 0, last = 0;
@@ -265,17 +335,16 @@ int quern_render_frame_read(
 		quern_text_add(why, "%s/frames holds no frames: name the folder of a run", folder);
 		return QUERN_EXIT_SCENE;
 	}
-	if (number < 0) f->number = last;
-	char *path = quern_format("%s/frames/%06lld.h5", folder, (long long)f->number);
-	const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-	int status = QUERN_EXIT_SCENE;
-	if (file < 0 && (f->number < first || f->number > last))
-		quern_text_add(why, "%s has no frame %lld; its frames are %lld to %lld", folder, (long long)f->number,
+	if (number < 0) number = last;
+	if (number < first || number > last) {
+		quern_text_add(why, "%s has no frame %lld; its frames are %lld to %lld", folder, (long long)number,
 			(long long)first, (long long)last);
-	else if (file < 0) quern_text_add(why, "%s cannot be read: it is missing or damaged", path);
-	else if (!read_head(file, f)) quern_text_add(why, "%s is no frame of this program", path);
-	else status = read_clouds(f, file, path, field, why);
-	if (file >= 0) H5Fclose(file);
+		return QUERN_EXIT_SCENE;
+	}
+	char *path = quern_format("%s/frames/%06lld.h5", folder, (long long)number);
+	const int status = is_readable(path, field, why)
+						   ? quern_render_frame_read_file(f, path, number, field, why)
+						   : QUERN_EXIT_SCENE;
 	if (status == QUERN_EXIT_DONE) f->scene = scene_of(folder);
 	free(path);
 	return status;

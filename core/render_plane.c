@@ -44,12 +44,18 @@ void quern_render_disc(
 	cairo_fill(c);
 }
 
+/* What lies beyond is left out: far away, Cairo's numbers of pixels begin again from the other side. */
+static bool is_inside(const render_view *v, const double at[3], double reach) {
+	return at[0] > -reach && at[1] > -reach && at[0] < v->width + reach && at[1] < v->height + reach;
+}
+
 static void draw_grains(cairo_t *c, const render_style *s) {
 	const render_cloud *cloud = &s->frame->grains;
 	for (size_t i = 0; i < cloud->n; i++) {
 		double at[3];
 		quern_render_project(s->view, cloud->position[i], at);
 		const double radius = fmax(cloud->size[i] * s->view->scale, 0.7);
+		if (!is_inside(s->view, at, radius + s->line)) continue;
 		quern_render_disc(
 			c, at[0], at[1], radius, quern_render_colour_of(s, cloud, i), cloud->sort[i], s->line);
 	}
@@ -61,6 +67,7 @@ static void draw_squares(cairo_t *c, const render_style *s, const render_cloud *
 		if (cloud == &s->frame->cells && cloud->value[i] == 0) continue;
 		quern_render_project(s->view, cloud->position[i], at);
 		const double edge = fmax(share * cloud->size[i] * s->view->scale, 1.2);
+		if (!is_inside(s->view, at, edge)) continue;
 		quern_render_set(c, quern_render_colour_of(s, cloud, i), 1);
 		cairo_rectangle(c, at[0] - 0.5 * edge, at[1] - 0.5 * edge, edge, edge);
 		cairo_fill(c);
@@ -77,6 +84,7 @@ static void draw_outlines(cairo_t *c, const render_style *s) {
 			double at[3];
 			quern_render_project(s->view, clouds[k]->position[i], at);
 			const double radius = k == 0 ? clouds[k]->size[i] * s->view->scale : 0.7 * s->line;
+			if (!is_inside(s->view, at, radius + s->line)) continue;
 			cairo_new_sub_path(c);
 			cairo_arc(c, at[0], at[1], radius, 0, 2 * M_PI);
 			cairo_stroke(c);
@@ -267,7 +275,9 @@ static void draw_domain(cairo_t *c, const render_style *s) {
 	if (!s->frame->scene) return;
 	quern_render_project(s->view, s->frame->scene->general.lower, low);
 	quern_render_project(s->view, s->frame->scene->general.upper, high);
-	cairo_rectangle(c, low[0], high[1], high[0] - low[0], low[1] - high[1]);
+	const double left = fmax(low[0], -9 * s->line), right = fmin(high[0], s->view->width + 9 * s->line);
+	const double top = fmax(high[1], -9 * s->line), bottom = fmin(low[1], s->view->height + 9 * s->line);
+	cairo_rectangle(c, left, top, right - left, bottom - top);
 	quern_render_set(c, quern_render_ink, 0.5);
 	cairo_set_line_width(c, s->line);
 	cairo_stroke(c);

@@ -36,9 +36,16 @@ typedef struct {
 	int x[2], y[2];
 } window;
 
+/* From first to last; none, with the first behind the last, where it lies beside the picture. */
+static void pixels(double at, double reach, int size, int out[2]) {
+	out[0] = (int)fmin(fmax(floor(at - reach), 0), size);
+	out[1] = (int)fmax(fmin(ceil(at + reach), size - 1), -1);
+}
+
 static window around(const raster *r, const double at[3], double reach) {
-	const window w = { { (int)fmax(floor(at[0] - reach), 0), (int)fmin(ceil(at[0] + reach), r->width - 1) },
-		{ (int)fmax(floor(at[1] - reach), 0), (int)fmin(ceil(at[1] + reach), r->height - 1) } };
+	window w;
+	pixels(at[0], reach, r->width, w.x);
+	pixels(at[1], reach, r->height, w.y);
 	return w;
 }
 

@@ -42,7 +42,10 @@ static void crop(render_view *v, const render_frame *f) {
 			floor = fmin(floor, f->grains.position[i][up] - f->grains.size[i]);
 	if (floor < v->low[up] && floor > v->low[up] - 0.5 * most) v->low[up] = floor;
 	if (f->dimension == 2) v->low[2] = v->high[2] = 0;
-	if (!(most > 0)) most = 1;
+	/* a single place; or so little, so far from the origin, that its numbers hardly differ */
+	double far = 0;
+	for (int k = 0; k < f->dimension; k++) far = fmax(far, fmax(fabs(v->low[k]), fabs(v->high[k])));
+	if (!(most > fmax(1e-9 * far, 1e-12))) most = 1;
 	const double margin = (f->dimension == 2 ? 0.03 : 0.02) * most;
 	for (int k = 0; k < f->dimension; k++) {
 		if (f->dimension == 3 && k == up) continue;

@@ -37,10 +37,6 @@ static void add(quern_report *report, quern_mark mark, severity kind, const char
 	report->follow += kind == FOLLOWS;
 }
 
-void quern_report_addv(quern_report *report, quern_mark mark, const char *fmt, va_list list) {
-	add(report, mark, FAULT, fmt, list);
-}
-
 void quern_report_add(quern_report *report, quern_mark mark, const char *fmt, ...) {
 	va_list list;
 	va_start(list, fmt);

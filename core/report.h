@@ -17,8 +17,6 @@ void quern_report_destroy(quern_report *);
 
 /* Adds one fault. A message says what was found and what is allowed, in one sentence without a full stop. */
 void quern_report_add(quern_report *, quern_mark, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
-void quern_report_addv(quern_report *, quern_mark, const char *fmt, va_list)
-	__attribute__((format(printf, 3, 0)));
 /* A fault that may follow from others: it counts as they do, and is printed only where there is no other. */
 void quern_report_follow(quern_report *, quern_mark, const char *fmt, ...)
 	__attribute__((format(printf, 3, 4)));

@@ -138,7 +138,8 @@ void quern_run_destroy(quern_run *run) {
 /* How far from a whole number of intervals still counts as one, in intervals: both times may be written as decimals. */
 static double slack(double intervals) { return fmin(1e-9 * fmax(intervals, 1), 0.01); }
 
-double quern_run_due(const quern_run *run, double time) {
+/* s, when the first frame after `time` is due: at whole multiples of output.every, and at time.end. */
+static double due(const quern_run *run, double time) {
 	const quern_general *g = &run->scene->general;
 	const double last = g->end / g->every, now = time / g->every;
 	const double next = floor(now + slack(now)) + 1;
@@ -168,7 +169,7 @@ bool quern_run_rejoin(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	const double now = quern_run_time(run), intervals = now / g->every;
 	if (c->frame >= 0 && g->end / g->every < intervals - slack(intervals)) return false;
-	const bool same = quern_run_due(run, c->begin) == c->end || quern_run_due(run, now) == c->end;
+	const bool same = due(run, c->begin) == c->end || due(run, now) == c->end;
 	if (c->steps_in && !same) quern_run_cut(run);
 	return true;
 }
@@ -271,7 +272,7 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 quern_status quern_run_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
-	const double end = quern_run_due(run, c->end), length = end - c->end;
+	const double end = due(run, c->end), length = end - c->end;
 	double hard;
 	char hard_reason[200];
 	double limit = quern_run_limit(run, &hard, run->limit_reason, hard_reason);
@@ -348,18 +349,18 @@ static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
 
 quern_status quern_run_setup(quern_run *run) { return run_phase(run, QUERN_SETUP, 0); }
 
-/* The grains' own limit, not the continuum's. */
+/* The least limit of those who step grains, not the continuum's. */
 static double settle_dt(quern_run *run) {
-	double hard;
-	char reason[200];
-	double dt = quern_run_limit(run, &hard, run->limit_reason, reason);
+	double least = INFINITY;
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
+		if (!steps_grains(run, s) || !s->ops->limit) continue;
 		const quern_step step = quern_run_record(run, s);
+		double hard;
 		char why[160];
-		if (steps_grains(run, s) && s->ops->limit) dt = limit_of(s, &step, &hard, why);
+		least = fmin(least, limit_of(s, &step, &hard, why));
 	}
-	return isfinite(dt) ? dt : 0;
+	return isfinite(least) ? least : 0;
 }
 
 double quern_run_settling(quern_run *run, double *dt) {

@@ -74,8 +74,6 @@ bool quern_run_rejoin(quern_run *);
 void quern_run_cut(quern_run *);
 
 double quern_run_time(const quern_run *); /* s since the release */
-/* s, when the first frame after `time` is due: at whole multiples of output.every, and at time.end. */
-double quern_run_due(const quern_run *, double time);
 /* True once the frame of time.end is written; a time that is later only by round-off counts as that. */
 bool quern_run_over(const quern_run *);
 /* The step record for code that is called between stages. */

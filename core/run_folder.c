@@ -200,10 +200,10 @@ enum { HEADING = sizeof heading - 1 + 16 + 1 };
 static bool is_own_scene(const char *path) {
 	char line[HEADING + 1] = "";
 	uint64_t hash;
-	FILE *file = fopen(path, "r");
-	const bool read = file && fread(line, HEADING, 1, file) == 1;
-	if (file) fclose(file);
-	return read && !strncmp(line, heading, sizeof heading - 1) && line[HEADING - 1] == '\n' &&
+	const int fd = quern_open_file(path);
+	const bool whole = fd >= 0 && read(fd, line, HEADING) == HEADING;
+	if (fd >= 0) close(fd);
+	return whole && !strncmp(line, heading, sizeof heading - 1) && line[HEADING - 1] == '\n' &&
 		   quern_hash_file(path, HEADING, &hash) && strtoull(line + sizeof heading - 1, NULL, 16) == hash;
 }
 
@@ -288,8 +288,12 @@ static void remove_one(void *context, const char *path, int64_t number) {
 
 void quern_run_folder_clear(const quern_run_folder *f, const quern_scene *scene) {
 	inputs in = inputs_of(scene);
+	char *own = in_folder(f, "scene.yaml"), *input = in_folder(f, "input.yaml");
+	if (is_input(&in, own)) add_input(&in, input); /* it is what that one was made from */
 	visit_all(f, remove_one, &in);
 	free(in.at);
+	free(own);
+	free(input);
 	for (const char *const *name = names; *name; name++) {
 		char *path = in_folder(f, *name);
 		rmdir(path); /* stays where anything else is in it */

@@ -20,7 +20,8 @@ void quern_run_folder_give_back(quern_run_folder *);
 bool quern_run_folder_is_free(const quern_run_folder *, const quern_scene *, bool force, quern_text *why);
 /* Whether a run may begin where one was stopped before its first checkpoint. */
 bool quern_run_folder_is_begun(const quern_run_folder *, quern_text *why);
-/* Removes what runs leave and nothing else; the scene and its files stay. */
+/* Removes what runs leave and nothing else; the scene and its files stay, and with the folder's own scene.yaml the text that
+ * it was made from. */
 void quern_run_folder_clear(const quern_run_folder *, const quern_scene *);
 /* Removes frames from this number on, with their views. */
 void quern_run_folder_trim(const quern_run_folder *, int64_t frames);

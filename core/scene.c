@@ -50,6 +50,13 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 		.choices = instructions, .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 
+const quern_general_list quern_general_lists[] = {
+	{ "domain.periodic", "true or false",
+		"Directions in which the domain repeats itself, one per dimension; default: none." },
+	{ "output.fields", "text", "Fields to write out beside those that frames always have: grain.velocity." },
+	{ NULL, NULL, NULL }
+};
+
 static const char *const general_also[] = { "domain.periodic", "output.fields", "observe", "bodies", "grains",
 	"continuum", "hybrid", NULL };
 

@@ -90,6 +90,11 @@ quern_node *quern_scene_tree(const quern_scene *, const quern_naming *);
 char *quern_scene_resolved(const quern_scene *, const quern_naming *);
 /* The rows of the core's own keys, for schema and describe. */
 extern const quern_param quern_general_rows[];
+/* Keys of the core that take lists, which rows do not describe; NULL-name terminated. */
+typedef struct quern_general_list {
+	const char *name, *item, *doc;
+} quern_general_list;
+extern const quern_general_list quern_general_lists[];
 /* Sections and the solver that reads each by default, NULL-name terminated. */
 typedef struct quern_section_name {
 	const char *section, *solver;

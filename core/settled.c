@@ -19,11 +19,22 @@ static bool settles(const quern_field *field) { return field->settles || field->
 
 /* ---- what a settled state depends on ---- */
 
-/* Sections whose solver settles, and those whose plugins it borrows. */
-static bool concerns(const quern_scene *scene, const quern_section *section) {
+/* A section that settles, or has a say in how others do. */
+static bool acts(const quern_plan *plan, const quern_section *section) {
+	for (size_t i = 0; i < plan->n_uses; i++) {
+		const quern_plan_use *u = &plan->uses[i];
+		if (u->target < 0 || u->stage < 0 || plan->stages[u->stage].section != section) continue;
+		if (plan->stages[u->stage].phase == QUERN_GRAINS && quern_plan_settles(u->row)) return true;
+	}
+	return section->ops->settled != NULL;
+}
+
+/* Sections that act while settling, and those whose plugins they borrow. */
+static bool concerns(const quern_run *run, const quern_section *section) {
+	const quern_scene *scene = run->scene;
 	for (size_t i = 0; i < scene->n_sections; i++) {
 		const quern_section *s = &scene->sections[i];
-		if (!s->ops->settled) continue;
+		if (!acts(run->plan, s)) continue;
 		if (s == section) return true;
 		for (size_t k = 0; k < s->n_slots; k++) {
 			const char *from = s->slots[k].slot->same_as;
@@ -53,12 +64,39 @@ static void add_section(
 			add_plugin(run, section->slots[k].filling[i].instance->file, out);
 }
 
-/* All that the state depends on, as a text; NULL if nothing settles. */
-static char *dependencies(quern_run *run) {
+static bool is_meant(const quern_run *run, int set) {
+	for (size_t k = 0; k < run->plan->store.n_fields; k++)
+		if (run->plan->store.fields[k].set == set && run->plan->store.fields[k].settles) return true;
+	return false;
+}
+
+/* Whoever has had a hand in the set-up: what settles begins with these numbers. */
+static uint64_t beginning(const quern_run *run) {
+	const quern_store *store = &run->plan->store;
+	uint64_t hash = quern_hash("", 0);
+	for (size_t k = 0; k < store->n_fields; k++) {
+		const quern_field *field = &store->fields[k];
+		const quern_set_store *set = &store->sets[field->set];
+		const bool begins = field->shape == QUERN_ID || (field->settles && field->state);
+		if (!begins || field->local || set->rows || !is_meant(run, field->set)) continue;
+		hash = quern_hash_more(hash, field->name, strlen(field->name));
+		for (uint8_t c = 0; c < field->n_components; c++)
+			hash = quern_hash_more(hash, field->data[field->now][c], set->n * quern_field_bytes(field));
+	}
+	return hash;
+}
+
+static bool anything_settles(const quern_scene *scene) {
+	for (size_t i = 0; i < scene->n_sections; i++)
+		if (scene->sections[i].ops->settled) return true;
+	return false;
+}
+
+char *quern_settled_key(const quern_run *run) {
 	static const char *const keys[] = { "dimension", "seed", "gravity", "domain" };
 	uint64_t program = 0;
 	quern_text out = { 0 };
-	bool any = false;
+	if (!anything_settles(run->scene)) return NULL;
 	quern_hash_file("/proc/self/exe", 0, &program);
 	quern_text_add(&out, "quern " QUERN_VERSION " %016llx\n", (unsigned long long)program);
 	quern_node *root = quern_run_tree(run);
@@ -70,17 +108,15 @@ static char *dependencies(quern_run *run) {
 	}
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *section = &run->scene->sections[i];
-		if (!concerns(run->scene, section)) continue;
-		any = true;
-		add_section(run, section, root, &out);
+		if (concerns(run, section)) add_section(run, section, root, &out);
 	}
 	quern_node_destroy(root);
-	if (any) return out.data;
-	quern_text_finish(&out);
-	return NULL;
+	quern_text_add(&out, "beginning %016llx\n", (unsigned long long)beginning(run));
+	return out.data;
 }
 
-char *quern_settled_folder(void) {
+/* NULL where QUERN_CACHE is empty, or no home is known: then nothing is kept. */
+static char *cache_folder(void) {
 	const char *own = getenv("QUERN_CACHE"), *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
 	if (own) return *own ? quern_copy(own) : NULL;
 	if (cache && *cache == '/') return quern_format("%s/quern", cache);
@@ -88,12 +124,6 @@ char *quern_settled_folder(void) {
 }
 
 /* ---- taking ---- */
-
-static bool is_meant(const quern_run *run, int set) {
-	for (size_t k = 0; k < run->plan->store.n_fields; k++)
-		if (run->plan->store.fields[k].set == set && run->plan->store.fields[k].settles) return true;
-	return false;
-}
 
 static int id_field(const quern_store *store, int set) {
 	for (int k = 0; k < (int)store->n_fields; k++)
@@ -123,7 +153,7 @@ static int32_t *places(quern_run *run, const quern_state_group *g, int set) {
 		for (uint32_t i = 0; good && i < n; i++) at[is[i]] = (int32_t)i;
 		for (uint32_t i = 0; good && i < n; i++) {
 			good = wanted[i] >= 0 && wanted[i] < g->next_id && at[wanted[i]] >= 0;
-			if (good) from[i] = at[wanted[i]];
+			if (good) from[i] = at[wanted[i]], at[wanted[i]] = -1;
 		}
 	}
 	free(at);
@@ -176,12 +206,14 @@ static bool read_clock(quern_run *run, quern_h5 *h) {
 	return true;
 }
 
+/* Indices follow what they point at, so that all sets have their order before one is read. */
 static bool read_sets(quern_run *run, const taking *t, size_t n, quern_text *why) {
 	quern_store *store = &run->plan->store;
 	for (size_t i = 0; i < n; i++)
-		if (quern_store_remap(store, t[i].set, t[i].group.n, t[i].from, 0, NULL) != QUERN_OK ||
-			!quern_state_read(run, &t[i].group, t[i].set, settles, why))
-			return false;
+		if (quern_store_remap(store, t[i].set, t[i].group.n, t[i].from, 0, NULL) != QUERN_OK)
+			return quern_text_add(why, "there is no memory for it"), false;
+	for (size_t i = 0; i < n; i++)
+		if (!quern_state_read(run, &t[i].group, t[i].set, settles, why)) return false;
 	for (size_t k = 0; k < store->n_fields; k++) {
 		const char *fault = store->fields[k].settles ? quern_state_fault(run, &store->fields[k]) : NULL;
 		if (!fault) continue;
@@ -200,7 +232,8 @@ static bool take_from(quern_run *run, const char *path, const char *depends) {
 	taking *t = quern_take(run->plan->store.n_sets, sizeof *t);
 	bool good = look(run, &h, depends, t, &n) && read_clock(run, &h);
 	if (good && !read_sets(run, t, n, &why)) {
-		quern_run_stop(run, QUERN_E_IO, "%s: %s; remove it", path, quern_text_string(&why));
+		quern_run_stop(
+			run, QUERN_E_IO, "%s: %s; remove it, or go without by --no-cache", path, quern_text_string(&why));
 		good = false;
 	}
 	for (size_t i = 0; i < n; i++) quern_state_leave(&t[i].group), free(t[i].from);
@@ -219,15 +252,13 @@ static char *path_of(const char *folder, const char *depends) {
 		"%s/settled-%016llx.h5", folder, (unsigned long long)quern_hash(depends, strlen(depends)));
 }
 
-bool quern_settled_take(quern_run *run) {
-	char *folder = quern_settled_folder(), *depends = folder ? dependencies(run) : NULL;
-	char *path = depends ? path_of(folder, depends) : NULL;
-	const bool taken = path && take_from(run, path, depends);
+bool quern_settled_take(quern_run *run, const char *key) {
+	char *folder = cache_folder(), *path = folder ? path_of(folder, key) : NULL;
+	const bool taken = path && take_from(run, path, key);
 	if (taken)
 		quern_log_add(
 			run->log, 1, "settled already: %lld steps, from %s", (long long)run->clock.settle_step, path);
 	free(path);
-	free(depends);
 	free(folder);
 	return taken;
 }
@@ -278,34 +309,38 @@ static bool worth_it(const quern_run *run) {
 	return most * (double)run->clock.settle_step >= worth;
 }
 
-static bool write_to(quern_run *run, const char *path, const char *depends, char why[256]) {
+/* Under a name of its own until it is whole: another run may be keeping the same state. */
+static bool write_to(quern_run *run, const char *path, const char *key, char why[256]) {
 	quern_h5 h;
 	if (!quern_h5_create(&h, true, 512)) return snprintf(why, 256, "out of memory"), false;
 	quern_h5_text(&h, h.file, "format", format);
-	quern_h5_put(&h, h.file, "depends", H5T_NATIVE_UINT8, strlen(depends), 1, depends);
+	quern_h5_put(&h, h.file, "depends", H5T_NATIVE_UINT8, strlen(key), 1, key);
 	quern_h5_integer(&h, h.file, "steps", run->clock.settle_step);
 	quern_h5_number(&h, h.file, "dt", run->clock.settle_dt);
 	for (int s = 0; s < (int)run->plan->store.n_sets; s++)
 		if (is_meant(run, s)) quern_state_write(&h, run, s, settles);
-	return quern_h5_save(&h, path, why);
+	char *own = quern_format("%s.%ld", path, (long)getpid());
+	bool good = quern_h5_save(&h, own, why);
+	if (good && rename(own, path)) {
+		snprintf(why, 256, "%.180s cannot be written: %s", path, strerror(errno));
+		unlink(own);
+		good = false;
+	}
+	free(own);
+	return good;
 }
 
-void quern_settled_keep(quern_run *run) {
-	char *folder = worth_it(run) ? quern_settled_folder() : NULL,
-		 *depends = folder ? dependencies(run) : NULL;
+void quern_settled_keep(quern_run *run, const char *key) {
+	char *folder = worth_it(run) ? cache_folder() : NULL, *path = folder ? path_of(folder, key) : NULL;
 	char why[256];
-	if (depends) {
-		char *path = path_of(folder, depends);
-		if (!quern_folder_make(folder))
-			quern_log_add(run->log, 0, "settled state not kept: %s: %s", folder, strerror(errno));
-		else if (!write_to(run, path, depends, why))
-			quern_log_add(run->log, 0, "settled state not kept: %s", why);
-		else {
-			quern_log_add(run->log, 0, "settled state kept in %s", path);
-			drop_old(folder);
-		}
-		free(path);
+	if (path && !quern_folder_make(folder))
+		quern_log_add(run->log, 0, "settled state not kept: %s: %s", folder, strerror(errno));
+	else if (path && !write_to(run, path, key, why))
+		quern_log_add(run->log, 0, "settled state not kept: %s", why);
+	else if (path) {
+		quern_log_add(run->log, 0, "settled state kept in %s", path);
+		drop_old(folder);
 	}
-	free(depends);
+	free(path);
 	free(folder);
 }

@@ -1,8 +1,11 @@
 #include "sidecar.h"
+#include "child.h"
 #include "h5.h"
 #include "text.h"
+#include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -54,11 +57,18 @@ static void entry_finish(entry *e) {
 	free(e->set);
 }
 
+/* Names stand in XML, in JSON and in paths as they are. */
+static bool is_plain(const char *name) {
+	for (const char *c = name; *c; c++)
+		if (!isalnum((unsigned char)*c) && !strchr("_-.", *c)) return false;
+	return *name && *name != '.';
+}
+
 static herr_t note_field(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
 	set *s = arg;
 	size_t rows, columns;
 	(void)info;
-	if (!quern_h5_read_size(group, name, &rows, &columns)) return 0;
+	if (!is_plain(name) || !quern_h5_read_size(group, name, &rows, &columns)) return 0;
 	const hid_t data = H5Dopen2(group, name, H5P_DEFAULT), type = H5Dget_type(data);
 	s->field = quern_grow(s->field, s->n_fields, &s->capacity, sizeof(field));
 	s->field[s->n_fields++] =
@@ -72,7 +82,7 @@ static herr_t note_field(hid_t group, const char *name, const H5L_info_t *info, 
 static herr_t note_set(hid_t file, const char *name, const H5L_info_t *info, void *arg) {
 	entry *e = arg;
 	(void)info;
-	const hid_t group = quern_h5_find(file, name);
+	const hid_t group = is_plain(name) ? quern_h5_find(file, name) : -1;
 	if (group < 0) return 0;
 	e->set = quern_grow(e->set, e->n_sets, &e->capacity, sizeof(set));
 	set *s = &e->set[e->n_sets++];
@@ -88,7 +98,7 @@ static bool describe(const char *folder, int64_t number, entry *e) {
 	*e = (entry) { .number = number };
 	free(path);
 	if (file < 0) return false;
-	const bool good = quern_h5_read_number(file, "time", &e->time);
+	const bool good = quern_h5_read_number(file, "time", &e->time) && isfinite(e->time);
 	H5Literate(file, H5_INDEX_NAME, H5_ITER_INC, NULL, note_set, e);
 	H5Fclose(file);
 	return good;
@@ -101,6 +111,39 @@ static const field *position_of(const set *s) {
 }
 
 static bool is_drawn(const set *s) { return s->n && position_of(s); }
+
+/* ---- damage ---- */
+
+typedef struct {
+	const char *folder;
+	int64_t first, frames;
+	volatile int64_t *at; /* the one that is being read, for who comes after a crash */
+} reading;
+
+/* What the library prints as it crashes is nobody's sentence. */
+static void try_reading(void *arg) {
+	const reading *r = arg;
+	if (!freopen("/dev/null", "w", stderr)) return;
+	for (*r->at = r->first; *r->at < r->frames; ++*r->at) {
+		entry e;
+		describe(r->folder, *r->at, &e);
+		entry_finish(&e);
+	}
+}
+
+/* Frames have no checksum, and a damaged one can crash the library that reads it. A child reads them first: from `first`
+ * on, all that it gets past can be read. */
+static int64_t first_that_crashes(const char *folder, int64_t first, int64_t frames) {
+	enum { SECONDS = 3600 };
+	reading r = { folder, first, frames, quern_shared_take(sizeof(int64_t)) };
+	if (!r.at) return frames;
+	*r.at = first;
+	const quern_child how = quern_child_run(try_reading, &r, SECONDS);
+	const bool crashed = how.end == QUERN_CHILD_CRASHED || how.end == QUERN_CHILD_LATE;
+	const int64_t at = crashed ? *r.at : frames;
+	quern_shared_drop((void *)(uintptr_t)r.at, sizeof(int64_t));
+	return at;
+}
 
 /* ---- an entry of run.xdmf ---- */
 
@@ -283,6 +326,18 @@ static void gather(quern_sidecars *q, const entry *e) {
 	}
 }
 
+/* All frames that there are, but those that cannot be read: `left_out` names these. */
+static void gather_all(quern_sidecars *q, int64_t frames, quern_text *left_out) {
+	int64_t bad = frames > 0 ? first_that_crashes(q->folder, 0, frames) : 0;
+	for (int64_t i = 0; i < frames; i++) {
+		entry e = { .number = i };
+		if (i != bad && describe(q->folder, i, &e)) gather(q, &e);
+		else quern_text_add(left_out, "%s%lld", left_out->length ? ", " : "", (long long)i);
+		entry_finish(&e);
+		if (i == bad) bad = first_that_crashes(q->folder, i + 1, frames);
+	}
+}
+
 static bool flush(quern_sidecars *q, char why[256]) {
 	for (size_t i = q->n; i-- > 0;) /* run.xdmf names what is in views/, so it comes last */
 		if (!flush_listing(&q->listing[i], why)) return false;
@@ -299,12 +354,14 @@ quern_sidecars *quern_sidecars_create(const char *folder, int64_t frames, char w
 	if (!made) snprintf(why, 256, "the folder %.180s cannot be made: %s", views, strerror(errno));
 	free(views);
 	add_listing(q, quern_format("%s/run.xdmf", folder), NULL);
-	for (int64_t i = 0; i < frames && made; i++) {
-		entry e;
-		if (describe(folder, i, &e)) gather(q, &e);
-		entry_finish(&e);
-	}
-	if (made && flush(q, why)) return q;
+	quern_text left_out = { 0 };
+	if (made) gather_all(q, frames, &left_out);
+	const bool good = made && flush(q, why);
+	if (good)
+		snprintf(why, 256, left_out.length ? "run.xdmf leaves out frames that cannot be read: %.180s" : "%s",
+			quern_text_string(&left_out));
+	quern_text_finish(&left_out);
+	if (good) return q;
 	quern_sidecars_destroy(q);
 	return NULL;
 }

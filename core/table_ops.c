@@ -36,7 +36,8 @@ const quern_function quern_functions[] = { EACH(QUERN_CONTACT, quern_contact_ops
 	MAYBE(QUERN_OBSERVER, quern_observer_ops, map), MAYBE(QUERN_OBSERVER, quern_observer_ops, whole),
 	MAYBE(QUERN_SOLVER, quern_solver_ops, ready), MAYBE(QUERN_SOLVER, quern_solver_ops, limit),
 	MAYBE(QUERN_SOLVER, quern_solver_ops, substeps), MAYBE(QUERN_SOLVER, quern_solver_ops, settled),
-	MAYBE(QUERN_SOLVER, quern_solver_ops, account), { .name = NULL } };
+	MAYBE(QUERN_SOLVER, quern_solver_ops, account), MAYBE(QUERN_SOLVER, quern_solver_ops, settling),
+	{ .name = NULL } };
 
 /* The host's own sizes. */
 static const size_t sizes[QUERN_KINDS] = { [QUERN_SOLVER] = sizeof(quern_solver_ops),

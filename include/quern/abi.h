@@ -235,7 +235,8 @@ typedef struct quern_host {
 	void (*random)(uint64_t stream, uint64_t key, uint64_t counter, quern_real out[2]);
 	/* [stage] level 0: log file only, 1: terminal too, 2: a warning */
 	void (*log)(quern_run *, int level, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
-	/* [stage] Calls body(arg, i, worker) once for every i < n, on all workers; returns when all are done. */
+	/* [stage] Calls body(arg, i, worker) once for every i < n, on all workers; returns when all are done. A body that
+	 * calls it again ends the program. */
 	void (*parallel)(
 		quern_run *, uint32_t n, void (*body)(void *arg, uint32_t i, uint32_t worker), void *arg);
 	uint32_t (*workers)(quern_run *);

@@ -128,7 +128,8 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 	return !meets_body(p, s);
 }
 
-int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real share, quern_real *by) {
+int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real share,
+	bool (*counts)(const void *arg, int32_t), const void *arg, quern_real *by) {
 	const int depth = p->dim == 3 ? 1 : 0;
 	int32_t middle[3] = { 0 }, worst = -1;
 	*by = share;
@@ -141,7 +142,7 @@ int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real shar
 				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i]) {
 					const quern_real overlap = overlap_of(p, s, &p->spot[i]);
-					if (overlap > *by) *by = overlap, worst = i;
+					if (overlap > *by && (!counts || counts(arg, i))) *by = overlap, worst = i;
 				}
 			}
 	return worst;

@@ -6,15 +6,16 @@
 
 enum { LASTS = 5 }; /* durations of a contact */
 
-/* Steps, about a contact's duration. */
+/* Steps, about a contact's duration; that of settling may be given as short as one likes. */
 static uint32_t every(const forces_shared *sh) {
-	return sh->s->settling ? (uint32_t)(1 / sh->d->settle_step) : 50;
+	const quern_real wanted = sh->s->settling ? 1 / sh->d->settle_step : 50;
+	return wanted < 1e6 ? (uint32_t)wanted : 1000000;
 }
 
 void quern_dem_decide_checks(forces_shared *sh) {
 	const bool regular = (sh->s->substep + 1) % every(sh) == 0;
 	sh->checks = regular || sh->looks;
-	sh->deep = regular && !sh->looks && sh->n_laws && sh->d->overlap_most > 0;
+	sh->deep = sh->checks && sh->n_laws && sh->d->overlap_most > 0;
 }
 
 static bool is_watched(const forces_shared *sh, const deep_contact *c) {
@@ -58,7 +59,7 @@ void quern_dem_check_contacts(
 			.second = body < 0 ? id[w->second[q]] : -1 - body };
 		ask_laws(sh, &c, w->mass[q], w->radius[q]);
 		if (is_worse(&c, &sh->worst[b])) sh->worst[b] = c;
-		if (is_watched(sh, &c)) sh->watched[b] = c;
+		if (!sh->looks && is_watched(sh, &c)) sh->watched[b] = c;
 	}
 }
 
@@ -111,8 +112,10 @@ quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks
 		if (is_worse(&sh->worst[b], &worst)) worst = sh->worst[b];
 		if (sh->watched[b].by > 0) watched = sh->watched[b];
 	}
-	quern_real *time = u[FORCE_DEEP_TIME].real[0];
 	if (worst.by >= 1) return stop_deep(sh, &worst, ", its centre behind the surface,");
+	if (sh->looks)
+		return QUERN_OK; /* who looks does not watch; but no frame shows a grain behind a surface */
+	quern_real *time = u[FORCE_DEEP_TIME].real[0];
 	if (watched.by > 0 && !sh->s->settling) {
 		*time += every(sh) * sh->s->dt;
 		if (*time >= LASTS * watched.period) return stop_deep(sh, &watched, " for long");

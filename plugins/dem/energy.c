@@ -38,9 +38,8 @@ static bool is_fixed(const forces_shared *sh, uint32_t i) {
 }
 
 QUERN_INLINE void lose(const forces_work *w, uint32_t row, uint32_t n, const int dim, const bool spin) {
-	const quern_real(*restrict all)[8] = (const quern_real(*)[8])(const void *)(w->row + row);
 	const quern_real(*restrict drag)[8] =
-		dim == 2 ? all : (const quern_real(*)[8])(const void *)(w->drag_row + row);
+		(const quern_real(*)[8])(const void *)((dim == 2 ? w->row : w->drag_row) + row);
 	const quern_real *restrict vx = w->grains[G_MEAN], *restrict vy = w->grains[G_MEAN + 1],
 							   *restrict vz = w->grains[G_MEAN + 2];
 	const quern_real *restrict sx = w->grains[G_MEAN_SPIN], *restrict sy = w->grains[G_MEAN_SPIN + 1],
@@ -55,7 +54,7 @@ QUERN_INLINE void lose(const forces_work *w, uint32_t row, uint32_t n, const int
 		if (spin) sum += d[dim] * sx[i];
 		if (spin && dim == 3) sum += d[4] * sy[i] + d[5] * sz[i];
 		work[i] = -sum;
-		rubbed[i] = all[i][LANE_RUBBED];
+		rubbed[i] = drag[i][LANE_RUBBED];
 	}
 }
 

@@ -130,14 +130,18 @@ static bool is_near(const quern_step *s, const dem_place *grain) {
 
 enum { WORDS = 200 };
 
+/* Fixed grains may overlap each other. */
+static bool moves(const void *arg, int32_t i) { return !((const filling *)arg)->grain[i].fixed; }
+
 /* Whether it may stand there, after all those before it; says why not. */
 static bool may_stand(const filling *f, const dem_place *grain, char why[WORDS]) {
 	const quern_step *s = f->step;
 	quern_spot spot = { .radius = grain->radius };
 	quern_real by;
 	memcpy(spot.x, grain->position, sizeof spot.x);
-	const int32_t other = quern_placer_worst(&f->placer, &spot, (1 + 1e-9) * f->d->overlap_start, &by);
-	if (other >= 0 && !(grain->fixed && f->grain[other].fixed)) {
+	const int32_t other = quern_placer_worst(
+		&f->placer, &spot, (1 + 1e-9) * f->d->overlap_start, grain->fixed ? moves : NULL, f, &by);
+	if (other >= 0) {
 		const quern_real *x = f->grain[other].position;
 		const bool placed = (uint32_t)other < f->d->place.n;
 		snprintf(why, WORDS,

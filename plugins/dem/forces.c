@@ -6,6 +6,8 @@
 #include <math.h>
 #include <string.h>
 
+static const quern_real NO_TIME = 1e-300; /* s; a law may divide by it */
+
 typedef struct {
 	char *base; /* NULL: only measured */
 	size_t used;
@@ -110,7 +112,10 @@ static bool any_couples(const quern_step *s) {
 static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	const quern_step *s = sh->s;
 	const quern_set_view contacts = s->host->set(s->run, "contact"), touches = s->host->set(s->run, "touch");
+	const quern_integrator_ops *integrator = dem_integrator(s)->ops;
 	sh->use = s->use;
+	/* an integrator in two parts leaves positions to which it has moved the springs already */
+	sh->dt = sh->looks && integrator->open[s->dim - 2] ? NO_TIME : s->dt;
 	sh->cap = s->batch;
 	sh->n_bodies = s->n_slot[SLOT_BODIES];
 	sh->n_laws = s->n_slot[SLOT_CONTACT];
@@ -233,13 +238,14 @@ quern_status quern_dem_forces(const void *self, const quern_step *s) {
  * first step there is no step's length, and no kick. */
 quern_status quern_dem_observe(const void *self, const quern_step *s) {
 	quern_step now = *s;
-	now.dt = s->dt > 0 ? s->dt / s->n_substeps : 1e-300;
+	now.dt = s->dt > 0 ? s->dt / s->n_substeps : NO_TIME;
 	forces_shared sh = { .d = self, .s = &now, .looks = true };
 	const quern_set_view grains = s->host->set(s->run, "grain");
 	if (!grains.n) return QUERN_OK;
 	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);
-	const quern_status status = quern_dem_judge_grains(&sh, grains.n_blocks);
+	quern_status status = quern_dem_judge_grains(&sh, grains.n_blocks);
+	if (status == QUERN_OK && sh.deep) status = quern_dem_judge_contacts(&sh, grains.n_blocks);
 	if (status != QUERN_OK) return status;
 	quern_real energy[N_ENERGIES] = { 0 };
 	for (uint32_t b = 0; b < grains.n_blocks; b++) {

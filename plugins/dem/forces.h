@@ -19,8 +19,8 @@ enum {
 	G_NEW_VELOCITY = 30,
 	G_NEW_SPIN = 33
 };
-/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both, which in 3-D has a row of its own; and
- * what sliding has taken. */
+/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in 3-D
+ * have a row of their own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
@@ -38,9 +38,10 @@ typedef struct forces_shared {
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
 	bool spin, couple;
-	bool books;  /* losses of this step are booked */
-	bool looks;  /* nothing moves: forces and energies of the state as it is */
-	bool starts; /* losses will be booked from now on: what springs hold is noted */
+	quern_real dt; /* s, by which springs move */
+	bool books;    /* losses of this step are booked */
+	bool looks;    /* nothing moves: forces and energies of the state as it is */
+	bool starts;   /* losses will be booked from now on: what springs hold is noted */
 	quern_real half[3],
 		length[3]; /* periodic: half the domain's length and the length; infinite and 0 otherwise */
 	const uint32_t *grain, *contact, *touch; /* partitions */
@@ -107,16 +108,20 @@ void quern_dem_lose(
 /* What n grains have. */
 void quern_dem_have(const forces_shared *, const forces_work *, uint32_t begin, uint32_t n, quern_real *sums);
 
-/* What sliding takes of contact q, and what a spring gives up that has opened since the last step: no law sees that. The
- * spring's energy is kept in `held`, by slot, which may be NULL. */
-QUERN_INLINE quern_real dem_rubbed(const forces_work *w, uint32_t q, quern_real share, quern_real *held) {
-	const bool touching = w->overlap[q] > 0;
-	quern_real rubbed = share * w->rubbed[q];
-	if (!held) return rubbed;
-	quern_real *mine = held + w->slot[q];
-	rubbed += touching ? 0 : *mine;
-	*mine = touching ? share * w->sheared[q] : 0;
-	return rubbed;
+/* What sliding takes of n contacts, with their weights, and what springs give up that have opened since the last step: no
+ * law sees that. The springs' energy is kept in `held`, by slot, which may be NULL. */
+QUERN_INLINE void dem_rub(const forces_work *w, const quern_real *weight, quern_real *held, uint32_t n) {
+	const quern_real *restrict overlap = w->overlap, *restrict sheared = w->sheared;
+	const int32_t *restrict slot = w->slot;
+	quern_real *restrict rubbed = w->rubbed, *restrict kept = held;
+	for (uint32_t q = 0; q < n && weight; q++) rubbed[q] *= weight[q];
+	if (!held) return;
+	QUERN_SIMD
+	for (uint32_t q = 0; q < n; q++) {
+		const quern_real before = kept[slot[q]], now = weight ? weight[q] * sheared[q] : sheared[q];
+		rubbed[q] += overlap[q] > 0 ? 0 : before;
+		kept[slot[q]] = overlap[q] > 0 ? now : 0;
+	}
 }
 
 /* Torque over lever: -(n x f), for the first and the second alike. */

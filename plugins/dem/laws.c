@@ -62,7 +62,7 @@ static void clear(quern_real *const *column, uint32_t count, uint32_t n) {
 static quern_contact_batch batch_of(const forces_shared *sh, const forces_work *w, uint32_t n) {
 	quern_contact_batch b = { .n = n,
 		.cap = sh->cap,
-		.dt = sh->s->dt,
+		.dt = sh->dt,
 		.overlap = w->overlap,
 		.radius = w->radius,
 		.mass = w->mass,

@@ -342,17 +342,20 @@ static quern_status keep_inside(const listing *l) {
 	return QUERN_OK;
 }
 
-/* Before the first step there is no list yet, and after it there always is one. */
+/* At the release other bodies are there than while settling, whatever has moved. */
+static bool is_release(const quern_step *s) { return !s->settling && s->step == 0 && s->substep == 0; }
+
+/* Before the first step there is no list yet, or that of settling; after it there always is one. */
 quern_status quern_dem_list(const void *self, const quern_step *s) {
-	return isinf(s->use[NEAR_DISPLACEMENT].real[0][0]) ? quern_dem_neighbours(self, s) : QUERN_OK;
+	const bool none = isinf(s->use[NEAR_DISPLACEMENT].real[0][0]);
+	return none || is_release(s) ? quern_dem_neighbours(self, s) : QUERN_OK;
 }
 
 quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 	listing l = { .d = self, .s = s, .search = &s->slot[SLOT_NEIGHBOURS][0] };
 	l.ops = l.search->ops;
 	const quern_real moved = s->use[NEAR_DISPLACEMENT].real[0][0];
-	const bool released = !s->settling && s->step == 0 && s->substep == 0;
-	if (moved < 0.5 * l.d->skin * 2 * l.d->radii.mean && !released) return QUERN_OK;
+	if (moved < 0.5 * l.d->skin * 2 * l.d->radii.mean && !is_release(s)) return QUERN_OK;
 	quern_status status = keep_inside(&l);
 	if (status == QUERN_OK) status = sort_grains(&l);
 	if (status == QUERN_OK) status = check_periodic(&l);

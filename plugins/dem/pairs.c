@@ -150,76 +150,83 @@ static void masses(const forces_shared *sh, const forces_work *w, uint32_t n) {
 /* ---- sums ---- */
 typedef quern_real lanes8 __attribute__((vector_size(64)));
 
-/* Adds to the rows of the block's grains; a partner outside goes to the spare row. */
-QUERN_INLINE void add_pairs(const forces_shared *sh, const forces_work *w, quern_real (*row)[8],
-	quern_real *const force[3], quern_real *const torque[3], uint32_t begin, uint32_t end, uint32_t n,
-	const int dim, const bool spin) {
-	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
-	const uint32_t spare = end - begin;
+/* The row of a grain of the block; a partner outside has the spare row. */
+QUERN_INLINE uint32_t row_of(int32_t grain, uint32_t begin, uint32_t end) {
+	const uint32_t i = (uint32_t)grain - begin;
+	return i < end - begin ? i : end - begin;
+}
+
+QUERN_INLINE void add_2d(
+	const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin, const bool weighted) {
 	for (uint32_t q = 0; q < n; q++) {
-		uint32_t i = (uint32_t)w->first[q] - begin, j = (uint32_t)w->second[q] - begin;
-		i = i < spare ? i : spare;
-		j = j < spare ? j : spare;
+		quern_real *i = w->row[row_of(w->first[q], begin, end)],
+				   *j = w->row[row_of(w->second[q], begin, end)];
 		const quern_real share = weighted ? w->weight[q] : 1;
-		if (dim == 2) {
-			const quern_real x = share * force[0][q], y = share * force[1][q],
-							 t = spin ? share * torque[0][q] : 0;
-			row[i][0] += x, row[i][1] += y;
-			row[j][0] -= x, row[j][1] -= y;
-			if (spin) row[i][2] += w->arm[0][q] * t, row[j][2] += w->arm[1][q] * t;
-		} else {
-			const quern_real a = w->arm[0][q], b = w->arm[1][q];
-			const lanes8 f = { force[0][q], force[1][q], force[2][q], spin ? torque[0][q] : 0,
-				spin ? torque[1][q] : 0, spin ? torque[2][q] : 0, 0, 0 };
-			const lanes8 to_first = { share, share, share, share * a, share * a, share * a, 0, 0 };
-			const lanes8 to_second = { -share, -share, -share, share * b, share * b, share * b, 0, 0 };
-			*(lanes8 *)(void *)row[i] += to_first * f;
-			*(lanes8 *)(void *)row[j] += to_second * f;
-		}
+		const quern_real x = share * w->force[0][q], y = share * w->force[1][q],
+						 t = spin ? share * w->torque[0][q] : 0;
+		i[0] += x, i[1] += y;
+		j[0] -= x, j[1] -= y;
+		if (spin) i[2] += w->arm[0][q] * t, j[2] += w->arm[1][q] * t;
 	}
 }
 
-/* The same with what dashpots give, in the lanes behind, and what sliding takes. The force's lanes get the same bits. */
-QUERN_INLINE void add_pairs_2d(const forces_shared *sh, const forces_work *w, quern_real *held,
-	uint32_t begin, uint32_t end, uint32_t n, const bool spin) {
-	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
-	const uint32_t spare = end - begin;
+/* The same, with what dashpots give in the lanes behind, and what sliding takes, which has its weight already. */
+QUERN_INLINE void add_books_2d(
+	const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin, const bool weighted) {
+	static const lanes8 lever = { 0, 0, 1, 0, 0, 1, 0, 0 }, plain = { 1, 1, 0, 1, 1, 0, 1, 0 },
+						against = { -1, -1, 0, -1, -1, 0, 0, 0 }, all = { 1, 1, 1, 1, 1, 1, 0, 0 },
+						own = { 0, 0, 0, 0, 0, 0, 1, 0 };
 	for (uint32_t q = 0; q < n; q++) {
-		uint32_t i = (uint32_t)w->first[q] - begin, j = (uint32_t)w->second[q] - begin;
-		i = i < spare ? i : spare;
-		j = j < spare ? j : spare;
-		const quern_real share = weighted ? w->weight[q] : 1, a = w->arm[0][q], b = w->arm[1][q];
+		quern_real *i = w->row[row_of(w->first[q], begin, end)],
+				   *j = w->row[row_of(w->second[q], begin, end)];
 		const lanes8 f = { w->force[0][q], w->force[1][q], spin ? w->torque[0][q] : 0, w->dashpot[0][q],
-			w->dashpot[1][q], spin ? w->drag_torque[0][q] : 0, 0, 0 };
-		const lanes8 one = { 0, 0, 0, 0, 0, 0, dem_rubbed(w, q, share, held), 0 };
-		const lanes8 given = share * f + one, to_first = { 1, 1, a, 1, 1, a, 1, 0 },
-					 to_second = { -1, -1, b, -1, -1, b, 0, 0 };
-		*(lanes8 *)(void *)w->row[i] += to_first * given;
-		*(lanes8 *)(void *)w->row[j] += to_second * given;
+			w->dashpot[1][q], spin ? w->drag_torque[0][q] : 0, w->rubbed[q], 0 };
+		const lanes8 given = weighted ? (w->weight[q] * all + own) * f : f;
+		*(lanes8 *)(void *)i += (plain + w->arm[0][q] * lever) * given;
+		*(lanes8 *)(void *)j += (against + w->arm[1][q] * lever) * given;
 	}
 }
 
-static void add_rubbed(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t begin,
-	uint32_t end, uint32_t n) {
-	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
-	const uint32_t spare = end - begin;
+QUERN_INLINE void add_3d(const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin,
+	const bool weighted, const bool books) {
+	static const lanes8 lever = { 0, 0, 0, 1, 1, 1, 0, 0 }, plain = { 1, 1, 1, 0, 0, 0, 0, 0 },
+						own = { 0, 0, 0, 0, 0, 0, 1, 0 };
 	for (uint32_t q = 0; q < n; q++) {
-		const uint32_t i = (uint32_t)w->first[q] - begin;
-		w->row[i < spare ? i : spare][LANE_RUBBED] += dem_rubbed(w, q, weighted ? w->weight[q] : 1, held);
+		const uint32_t i = row_of(w->first[q], begin, end), j = row_of(w->second[q], begin, end);
+		const quern_real share = weighted ? w->weight[q] : 1;
+		const lanes8 to_first = share * (plain + w->arm[0][q] * lever),
+					 to_second = share * (w->arm[1][q] * lever - plain);
+		const lanes8 f = { w->force[0][q], w->force[1][q], w->force[2][q], spin ? w->torque[0][q] : 0,
+			spin ? w->torque[1][q] : 0, spin ? w->torque[2][q] : 0, 0, 0 };
+		*(lanes8 *)(void *)w->row[i] += to_first * f;
+		*(lanes8 *)(void *)w->row[j] += to_second * f;
+		if (!books) continue;
+		const lanes8 d = { w->dashpot[0][q], w->dashpot[1][q], w->dashpot[2][q],
+			spin ? w->drag_torque[0][q] : 0, spin ? w->drag_torque[1][q] : 0, spin ? w->drag_torque[2][q] : 0,
+			w->rubbed[q], 0 };
+		*(lanes8 *)(void *)w->drag_row[i] += (to_first + own) * d;
+		*(lanes8 *)(void *)w->drag_row[j] += to_second * d;
 	}
+}
+
+QUERN_INLINE void add_pairs(const forces_work *w, uint32_t first, uint32_t last, uint32_t n, const int dim,
+	const bool spin, const bool weighted, const bool books) {
+	if (dim == 3) add_3d(w, first, last, n, spin, weighted, books);
+	else if (books) add_books_2d(w, first, last, n, spin, weighted);
+	else add_2d(w, first, last, n, spin, weighted);
 }
 
 /* Forces and torques to the grains of a block, and with them, if they are booked, losses. */
 QUERN_INLINE void add_all(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t first,
 	uint32_t last, uint32_t n, const int dim, const bool spin) {
+	const quern_real *weight = sh->use[FORCE_WEIGHT].real[0] ? w->weight : NULL;
 	if (spin) dem_torques(w, w->force, w->torque, n, dim);
 	if (sh->books && spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
-	if (sh->books && dim == 2) add_pairs_2d(sh, w, held, first, last, n, spin);
-	else add_pairs(sh, w, w->row, w->force, w->torque, first, last, n, dim, spin);
-	if (sh->books && dim == 3) {
-		add_pairs(sh, w, w->drag_row, w->dashpot, w->drag_torque, first, last, n, dim, spin);
-		add_rubbed(sh, w, held, first, last, n);
-	}
+	if (sh->books) dem_rub(w, weight, held, n);
+	if (sh->books && weight) add_pairs(w, first, last, n, dim, spin, true, true);
+	else if (sh->books) add_pairs(w, first, last, n, dim, spin, false, true);
+	else if (weight) add_pairs(w, first, last, n, dim, spin, true, false);
+	else add_pairs(w, first, last, n, dim, spin, false, false);
 	if (!spin || !sh->couple) return;
 	quern_dem_add_couples(sh, w, w->row, (uint32_t)dim, w->couple, -1, first, last, n);
 	if (sh->books)

@@ -209,7 +209,7 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 		.uses = force_uses,
 		.run = quern_dem_forces },
 	{ .name = "dem.list",
-		.doc = "The first list, if nothing has moved yet.",
+		.doc = "The list of the release, before anything has moved.",
 		.phase = QUERN_OUTPUT,
 		.sometimes = 1,
 		.uses = near_uses,
@@ -341,30 +341,62 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 
 /* ---- the step ---- */
 
+/* A kind of contact as the step sees it: half the shortest period, the limit of the step, and the damping ratio at that
+ * period. The stiffest of its laws gives the name. */
 typedef struct {
-	const dem *d;
-	quern_real period, hard,
-		damping; /* s: the shortest half-period and the shortest hard limit; ratio of that law */
+	quern_real period, hard, damping;
 	const char *law, *where, *body;
-} shortest;
+	uint32_t others; /* laws beside that one */
+} contact_limit;
 
 /* The fastest mode of a packing: a grain has several contacts. omega_max^2 = 6 k/m of a triangular lattice and 8 k/m of a
  * face-centred one are 3 and 4 times that of a pair. */
 static quern_real crowding(uint32_t dim) { return dim == 2 ? 1.7320508075688772 : 2; }
 
-/* 0.2 of the half-period, and the limit of explicit dashpots in a packing, omega dt < 2 (sqrt(1 + zeta^2) - zeta). */
-static void consider(shortest *s, const quern_bound *law, const void *self, quern_real mass,
-	quern_real radius, const char *where, const char *body) {
-	const quern_contact_ops *ops = law->ops;
-	if (!ops->period) return;
-	const quern_real t = ops->period(self, s->d->dim, mass, radius), c = crowding(s->d->dim);
-	const quern_real ratio = ops->damping ? ops->damping(self, s->d->dim) : 0, zeta = c * ratio;
-	const quern_real damped = 2 * (sqrt(1 + zeta * zeta) - zeta) / c * t / 3.141592653589793;
-	const quern_real hard = damped < 0.2 * t ? damped : 0.2 * t;
-	s->hard = hard < s->hard ? hard : s->hard;
-	if (!(t < s->period)) return;
-	s->period = t, s->damping = ratio;
-	s->law = law->id, s->where = where, s->body = body;
+/* All laws together: stiffnesses add up, and so do the squares of frequencies; damping coefficients too. */
+static contact_limit all_laws(const quern_step *s, quern_real mass, quern_real radius, int32_t body) {
+	contact_limit c = { .period = INFINITY, .hard = INFINITY };
+	quern_real square = 0, drag = 0, shortest = INFINITY;
+	uint32_t n = 0;
+	for (uint32_t l = 0; l < s->n_slot[SLOT_CONTACT]; l++) {
+		const quern_bound *law = &s->slot[SLOT_CONTACT][l];
+		const quern_contact_ops *ops = law->ops;
+		const void *self = body >= 0 && law->n_variant ? law->variant[body] : law->self;
+		if (!ops->period) continue;
+		const quern_real t = ops->period(self, s->dim, mass, radius);
+		const quern_real ratio = ops->damping ? ops->damping(self, s->dim) : 0;
+		square += 1 / (t * t);
+		drag += ratio / t;
+		n++;
+		if (t < shortest) shortest = t, c.law = law->id, c.damping = ratio;
+	}
+	c.period = n > 1 ? 1 / sqrt(square) : shortest;
+	if (n > 1) c.damping = drag * c.period, c.others = n - 1;
+	return c;
+}
+
+/* 0.2 of the half-period, or the limit of explicit dashpots in a packing, omega dt < 2 (sqrt(1 + zeta^2) - zeta). */
+static contact_limit limit_of(const quern_step *s, quern_real mass, quern_real radius, int32_t body) {
+	contact_limit c = all_laws(s, mass, radius, body);
+	const quern_real crowd = crowding(s->dim), zeta = crowd * c.damping;
+	const quern_real damped = 2 * (sqrt(1 + zeta * zeta) - zeta) / crowd * c.period / 3.141592653589793;
+	c.hard = damped < 0.2 * c.period ? damped : 0.2 * c.period;
+	c.where = "of the lightest grain on ";
+	c.body = body >= 0 ? s->slot[SLOT_BODIES][body].id : "";
+	return c;
+}
+
+static void say_limit(
+	const contact_limit *fast, const contact_limit *hard, bool by_period, char reason[160]) {
+	const contact_limit *c = by_period ? fast : hard;
+	const bool same = c->period == hard->period && c->damping == hard->damping;
+	char others[24] = "", damped[120] = "";
+	if (c->others) snprintf(others, sizeof others, " and %u more", c->others);
+	if (hard->hard < 0.2 * hard->period)
+		snprintf(damped, sizeof damped, "%s%s%s, damping ratio %.3g", same ? "" : "; hard limit ",
+			same ? "" : hard->where, same ? "" : hard->body, hard->damping);
+	snprintf(reason, 160, "%s%s %s%s, half-period %.3g s%s%s", c->law, others, c->where, c->body, c->period,
+		by_period ? " / 50" : "", damped);
 }
 
 /* The stiffest contact is that of the two lightest grains, or of the lightest against a body. */
@@ -374,7 +406,6 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
 	const int32_t *fixed = s->use[FILL_FIXED].index;
 	quern_real least[2] = { INFINITY, INFINITY }, small = INFINITY;
-	shortest found = { .d = d, .period = INFINITY, .hard = INFINITY };
 	for (uint32_t i = 0; i < grains.n; i++) {
 		if (fixed && fixed[i]) continue;
 		if (mass[i] < least[0]) least[1] = least[0], least[0] = mass[i], small = radius[i];
@@ -386,25 +417,20 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	}
 	const bool two = isfinite(least[1]);
 	const quern_real pair = two ? least[0] * least[1] / (least[0] + least[1]) : least[0];
-	const quern_bound *law = s->slot[SLOT_CONTACT];
-	for (uint32_t l = 0; l < s->n_slot[SLOT_CONTACT]; l++) {
-		consider(&found, &law[l], law[l].self, pair, 0.5 * small,
-			two ? "between the two lightest grains" : "on the lightest grain", "");
-		for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++)
-			consider(&found, &law[l], law[l].n_variant ? law[l].variant[b] : law[l].self, least[0], small,
-				"of the lightest grain on ", s->slot[SLOT_BODIES][b].id);
+	contact_limit fast = limit_of(s, pair, 0.5 * small, -1);
+	fast.where = two ? "between the two lightest grains" : "on the lightest grain";
+	contact_limit first = fast; /* to fail when the step grows */
+	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
+		const contact_limit c = limit_of(s, least[0], small, (int32_t)b);
+		if (c.period < fast.period) fast = c;
+		if (c.hard < first.hard) first = c;
 	}
-	*hard = found.hard;
-	const bool by_period = found.period / 50 <= 0.5 * found.hard;
-	char damped[48] = "";
-	if (found.hard < 0.2 * found.period)
-		snprintf(damped, sizeof damped, ", damping ratio %.3g", found.damping);
-	if (isfinite(found.period))
-		snprintf(reason, 160, "%s %s%s, half-period %.3g s%s%s", found.law, found.where, found.body,
-			found.period, by_period ? " / 50" : "", damped);
+	*hard = first.hard;
+	const bool by_period = fast.period / 50 <= 0.5 * first.hard;
+	if (isfinite(fast.period)) say_limit(&fast, &first, by_period, reason);
 	else snprintf(reason, 160, "grains without a contact law");
-	if (s->settling && d->settle_step * found.period < found.hard) return d->settle_step * found.period;
-	return by_period ? found.period / 50 : 0.5 * found.hard;
+	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
+	return by_period ? fast.period / 50 : 0.5 * first.hard;
 }
 
 static void account(const void *self, const quern_step *s, quern_account *out) {

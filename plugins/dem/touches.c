@@ -78,9 +78,8 @@ QUERN_INLINE void add_losses(const forces_shared *sh, const forces_work *w, quer
 	add_touches(sh, w, row, lane, w->dashpot, w->drag_torque, first, n, dim, spin);
 	if (spin && sh->couple)
 		quern_dem_add_couples(sh, w, row, lane + (uint32_t)dim, w->drag_couple, body, first, last, n);
-	for (uint32_t q = 0; q < n; q++)
-		w->row[(uint32_t)w->first[q] - first][LANE_RUBBED] +=
-			dem_rubbed(w, q, sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1, held);
+	dem_rub(w, sh->use[FORCE_WEIGHT].real[0] ? w->weight : NULL, held, n);
+	for (uint32_t q = 0; q < n; q++) row[(uint32_t)w->first[q] - first][LANE_RUBBED] += w->rubbed[q];
 }
 
 QUERN_INLINE void block(

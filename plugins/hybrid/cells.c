@@ -206,10 +206,30 @@ void quern_hybrid_fractions(update *d) {
 	}
 }
 
+/* The share of a cell's hat in which there can be contacts: bodies hold none. What lies behind a face of the domain is
+ * sampled before it. */
+static quern_real room_of(const update *d, uint32_t c) {
+	const int depth = d->s->dim == 3 ? 1 : 0;
+	int32_t cell[3];
+	quern_real room = 0;
+	if (d->wall[c] >= 2 * d->g->cell || !quern_hybrid_cell(d, c, cell)) return 1;
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -1; y <= 1; y++)
+			for (int x = -1; x <= 1; x++) {
+				const int32_t i =
+					quern_hybrid_entry(d, (int32_t[3]) { cell[0] + x, cell[1] + y, cell[2] + z });
+				const quern_real part =
+					(x ? 0.125 : 0.75) * (y ? 0.125 : 0.75) * (depth ? z ? 0.125 : 0.75 : 1);
+				room += part * (i >= 0 ? d->open[i] : 1);
+			}
+	return room > 0.125 ? room : 0.125;
+}
+
 bool quern_hybrid_contact_stress(const update *d, uint32_t cell, quern_real stress[6]) {
 	const quern_real samples = d->u[U_SAMPLES].real[0][0];
+	const quern_real times = samples > 0 ? samples * room_of(d, cell) : 1;
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
-		stress[k] = samples > 0 ? d->u[U_STRESS].real[k][cell] / samples : 0;
+		stress[k] = samples > 0 ? d->u[U_STRESS].real[k][cell] / times : 0;
 	return samples > 0;
 }
 

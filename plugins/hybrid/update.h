@@ -52,7 +52,7 @@ quern_status quern_hybrid_sort(update *);
 void quern_hybrid_averages(update *);
 void quern_hybrid_fractions(update *);
 void quern_hybrid_rates(update *);
-/* Mean over the samples of the contact stress in a cell; false if there is none. */
+/* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is none. */
 bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stress[6]);
 /* Normals of the zone at every particle, and where each is, for the next update. After the sets have their new order. */
 quern_status quern_hybrid_normals(update *);

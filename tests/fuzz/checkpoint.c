@@ -1,11 +1,8 @@
 /* fuzz checkpoint - a good checkpoint with some of its values, sizes and types changed is refused, or taken and looked
- * through; the unchanged one is taken and stepped on. Bytes that begin like a checkpoint are taken for a whole file.
- *
- * The bytes are a list of edits: which attribute or dataset, what to do, how. HDF5 itself is not the target: damage of
- * the file as a whole is caught by its checksum before HDF5 sees a byte. */
+ * through; the unchanged one is taken and stepped on. Bytes that begin like a checkpoint are taken for a whole file. */
+#include "edits.h"
+#include "kit.h"
 #include <checkpoint.h>
-#include <h5.h>
-#include <run.h>
 #include <stdlib.h>
 #include <string.h>
 #include <text.h>
@@ -14,220 +11,34 @@
 int LLVMFuzzerInitialize(int *argc, char ***argv);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static const char scene_text[] =
-	"quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [0.2, 0.2]}\ntime: {end: "
-	"1}\n"
-	"output: {every: 0.1, compress: false}\n"
-	"bodies: [{plane: {point: [0, 0], normal: [0, 1]}}]\n"
-	"grains: {material: {density: 2500, radius: {mean: 0.002}}, contact: {linear: {stiffness: 1e5}},\n"
-	"  fill: {region: {box: {lower: [0.002, 0.002], upper: [0.05, 0.05]}}}}\n"
-	"continuum: {cell: 0.008, material: mu_i}\n"
-	"hybrid: {oracle: [{packing_fraction: {depth: 0.016, half_width: 0.008}}], update: 10}\n"
-	"observe: [mass, energy, ledger]\n";
-
-enum { MOST_OBJECTS = 512, MOST_EDITS = 8, STEPS = 2 };
-static struct {
-	char group[24], name[40]; /* group "" is the root */
-	bool attribute;
-} object[MOST_OBJECTS];
-static int n_objects;
-static char path[256];
-static char *image;
-static size_t image_size;
-
-static quern_run *open_run(void) {
-	quern_scene *scene =
-		quern_scene_parse("scene.yaml", scene_text, sizeof scene_text - 1, &quern_host_table);
-	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, 1);
-	if (run) return run;
-	quern_report_print(scene->report, stderr);
-	abort();
-}
-
-static void steps(quern_run *run, int n) {
-	quern_clock *c = &run->clock;
-	c->settled = 1;
-	if (c->frame < 0) quern_run_frame(run);
-	for (int i = 0; i < n && run->status == QUERN_OK; i++) {
-		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
-		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) quern_run_frame(run);
-	}
-}
-
-/* ---- the good checkpoint ---- */
-
-static void note(const char *group, const char *name, bool attribute) {
-	if (n_objects == MOST_OBJECTS) abort();
-	snprintf(object[n_objects].group, sizeof object->group, "%s", group);
-	snprintf(object[n_objects].name, sizeof object->name, "%s", name);
-	object[n_objects++].attribute = attribute;
-}
-
-static herr_t note_attribute(hid_t at, const char *name, const H5A_info_t *info, void *group) {
-	(void)at, (void)info;
-	note(group, name, true);
-	return 0;
-}
-
-static herr_t note_link(hid_t at, const char *name, const H5L_info_t *info, void *group) {
-	(void)info;
-	const hid_t below = H5Oopen(at, name, H5P_DEFAULT);
-	char copy[40];
-	snprintf(copy, sizeof copy, "%s", name);
-	if (H5Iget_type(below) == H5I_DATASET) note(group, name, false);
-	else {
-		H5Aiterate2(below, H5_INDEX_NAME, H5_ITER_INC, NULL, note_attribute, copy);
-		H5Literate(below, H5_INDEX_NAME, H5_ITER_INC, NULL, note_link, copy);
-	}
-	H5Oclose(below);
-	return 0;
-}
-
-static hid_t open_image(void) {
-	const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-	H5Pset_fapl_core(access, 1 << 16, 0);
-	H5Pset_file_image(access, image, image_size);
-	const hid_t file = H5Fopen("memory", H5F_ACC_RDWR, access);
-	H5Pclose(access);
-	if (file < 0) abort();
-	return file;
-}
+enum { STEPS = 2 };
+static char *path;
 
 int LLVMFuzzerInitialize(int *argc, char ***argv) {
 	(void)argc, (void)argv;
-	quern_h5_quiet();
-	quern_run *run = open_run();
-	if (quern_run_setup(run) != QUERN_OK) abort();
-	run->mass_initial = quern_run_account(run).mass;
-	steps(run, 20);
-	const char *folder = getenv("TMPDIR"); /* best in memory */
-	snprintf(path, sizeof path, "%.200s", folder ? folder : "/tmp");
-	run->folder = quern_copy(path);
+	quern_run *run = kit_run("checkpoint", 20);
 	if (quern_checkpoint_write(run, run->clock.frame + 1) != QUERN_OK) abort();
-	quern_run_destroy(run);
-	strcat(path, "/checkpoint.h5");
-	FILE *f = fopen(path, "rb");
-	image = malloc(1 << 22);
-	image_size = f ? fread(image, 1, 1 << 22, f) : 0;
-	if (f) fclose(f);
-	const hid_t h = open_image();
-	char root[1] = "";
-	H5Aiterate2(h, H5_INDEX_NAME, H5_ITER_INC, NULL, note_attribute, root);
-	H5Literate(h, H5_INDEX_NAME, H5_ITER_INC, NULL, note_link, root);
-	H5Fclose(h);
+	path = quern_format("%s/checkpoint.h5", run->folder);
+	kit_close(run);
+	edits_begin(path, true);
 	return 0;
-}
-
-/* ---- edits ---- */
-
-typedef struct {
-	const uint8_t *at, *end;
-} bytes;
-
-static uint64_t take(bytes *b, int n) {
-	uint64_t value = 0;
-	for (int i = 0; i < n && b->at < b->end; i++) value |= (uint64_t)*b->at++ << 8 * i;
-	return value;
-}
-
-static hid_t some_type(uint64_t which) {
-	const hid_t types[6] = { H5T_NATIVE_INT32, H5T_NATIVE_DOUBLE, H5T_NATIVE_INT64, H5T_NATIVE_UINT8,
-		H5T_NATIVE_FLOAT, H5T_NATIVE_UINT32 };
-	return types[which % 6];
-}
-
-static void edit_attribute(hid_t at, const char *name, bytes *b) {
-	const uint64_t what = take(b, 1) % 3;
-	const hid_t old = H5Aopen(at, name, H5P_DEFAULT), is = H5Aget_type(old), space = H5Aget_space(old);
-	uint64_t value[32] = { take(b, 8) };
-	if (what == 0 && H5Tget_size(is) <= sizeof value) H5Awrite(old, is, value);
-	H5Aclose(old);
-	if (what) H5Adelete(at, name);
-	if (what == 2) {
-		const hsize_t n = take(b, 1) % 4;
-		const hid_t type = some_type(take(b, 1)), list = H5Screate_simple(1, &n, NULL);
-		const hid_t now = H5Acreate2(at, name, type, list, H5P_DEFAULT, H5P_DEFAULT);
-		H5Awrite(now, type, value);
-		H5Aclose(now);
-		H5Sclose(list);
-	}
-	H5Tclose(is);
-	H5Sclose(space);
-}
-
-static void edit_dataset(hid_t at, const char *name, bytes *b) {
-	const uint64_t what = take(b, 1) % 3;
-	const hid_t old = H5Dopen2(at, name, H5P_DEFAULT), is = H5Dget_type(old), space = H5Dget_space(old);
-	const hssize_t n = H5Sget_simple_extent_npoints(space);
-	const size_t size = H5Tget_size(is);
-	char *data = calloc((size_t)n + 1, size);
-	if (n) H5Dread(old, is, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
-	const uint64_t place = take(b, 2), value = take(b, 8);
-	if (what == 0 && n) {
-		memcpy(data + place % (uint64_t)n * size, &value, size < 8 ? size : 8);
-		H5Dwrite(old, is, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
-	}
-	H5Dclose(old);
-	if (what) H5Ldelete(at, name, H5P_DEFAULT);
-	if (what == 2) { /* another type, another size, another rank */
-		const hsize_t extent[3] = { place % 1000, take(b, 1) % 4, 1 };
-		const hid_t list = H5Screate_simple((int)(1 + take(b, 1) % 3), extent, NULL);
-		const hid_t now = H5Dcreate2(
-			at, name, value & 1 ? is : some_type(value >> 1), list, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-		H5Dclose(now);
-		H5Sclose(list);
-	}
-	free(data);
-	H5Tclose(is);
-	H5Sclose(space);
-}
-
-static void edit(hid_t file, bytes *b) {
-	for (int k = 0; k < MOST_EDITS && b->at < b->end; k++) {
-		const int i = (int)(take(b, 2) % (uint64_t)n_objects);
-		const hid_t at = *object[i].group ? H5Gopen2(file, object[i].group, H5P_DEFAULT) : file;
-		const bool there = object[i].attribute ? H5Aexists(at, object[i].name) > 0
-											   : H5Lexists(at, object[i].name, H5P_DEFAULT) > 0;
-		if (there && object[i].attribute) edit_attribute(at, object[i].name, b);
-		else if (there) edit_dataset(at, object[i].name, b);
-		if (at != file) H5Gclose(at);
-	}
-}
-
-static bool save(hid_t file, char why[256]) {
-	H5Fflush(file, H5F_SCOPE_GLOBAL);
-	const ssize_t n = H5Fget_file_image(file, NULL, 0);
-	char *edited = n > 0 ? malloc(512 + (size_t)n) : NULL;
-	if (!edited || H5Fget_file_image(file, edited + 512, (size_t)n) != n) abort();
-	H5Fclose(file);
-	quern_h5_seal(edited, 512 + (size_t)n);
-	const bool good = quern_save_bytes(path, edited, 512 + (size_t)n, why);
-	free(edited);
-	return good;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 	char broken[256];
 	int64_t rows = 0;
 	quern_text said = { 0 }, why = { 0 };
-	bytes b = { data, data + size };
-	bool good;
-	if (size >= 5 && !memcmp(data, "quern", 5)) good = quern_save_bytes(path, data, size, broken);
-	else {
-		const hid_t file = open_image();
-		edit(file, &b);
-		good = save(file, broken);
-	}
-	if (!good) abort();
-	quern_run *run = open_run();
-	good = quern_checkpoint_read(run, path, size % 2, &rows, &said, &why) == QUERN_OK;
+	if (size < 5 || memcmp(data, "quern", 5) != 0) edits_make(path, data, size);
+	else if (!quern_save_bytes(path, data, size, broken)) abort();
+	quern_run *run = kit_open();
+	const bool good = quern_checkpoint_read(run, path, size % 2, &rows, &said, &why) == QUERN_OK;
 	if (!good && !why.length) abort();
 	if (!size && !good) {
 		fprintf(stderr, "the checkpoint as it was written is refused: %s\n", why.data);
 		abort();
 	}
 	if (good) quern_run_account(run);
-	if (!size) steps(run, STEPS);
+	if (!size) kit_steps(run, STEPS);
 	quern_text_finish(&said);
 	quern_text_finish(&why);
 	quern_run_destroy(run);

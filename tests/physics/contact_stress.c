@@ -12,6 +12,7 @@
 #include "table.h"
 #include "text.h"
 #include <math.h>
+#include <string.h>
 
 static const double radius = 1e-3, stiffness = 1e5, cell = 4e-3;
 static const double squeezed = 3e-3; /* overlap over a diameter */
@@ -237,8 +238,78 @@ static void strained_lattices(void **state) {
 	assert_true(good);
 }
 
+/* ---- beside bodies ---- */
+
+static void update(quern_run *run) {
+	for (size_t k = 0; k < run->plan->n_stages; k++) {
+		const quern_plan_stage *stage = &run->plan->stages[k];
+		if (strcmp(stage->name, "hybrid.update") != 0) continue;
+		const quern_step step = quern_run_record(run, stage->section);
+		if (stage->stage->run(stage->section->solver->self, &step) != QUERN_OK) fail_msg("%s", run->message);
+	}
+	quern_plan_refresh(run->plan);
+}
+
+/* Of the points in a row of cells, and of all grains above the middle of their room, for a metre of the bed. */
+static double pressed(quern_run *run, int row) {
+	const quern_column x = harness_field(run, "point.position"), stress = harness_field(run, "point.stress");
+	double sum = 0;
+	int n = 0;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		if ((int)floor(x.real[1][i] / cell) == row) sum -= stress.real[1][i], n++;
+	assert_true(n > 0);
+	return sum / n;
+}
+
+static double weight_above(quern_run *run, double height, double width) {
+	const quern_column x = harness_field(run, "grain.position"), m = harness_field(run, "grain.mass");
+	double sum = 0;
+	for (uint32_t i = 0; i < harness_count(run, "grain"); i++)
+		if (x.real[1][i] > height) sum += m.real[0][i] * 9.81 / width;
+	return sum;
+}
+
+/* A bed of discs at rest on a face of the domain, on a body on a face of cells, and on bodies that cut their cells: points
+ * made in it bear what lies above them, in the lowest cells too. Of a cell that is open to a quarter the room is known to a fifth. */
+static void beds_bear_their_weight(void **state) {
+	static const double floors[] = { 0, 1, 1.25, 1.5, 1.75 }; /* cells */
+	const double width = 0.06;
+	bool good = true;
+	(void)state;
+	table_head("vertical stress of new points over the weight above them");
+	for (size_t f = 0; f < sizeof floors / sizeof *floors; f++) {
+		const double base = floors[f] * cell;
+		double weight[3];
+		quern_run *run = harness_open(1,
+			"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [%g, 0.06], "
+			"periodic: "
+			"[true, false]},\ntime: {end: 10}, bodies: [{plane: {point: [0, %g], normal: [0, 1]}}],\n"
+			"continuum: {cell: %g, material: {elastic: {bulk_modulus: 1e6, density: 1900}}},\n"
+			"hybrid: {oracle: [{packing_fraction: {depth: 9 mm, half_width: 4 mm}}], substeps: 4},\n"
+			"grains: {material: {density: 2500, radius: {mean: %g, spread: 0.2}}, contact: {linear: "
+			"{stiffness: "
+			"1e6}},\n  settle: {energy: 1e-8}, fill: {region: {box: {lower: [0, %g], upper: [%g, %g]}}, "
+			"settle: true}}}\n",
+			width, base, cell, radius, base + radius, width, base + 0.03);
+		harness_settle(run);
+		harness_steps(run, 1);
+		const int first = (int)floor(floors[f]);
+		for (int k = 0; k < 3; k++)
+			weight[k] =
+				weight_above(run, 0.5 * (fmax((first + k) * cell, base) + (first + k + 1) * cell), width);
+		update(run);
+		for (int k = 0; k < 3; k++) {
+			char name[80];
+			snprintf(name, sizeof name, "floor at %g cells, row %d", floors[f], k);
+			good &= table_row(name, pressed(run, first + k) / weight[k], 1, 0.12);
+		}
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(pairs_of_grains), cmocka_unit_test(grains_on_planes),
-		cmocka_unit_test(strained_lattices) };
+		cmocka_unit_test(strained_lattices), cmocka_unit_test(beds_bear_their_weight) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

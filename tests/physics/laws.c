@@ -10,6 +10,7 @@
 #include "table.h"
 #include "text.h"
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 /* Two grains and a floor, all in touch; the second grain may be fixed. Steps so short that nothing moves. */
@@ -48,6 +49,55 @@ static void every_law_counts(void **state) {
 		harness_close(run);
 	}
 	assert_true(good);
+}
+
+/* A step is limited by all laws together: twelve springs with their dashpots have the limits of the one that they make up,
+ * which is seven times as stiff as the stiffest of them. */
+static void steps_see_every_law(void **state) {
+	static text laws;
+	bool good = true;
+	(void)state;
+	table_head("limits of the step by twelve springs, over those by one");
+	for (int dim = 2; dim <= 3; dim++)
+		for (int strong = 0; strong < 2; strong++) {
+			double step[2], hard[2];
+			char reason[200], hard_reason[200];
+			for (int many = 0; many < 2; many++) {
+				laws.length = 0;
+				/* dashpots add up to that of the sum if stiffnesses are equal and each damps by 1/sqrt(12) */
+				for (int k = 0; k < (many ? 12 : 1); k++)
+					text_add(&laws, "{linear: {stiffness: %d, restitution: %s, friction: 0}}, ",
+						many ? 6500 : 78000,
+						!strong ? "1"
+						: many  ? "0.26639"
+								: "0.05");
+				text_add(&laws, "marking");
+				quern_run *run = touching(dim, laws.data, false);
+				step[many] = quern_run_limit(run, &hard[many], reason, hard_reason);
+				harness_close(run);
+			}
+			good &= table_row("recommended", step[1] / step[0], 1, strong ? 1e-3 : 1e-12);
+			good &= table_row("hard", hard[1] / hard[0], 1, strong ? 1e-3 : 1e-12);
+		}
+	assert_true(good);
+}
+
+/* The sentence about a limit names the contact that sets it: here a floor that damps, where grains bounce. */
+static void limits_name_their_contact(void **state) {
+	char reason[200], hard_reason[200];
+	double hard;
+	(void)state;
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [1, 1]}, time: {end: 1},\n"
+		"bodies: [{plane: {point: [0, 0], normal: [0, 1]}},\n"
+		"  {box: {lower: [0, 0], upper: [0.1, 0.1], contact: {restitution: 0.01}}}],\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, contact: {linear: {stiffness: 1e5, "
+		"restitution: 0.9}},\n  place: [{position: [0.5, 0.5]}, {position: [0.6, 0.5]}]}}\n");
+	quern_run_limit(run, &hard, reason, hard_reason);
+	assert_non_null(strstr(hard_reason, "on body.box"));
+	assert_non_null(strstr(hard_reason, "damping ratio"));
+	assert_null(strstr(hard_reason, "two lightest"));
+	harness_close(run);
 }
 
 /* Entry of the list whose mark is there. */
@@ -137,6 +187,7 @@ static void laws_reach_the_farthest(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(every_law_counts),
+		cmocka_unit_test(steps_see_every_law), cmocka_unit_test(limits_name_their_contact),
 		cmocka_unit_test(rows_of_every_kind), cmocka_unit_test(laws_reach_the_farthest) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,6 +47,19 @@ static void ends(quern_run *run, const char *first, const char *second) {
 	harness_close(run);
 }
 
+/* No frame shows a centre behind a surface, also in a run so short that no step has looked for it. */
+static void what_is_shown(void **state) {
+	(void)state;
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		const double k = weight(dim) / radius;
+		quern_run *run = open_scene(dim, true, k / 20, 0, "");
+		assert_int_equal(harness_try(run, 30), QUERN_OK);
+		assert_int_equal(quern_run_look(run), QUERN_E_NUMERIC);
+		if (!strstr(run->message, "behind the surface")) fail_msg("%s", run->message);
+		harness_close(run);
+	}
+}
+
 /* A grain whose weight presses it deep into what bears it ends the run, with the names of both and the stiffness; one that
  * lies less deep does not. A floor that bears nothing is fallen through, and said so at once. */
 static void what_lies_deep(void **state) {
@@ -113,7 +126,7 @@ static void what_spins(void **state) {
 }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(what_lies_deep), cmocka_unit_test(what_strikes),
-		cmocka_unit_test(what_is_out), cmocka_unit_test(what_spins) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(what_lies_deep), cmocka_unit_test(what_is_shown),
+		cmocka_unit_test(what_strikes), cmocka_unit_test(what_is_out), cmocka_unit_test(what_spins) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

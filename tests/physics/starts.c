@@ -150,9 +150,27 @@ static void settling_is_estimated(void **state) {
 	assert_true(good);
 }
 
+/* Grains are looked at once in a contact's duration, however many steps that has: here 2^32. */
+static void steps_may_be_as_short(void **state) {
+	static const char *const levels[] = { "v1", "auto" };
+	(void)state;
+	for (int k = 0; k < 2; k++) {
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [0.1, 0.1]}\ntime: "
+			"{end: "
+			"1}\nrun: {instructions: %s}\ngrains: {material: {density: 2500, radius: {mean: 1 mm}},\n"
+			"  contact: {linear: {stiffness: 1e5}}, settle: {step: 2.3283064365386963e-10, most: 400},\n"
+			"  fill: {region: {box: {lower: [0.01, 0.01], upper: [0.012, 0.012]}}, settle: true}}\n",
+			levels[k]);
+		harness_settle(run);
+		assert_int_equal(run->clock.settle_step, 400);
+		harness_close(run);
+	}
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(height_is_along_gravity),
 		cmocka_unit_test(stiffness_is_that_of_the_whole), cmocka_unit_test(points_in_bodies_are_left_out),
-		cmocka_unit_test(settling_is_estimated) };
+		cmocka_unit_test(settling_is_estimated), cmocka_unit_test(steps_may_be_as_short) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

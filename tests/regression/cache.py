@@ -2,6 +2,7 @@
 import os
 import pathlib
 import shutil
+import signal
 
 import h5py
 
@@ -10,6 +11,34 @@ import workshop
 
 OPTIONS = [*lab.SMALL["column"], "--set=time.end=10 ms", "--set=output.every=5 ms",
            "--set=grains.fill.1.region.box.upper=[0.039, 0.08]", "--set=grains.settle.step=0.05"]
+# Stands in for the continuum: lets grains grow a little at every step, also while they settle, and shows by how much.
+SWELL = """#include <quern/abi.h>
+#include <math.h>
+typedef struct { quern_real rate; } swell;
+static const quern_param params[] = { QUERN_PARAM(swell, rate, "1", "Per step.", .max = 1), QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES }, rows[] = {
+	{ .field = "grain.radius", .unit = "m", .access = QUERN_UPDATE, .shape = QUERN_SCALAR },
+	{ .field = "grain.swollen", .unit = "m", .doc = "Growth.", .access = QUERN_WRITE, .shape = QUERN_SCALAR },
+	QUERN_END_USES };
+static quern_status grow(const void *self, const quern_step *s) {
+	for (uint32_t i = 0; i < s->host->set(s->run, "grain").n; i++) {
+		quern_real *radius = &s->use[0].real[0][i], more = *radius * ((const swell *)self)->rate;
+		*radius += more;
+		if (s->use[1].real[0]) s->use[1].real[0][i] = more;
+	}
+	return QUERN_OK;
+}
+static const quern_stage stages[] = {
+	{ .name = "swell.grow", .phase = QUERN_GRAINS, .uses = rows, .run = grow }, { .name = NULL } };
+static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
+	return *hard = INFINITY; /* the other solver's is the least */
+}
+static const quern_solver_ops ops = { .size = sizeof ops, .stages = stages, .limit = limit };
+static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_SOLVER, .revision = 1,
+	.dims = QUERN_2D | QUERN_3D, .id = "solver.swell", .brief = "Growth.", .instance_size = sizeof(swell),
+	.params = params, .uses = uses, .ops = &ops };
+QUERN_LIBRARY(plugin, "0", "MIT");
+"""
 TAKEN, KEPT = "settled already: ", "settled state kept in "
 
 
@@ -73,10 +102,73 @@ def damaged(place, cache):
         path.write_bytes(damage(path.read_bytes()))
         assert KEPT in run(place / f"damaged{k}", cache, "--until=0"), k
         assert TAKEN in run(place / f"mended{k}", cache, "--until=0"), k
+    path, = files(cache)
+    with open(path, "wb") as file:
+        file.truncate(8 << 30)  # of nothing: it is not read to its end
+    run(place / "huge", cache, "--until=0")
+    assert lab.summary(place / "huge")["settle_seconds"] < 10
+    path.unlink()
+    os.mkfifo(path)
+    assert KEPT in run(place / "pipe", cache, "--until=0") and path.is_file()
     blocked = place / "blocked"
     blocked.write_text("no folder")
     assert "settled state not kept: " in run(place / "nowhere", blocked / "cache", "--until=0")
     run(place / "off", "", "--until=0")
+
+
+def changed_on_the_way(place, cache):
+    """A state is kept for what settling began with, whatever has become of the files since."""
+    table, out = place / "dropped.txt", place / "on_the_way"
+    dropped, cache = "x y radius\n0.02 {} 0.001\n", place / "on_the_way_cache"
+    options = [*OPTIONS, f"--set=grains.file={table}", "--until=0"]
+    table.write_text(dropped.format(0.25))
+    os.environ["QUERN_CACHE"] = str(cache)
+    process = lab.start("column", out, *options)
+    assert lab.wait_for(out / "scene.yaml", process)
+    table.write_text(dropped.format(0.3))
+    assert process.wait() == 0
+    assert KEPT in (out / "log.txt").read_text()
+    assert TAKEN not in run(place / "changed", cache, *options)
+    assert TAKEN in run(place / "changed_not", cache, *options)
+
+
+def resumed(place, cache):
+    """One that began with other plugins is nobody's: a run that goes on from a checkpoint keeps none."""
+    out, cache = place / "stopped", place / "resumed_cache"
+    lab.on_the_way("column", out, OPTIONS, signal.SIGINT, lambda process, share: None)
+    assert not lab.frames(out)
+    log = run(out, cache, "--until=0", "--force", resume=True, QUERN_PLUGIN_PATH=str(place / "plugins"))
+    assert "contact.linear was" in log and KEPT not in log and TAKEN not in log
+    assert TAKEN not in run(place / "not_resumed", cache, "--until=0", QUERN_PLUGIN_PATH=str(place / "plugins"))
+
+
+def helped(place, cache):
+    """A solver without an end of settling of its own that acts on grains counts, and so does what it shows of that."""
+    folder = place / "swelling"
+    folder.mkdir()
+    workshop.compile(SWELL, "solver.swell", folder)
+    how = {"QUERN_PLUGIN_PATH": str(folder)}
+    for k, (rate, taken) in enumerate([(1e-9, False), (2e-9, False), (1e-9, True)]):
+        options = ["--until=0", f"--set=hybrid={{solver: swell, rate: {rate}}}",
+                   "--set=output.fields=[grain.swollen]", "--set=observe=[energy]"]
+        assert (TAKEN in run(place / f"helped{k}", cache, *options, **how)) == taken, rate
+        with h5py.File(place / f"helped{k}/checkpoint.h5") as file:
+            assert 1e-6 < file.attrs["settle_dt"] < 1e-4, "the step while settling is not the least of both"
+        lab.run("column", place / f"helped{k}_own", *OPTIONS, *options, "--no-cache", **how)
+        lab.same(place / f"helped{k}_own", place / f"helped{k}", f"with another solver's help, {rate}")
+
+
+def together(place, cache):
+    """Runs that keep the same state at once each leave it whole."""
+    os.environ["QUERN_CACHE"] = str(cache)
+    for attempt in range(2):
+        shutil.rmtree(cache)
+        outs = [place / f"together{attempt}{k}" for k in range(3)]
+        processes = [lab.start("column", out, *OPTIONS, "--until=0") for out in outs]
+        assert [process.wait() for process in processes] == [0, 0, 0]
+        logs = [(out / "log.txt").read_text() for out in outs]
+        assert all(KEPT in log or TAKEN in log for log in logs), logs
+        assert [path.name for path in cache.iterdir()] == [path.name for path in files(cache)] and len(files(cache)) == 1
 
 
 def renamed(place, cache):
@@ -94,6 +186,6 @@ if __name__ == "__main__":
     with lab.workplace() as name:
         place = pathlib.Path(name)
         cache = place / "cache"
-        for test in (same_bits, shared, apart, damaged, renamed):
+        for test in (same_bits, shared, apart, damaged, changed_on_the_way, resumed, helped, together, renamed):
             test(place, cache)
             print(test.__name__.replace("_", " "), "holds")

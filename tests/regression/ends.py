@@ -1,7 +1,11 @@
 """Ends that change on resume, and --until: frames are due at whole multiples of output.every and at time.end, none is missing
 and none comes twice, and where nothing is asked for otherwise the bits are those of a run in one go."""
+import contextlib
 import math
+import os
 import pathlib
+import pty
+import re
 import subprocess
 
 import lab
@@ -114,8 +118,10 @@ def until(place):
     assert bytes_of(out) == before, "a run that had nothing to do has changed its folder"
     run(out, *sets(10, 3), "--until", "9 ms", resume=True)
     assert lab.summary(out)["time_end"] == 0.009000000000000001
+    run(out, *sets(10, 3), "--until", "9.5 ms", resume=True)
     run(out, *sets(10, 3), resume=True)
     lab.same(base, out, "stopped by --until and gone on")
+    assert lab.summary(out)["step_limited_by"] == lab.summary(base)["step_limited_by"] != ""
     # the command that it recommends
     run(out.with_name("said"), *sets(10, 3), "--until", "4 ms")
     line = (out.with_name("said") / "log.txt").read_text().splitlines()[-1]
@@ -123,7 +129,23 @@ def until(place):
     lab.same(base, out.with_name("said"), "gone on as the log says")
 
 
+def left(place):
+    """On a terminal, how long it will take from here: settling is over by then, also after a checkpoint and a resume."""
+    master, slave = pty.openpty()
+    words = [word for word in lab.command("column", place / "left", *lab.SMALL["column"], "--set=time.end=80 ms",
+                                          "--set=grains.settle.step=0.002") if word != "--quiet"]
+    process, said = subprocess.Popen(words, stderr=slave), b""
+    os.close(slave)
+    with contextlib.suppress(OSError):  # that is how a terminal says that nobody is there any more
+        while part := os.read(master, 4096):
+            said += part
+    assert process.wait() == 0
+    seconds = [float(number) for number in re.findall(rb"step \d+, (-?\d+) s left", said)]
+    assert seconds and min(seconds) >= 0, seconds
+    print(f"{lab.summary(place / 'left')['settle_seconds']:.1f} s of settling, then {seconds} s left")
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
-        for test in (later, later_on_the_way, earlier, other_every, default_every, until):
+        for test in (later, later_on_the_way, earlier, other_every, default_every, until, left):
             test(pathlib.Path(name))

@@ -1,5 +1,6 @@
 """The folder of a run: not replaced without --force, and then no more than what a run has left; never what the run was given;
 held by one run at a time, and free again once that is gone, however it went."""
+import os
 import pathlib
 import shutil
 import signal
@@ -86,6 +87,10 @@ def own_scene(place):
     with open(place / "changed/scene.yaml", "a") as file:
         file.write("# changed\n")
     run(SCENE, place / "changed", "--force", status=4)
+    # a pipe is nobody's scene, and nobody waits for it
+    (place / "pipe").mkdir()
+    os.mkfifo(place / "pipe/scene.yaml")
+    assert "pipe/scene.yaml is not what a run has left" in run(SCENE, place / "pipe", "--force", status=4)
     print("what a run was given is never replaced")
 
 
@@ -112,6 +117,12 @@ def resumed(place):
     before = contents(out)
     assert "no checkpoint.h5" in run(SCENE, out, "--resume", status=4)
     assert contents(out) == before
+    # one that was stopped before its first checkpoint begins anew, and still has the text that somebody wrote
+    begun = place / "begun"
+    run(SCENE, begun, "--until", "0")
+    (begun / "checkpoint.h5").unlink()
+    run(begun / "scene.yaml", begun, "--resume", "--until", "1 ms")
+    assert (begun / "input.yaml").read_bytes() == SCENE.read_bytes()
     print("a run goes on from its own scene.yaml")
 
 

@@ -12,7 +12,6 @@ import time
 import h5py
 import numpy
 
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # threads that spin are very slow where others work too
 QUERN = os.environ["QUERN"]
 SOURCE = pathlib.Path(os.environ["QUERN_SOURCE"])
 PLUGINS = pathlib.Path(os.environ["QUERN_PLUGINS_DIR"])

@@ -189,6 +189,8 @@ static const struct {
 	{ "grain/position.1", -1e300, 0, false },
 	{ "grain/position.0", 1, 0, false }, /* eighty domains away */
 	{ "grain/position.0", (double)NAN, 0, false },
+	{ "grain/radius.0", 180, 0, false }, /* every cell that it covers would be looked at */
+	{ "grain/radius.0", -0.001, 0, false },
 	{ "grain/velocity.0", (double)INFINITY, 0, false },
 	{ "total/damped.0", (double)INFINITY, 0, false },
 	{ "total/rubbed.0", (double)NAN, 0, false },
@@ -218,6 +220,8 @@ static const struct {
 	{ "@begin", (double)NAN, 0, false },
 	{ "@wall", (double)INFINITY, 0, false },
 	{ "@mass_initial", (double)NAN, 0, false },
+	{ "@mass_initial", 1e9, 0, false },
+	{ "grain/mass.0", 1e9, 0, false },
 };
 
 static void refuses_what_cannot_be(void **state) {
@@ -295,6 +299,9 @@ static int in_child(bool write) {
 		if (store->fields[k].set == grains && !store->fields[k].local && store->fields[k].twice)
 			for (int c = 0; c < store->fields[k].n_components; c++)
 				memset(store->fields[k].data[1][c], 0, MANY * sizeof(double));
+	const quern_field *radius = &store->fields[quern_store_field(store, "grain.radius")];
+	for (uint32_t i = 0; write && i < MANY; i++) ((quern_real *)radius->data[radius->now][0])[i] = 0.001;
+	run->mass_initial = quern_run_account(run).mass; /* of all of them */
 	const double before = peak();
 	const quern_status status = write ? quern_checkpoint_write(run, 0) : read_back(run, &why);
 	const double state = (double)quern_store_bytes(store), taken = peak() - before;

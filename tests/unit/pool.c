@@ -9,7 +9,10 @@
 #include <math.h>
 #include <platform.h>
 #include <pool.h>
+#include <sched.h>
+#include <signal.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
@@ -95,6 +98,63 @@ static void caller_does_it_alone(void **state) {
 	quern_pool_destroy(pool);
 }
 
+static int end_of(void (*work)(void)) {
+	const pid_t child = fork();
+	int status = -1;
+	if (child == 0) {
+		work();
+		_exit(0);
+	}
+	assert_int_equal(waitpid(child, &status, 0), child);
+	return status;
+}
+
+#ifndef QUERN_SANITIZED
+static void on_crash(int number) { _exit(number == SIGSEGV ? 42 : 1); }
+
+static void use_up_the_stack(void *arg, uint32_t i, uint32_t worker) {
+	(void)arg, (void)i;
+	while (!worker) sched_yield();
+	for (;;) *(volatile char *)__builtin_alloca(4096) = 1;
+}
+
+static void recurse_for_ever(void) {
+	const struct sigaction action = { .sa_handler = on_crash, .sa_flags = SA_ONSTACK };
+	sigaction(SIGSEGV, &action, NULL);
+	quern_pool_each(quern_pool_create(2), 2, use_up_the_stack, NULL);
+}
+
+/* A handler of crashes can speak where a thread has no stack left. */
+static void crash_has_a_stack(void **state) {
+	(void)state;
+	const int status = end_of(recurse_for_ever);
+	assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 42);
+}
+#endif
+
+static void call_again(void *arg, uint32_t i, uint32_t worker) {
+	counts own = { 0 };
+	(void)i, (void)worker;
+	quern_pool_each(arg, 1, count_one, &own);
+}
+
+static void call_within(uint32_t workers, uint32_t n) {
+	quern_pool *pool = quern_pool_create(workers);
+	fclose(stderr); /* it complains */
+	quern_pool_each(pool, n, call_again, pool);
+}
+static void one_within(void) { call_within(1, 1); }
+static void many_within(void) { call_within(2, 8); }
+
+/* With two workers a body that calls would hang: it ends the program with one as well, so that its author learns of it. */
+static void body_may_not_call(void **state) {
+	(void)state;
+	for (int k = 0; k < 2; k++) {
+		const int status = end_of(k ? many_within : one_within);
+		assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT);
+	}
+}
+
 /* The number of workers can be had from the environment, where batch systems put it; nonsense there is passed over. */
 static void environment_is_heard(void **state) {
 	(void)state;
@@ -146,7 +206,10 @@ static void tree_sums(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(every_index_once),
 		cmocka_unit_test(rounds_do_not_mix), cmocka_unit_test(caller_does_it_alone),
-		cmocka_unit_test(environment_is_heard), cmocka_unit_test(scratch_grows),
-		cmocka_unit_test(tree_sums) };
+#ifndef QUERN_SANITIZED
+		cmocka_unit_test(crash_has_a_stack),
+#endif
+		cmocka_unit_test(body_may_not_call), cmocka_unit_test(environment_is_heard),
+		cmocka_unit_test(scratch_grows), cmocka_unit_test(tree_sums) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,75 @@
+"""What the pages show works as it stands there: commands, scenes, Python, and the words that the program is said to print.
+
+In a page, an indented line `build/quern ...` is run, with the status that `# status N` behind it says; a block of yaml whose first
+line is `# FILE` is saved, others are planned; a block of python is run; every line of a block of text is found in what the last
+command printed. All of a page happens in one folder, in order. Every link of every page leads somewhere."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+SOURCE, QUERN = pathlib.Path(os.environ["QUERN_SOURCE"]), pathlib.Path(os.environ["QUERN"])
+PAGES = {"README.md": 10, "docs/tutorial.md": 8, "docs/run_folder.md": 2, "docs/observers.md": 1}
+PIECE = re.compile(r"^```(yaml|python|text)\n(.*?)^```|^    (build/quern [^\n]*)$", re.M | re.S)
+
+
+class Page:
+    """One page, played in a folder."""
+
+    def __init__(self, name, here):
+        self.name, self.here, self.printed, self.done = name, here, "", 0
+
+    def run(self, command, status=0):
+        done = subprocess.run(command, cwd=self.here, capture_output=True, text=True, shell=isinstance(command, str),
+                              env=os.environ | {"QUERN_CACHE": str(self.here / "cache")})
+        assert done.returncode == status, f"{self.name}: {command}: status {done.returncode}\n{done.stdout}{done.stderr}"
+        self.printed = done.stdout + done.stderr
+
+    def command(self, line):
+        line, _, comment = line.partition("    # ")
+        status = re.match(r"status (\d+)", comment)
+        self.run(line.strip(), int(status.group(1)) if status else 0)
+        self.done += 1
+
+    def yaml(self, text):
+        saved = re.match(r"# (\S+\.yaml)\n", text)
+        (self.here / (saved.group(1) if saved else "scene.yaml")).write_text(text)
+        if not saved:
+            self.run([str(QUERN), "plan", "scene.yaml"])
+
+    def python(self, text):
+        self.run([sys.executable, "-c", text])
+        self.done += 1
+
+    def text(self, text):
+        for line in text.splitlines():
+            assert line.strip() in self.printed, f"{self.name}: the program does not print '{line}'\n{self.printed}"
+
+
+def play(name, least):
+    with tempfile.TemporaryDirectory() as folder:
+        here = pathlib.Path(folder)
+        (here / "build").symlink_to(QUERN.parent)
+        (here / "configs").symlink_to(SOURCE / "configs")
+        (here / "out").mkdir()
+        page = Page(name, here)
+        for block, text, command in PIECE.findall((SOURCE / name).read_text()):
+            page.command(command) if command else getattr(page, block)(text)
+        assert page.done >= least, f"{name} shows {page.done} commands and pieces of Python, fewer than it did"
+        print(f"ok  {name}: {page.done}")
+
+
+def links():
+    for path in [SOURCE / "README.md", SOURCE / "CONTRIBUTING.md", *(SOURCE / "docs").rglob("*.md")]:
+        for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text()):
+            assert (path.parent / link).exists(), f"{path.name} links to {link}, which is not there"
+    print("ok  every link leads somewhere")
+
+
+links()
+for page, fewest in PAGES.items():
+    play(page, fewest)
+subprocess.run([SOURCE / "tools/reference", "--check"], check=True)
+print("ok  docs/scene.md is what the tables say")
