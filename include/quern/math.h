@@ -9,7 +9,7 @@
  *
  * Every function is free of branches and of table look-ups, so that a QUERN_SIMD loop over it vectorises;
  * both sides of every condition are computed, and one is selected. Errors are in ulp of the exact result, as
- * bounds that tests/unit/math.c asserts and that 10^7 random arguments in each of its ranges have kept;
+ * bounds that tests/unit/math.c asserts for 200 000 random arguments in each of its ranges;
  * results below 2^-1022 are left out. A result that is not a number is always the same one, quern_nan(),
  * except where an argument that is not a number is said to pass through.
  *

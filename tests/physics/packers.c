@@ -66,7 +66,8 @@ static void close_packer(packer *p) {
 typedef struct {
 	uint32_t dim, most; /* stops after `most` grains */
 	placer placer;
-	uint64_t draws;
+	uint64_t draws, forgotten; /* radii drawn; those that were drawn and given up with their region */
+	bool forgets;
 	quern_real lower[3], upper[3], cell_lower[3], cell_upper[3];
 	bool last[3];
 	uint32_t outside; /* placed with the centre outside their own cell */
@@ -75,7 +76,8 @@ typedef struct {
 } filling;
 
 static quern_real job_radius(quern_pack_job *job) {
-	return quern_radius_draw(&law, job->host, ((const filling *)job->scene)->draws);
+	const filling *f = job->scene;
+	return quern_radius_draw(&law, job->host, f->draws + f->forgotten);
 }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
@@ -133,6 +135,7 @@ static uint64_t fill_cell(filling *f, const packer *p, uint64_t key, uint64_t co
 	job.n_seed = n;
 	const quern_packer_ops *ops = p->plugin->ops;
 	ops->pack[f->dim - 2](p->self, &job);
+	f->forgotten += f->forgets;
 	return job.counter;
 }
 
@@ -335,6 +338,23 @@ static void radii_follow_the_law(void **state) {
 	}
 }
 
+/* The test can tell: darts whose radius is drawn anew for every region place too many small grains. */
+static void radii_drawn_anew_do_not(void **state) {
+	(void)state;
+	packer darts = open_packer("packer.random");
+	filling f;
+	begin(&f, 2, 50, true);
+	f.forgets = true;
+	fill_region(&f, &darts);
+	double mean = 0;
+	for (uint32_t g = 0; g < f.placer.n; g++) mean += f.placer.spot[g].radius / f.placer.n;
+	printf("  radii drawn anew: %u grains, KS p %.2g, mean radius %.4f of the law's\n", f.placer.n,
+		radius_p(&f), mean / law.mean);
+	assert_true(f.placer.n >= 5000 && radius_p(&f) < 1e-3 && mean < law.mean);
+	quern_placer_finish(&f.placer);
+	close_packer(&darts);
+}
+
 /* A second fill gives the same bits. */
 static void repeats(void **state) {
 	(void)state;
@@ -490,7 +510,8 @@ static void finds_what_lies_on_faces(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(reaches_its_fraction), cmocka_unit_test(no_overlap),
-		cmocka_unit_test(centres_inside), cmocka_unit_test(radii_follow_the_law), cmocka_unit_test(repeats),
+		cmocka_unit_test(centres_inside), cmocka_unit_test(radii_follow_the_law),
+		cmocka_unit_test(radii_drawn_anew_do_not), cmocka_unit_test(repeats),
 		cmocka_unit_test(tangent_grains_touch), cmocka_unit_test(stops_when_told),
 		cmocka_unit_test(keeps_the_counter), cmocka_unit_test(starts_from_anything),
 		cmocka_unit_test(respects_walls), cmocka_unit_test(finds_what_lies_on_faces) };

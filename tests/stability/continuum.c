@@ -52,9 +52,10 @@ static double fastest(quern_run *run, uint32_t dim) {
 typedef struct block {
 	const char *name, *shape;
 	uint32_t dim;
-	bool random;    /* points anywhere in their quarter of a cell */
-	double cut;     /* share of a full cell's mass below which a node's force is limited */
-	double failing; /* from this factor on the run must end */
+	bool random; /* points anywhere in their quarter of a cell */
+	double cut;  /* share of a full cell's mass below which a node's force is limited */
+	double sound,
+		failing; /* as in the page: up to this factor nothing is gained; from this one on the run ends */
 } block;
 
 /* No gravity, no contact with walls; FLIP keeps every motion that the grid can carry. */
@@ -94,16 +95,16 @@ static void block_row(const block *b, double factor) {
 	}
 	beyond_row("%s | %.3g | %.3g | %.2g | %lld | %s", b->name, factor, most / before,
 		speed / pressure_wave(b->dim), (long long)run->clock.step, beyond_message(run));
-	if (factor <= 0.9 && (run->status != QUERN_OK || most > 1.05 * before))
-		fail_msg("%s: energy at the recommended step", b->name);
+	if (factor <= b->sound && (run->status != QUERN_OK || most > 1.01 * before))
+		fail_msg("%s: energy within the limit", b->name);
 	if (factor >= b->failing) beyond_expect_culprit(run, "mpm.gather", "point");
 	harness_close(run);
 }
 
 static void shaken_block(void **unused) {
-	static const block blocks[] = { { "2-D, lattice", "gimp", 2, false, 1e-3, 2 },
-		{ "2-D, random points", "gimp", 2, true, 1e-3, 1.5 },
-		{ "3-D, random points", "gimp", 3, true, 1e-3, 2 } };
+	static const block blocks[] = { { "2-D, lattice", "gimp", 2, false, 1e-3, 1, 2 },
+		{ "2-D, random points", "gimp", 2, true, 1e-3, 1, 1.5 },
+		{ "3-D, random points", "gimp", 3, true, 1e-3, 1.3, 2 } };
 	static const double factors[] = { 0.5, 0.9, 1, 1.1, 1.2, 1.3, 1.5, 2, 2.5, 4 };
 	(void)unused;
 	beyond_table("An elastic block, shaken", "block | step over hard limit | largest kinetic energy over "
@@ -115,9 +116,9 @@ static void shaken_block(void **unused) {
 
 /* Hats have no limit that holds for all places of points: a point just over a cell's face feeds a node of no mass. */
 static void light_nodes(void **unused) {
-	static const block shapes[] = { { "gimp, cut 1e-6", "gimp", 2, true, 1e-6, INFINITY },
-		{ "linear, cut 1e-6", "linear", 2, true, 1e-6, INFINITY },
-		{ "linear, cut 1e-3", "linear", 2, true, 1e-3, INFINITY } };
+	static const block shapes[] = { { "gimp, cut 1e-6", "gimp", 2, true, 1e-6, 0.5, INFINITY },
+		{ "linear, cut 1e-6", "linear", 2, true, 1e-6, 0, INFINITY },
+		{ "linear, cut 1e-3", "linear", 2, true, 1e-3, 0, INFINITY } };
 	(void)unused;
 	beyond_table("Nodes that hardly have mass: random points at half of the recommended step",
 		"shape | steps | largest kinetic energy over first | what Quern says");
@@ -131,7 +132,7 @@ static void light_nodes(void **unused) {
 			most = fmax(most, quern_run_account(run).kinetic);
 		beyond_row("%s | %lld | %.3g | %s", shapes[k].name, (long long)run->clock.step, most / before,
 			beyond_message(run));
-		if (!k && (run->status != QUERN_OK || most > 1.05 * before)) fail_msg("gimp gains energy");
+		if (!k && (run->status != QUERN_OK || most > 1.01 * before)) fail_msg("gimp gains energy");
 		if (k == 1) beyond_expect_culprit(run, "mpm.gather", "point");
 		harness_close(run);
 	}
@@ -139,7 +140,7 @@ static void light_nodes(void **unused) {
 
 /* Points may fly faster than their waves: the recommended step knows, and nothing is taken for a blow-up. */
 static void faster_than_waves(void **unused) {
-	static const block fast = { "fast", "gimp", 2, false, 1e-3, INFINITY };
+	static const block fast = { "fast", "gimp", 2, false, 1e-3, 1, INFINITY };
 	(void)unused;
 	quern_run *run = open_block(&fast, 10 * pressure_wave(2));
 	const double before = quern_run_account(run).momentum[0];
@@ -165,7 +166,7 @@ static void column_row(const material *m, double factor) {
 		most = fmax(most, quern_run_account(run).kinetic);
 	beyond_row("%s | %.3g | %.2g | %lld | %s", m->name, factor, most / unit, (long long)run->clock.step,
 		beyond_message(run));
-	if (factor <= 1 && (run->status != QUERN_OK || most > 1e-5 * unit)) fail_msg("%s moves", m->name);
+	if (factor <= 1.25 && (run->status != QUERN_OK || most > 1e-5 * unit)) fail_msg("%s moves", m->name);
 	if (factor >= 4) beyond_expect_culprit(run, "mpm.gather", "point");
 	harness_close(run);
 }

@@ -109,6 +109,51 @@ static void one_contact(void **unused) {
 	}
 }
 
+/* ==== one collision ==== */
+
+/* Restitution of two equal discs that hit each other head-on without damping, with so many steps in a contact's
+ * duration; `phase` of a step later. */
+static double rebound(double steps, double phase) {
+	static const double k = 1e5, speed = 0.1;
+	const double mass = density * pi * radius * radius, step = pi * sqrt(0.5 * mass / k) / steps;
+	const double half_gap = speed * step * (1 + phase);
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [-1, -1], upper: [1, 1]},\n"
+		"time: {end: 1000}, output: {every: 1000}, grains: {material: {density: 2500, radius: {mean: 1 "
+		"mm}},\n"
+		"  contact: {linear: {stiffness: 1e5, restitution: 1, friction: 0}}, overlap: {most: 0},\n"
+		"  place: [{position: [%.17g, 0], velocity: [0.1, 0]}, {position: [%.17g, 0], velocity: [-0.1, "
+		"0]}]}}\n",
+		-radius - half_gap, radius + half_gap);
+	beyond_force_step(run, step);
+	harness_steps(run, (int64_t)(2 * steps) + 8);
+	const quern_column v = harness_field(run, "grain.velocity");
+	const double after = v.real[0][1] - v.real[0][0];
+	harness_close(run);
+	return after / (2 * speed);
+}
+
+/* The page's figures, grains.md, section 2. */
+static void one_collision(void **unused) {
+	static const struct {
+		double steps, most;
+	} rows[] = { { 50, 1.0002 }, { 10, 1.003 }, { 5, 1.02 }, { 4, 1.04 } };
+	enum { PHASES = 32 };
+	(void)unused;
+	beyond_table("A head-on collision without damping: restitution over 32 phases of the step",
+		"step over t_c | step over hard limit | least | most");
+	for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+		double least = INFINITY, most = 0;
+		for (int k = 0; k < PHASES; k++) {
+			const double e = rebound(rows[i].steps, (double)k / PHASES);
+			least = fmin(least, e);
+			most = fmax(most, e);
+		}
+		beyond_row("1/%g | %.3g | %.4f | %.4f", rows[i].steps, 5 / rows[i].steps, least, most);
+		if (!(most < rows[i].most)) fail_msg("a collision gains energy: %g at t_c/%g", most, rows[i].steps);
+	}
+}
+
 /* ==== a bed ==== */
 
 typedef struct bed {
@@ -185,7 +230,8 @@ static void bed_at_rest(void **unused) {
 }
 
 int main(int argc, char **argv) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(one_contact), cmocka_unit_test(bed_at_rest) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(one_contact), cmocka_unit_test(one_collision),
+		cmocka_unit_test(bed_at_rest) };
 	if (!beyond_begin(argc, argv, "grains")) return 2;
 	const int failed = cmocka_run_group_tests(tests, NULL, NULL);
 	beyond_end();

@@ -69,8 +69,19 @@ static void more_and_more_substeps(void **unused) {
 	}
 }
 
+/* Somebody who knows better may switch it off. */
+static void not_looked_at(void **unused) {
+	(void)unused;
+	const held h = held_open(0.04, 0.06, 120, "two_point_tangent", 7);
+	*harness_param(h.run, "solver.hybrid", "gain") = 0;
+	harness_steps(h.run, AT_ONCE);
+	assert_true(held_kinetic(&h) > 10);
+	harness_close(h.run);
+}
+
 int main(int argc, char **argv) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(more_and_more_substeps) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(more_and_more_substeps),
+		cmocka_unit_test(not_looked_at) };
 	if (!beyond_begin(argc, argv, "substeps")) return 2;
 	const int failed = cmocka_run_group_tests(tests, NULL, NULL);
 	beyond_end();
