@@ -10,7 +10,7 @@
 
 #include "harness.h"
 #include "table.h"
-#include "text.h"
+#include "scene_text.h"
 #include <math.h>
 #include <stdlib.h>
 #include <unistd.h>

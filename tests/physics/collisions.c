@@ -10,7 +10,7 @@
 
 #include "harness.h"
 #include "table.h"
-#include "text.h"
+#include "scene_text.h"
 
 enum { PHASES = 32 };
 static const double radius = 5e-3, speed = 1; /* m, m/s: of approach */

@@ -9,7 +9,7 @@
 
 #include "harness.h"
 #include "table.h"
-#include "text.h"
+#include "scene_text.h"
 
 static const double pi = 3.14159265358979312, radius = 5e-3, stiffness = 1e5, density = 2500, gravity = 10;
 static const char *const integrators[] = { "symplectic_euler", "velocity_verlet" };

@@ -9,7 +9,7 @@
 
 #include "harness.h"
 #include "table.h"
-#include "text.h"
+#include "scene_text.h"
 
 static const double radius = 5e-3, gravity = 9.81, degree = 3.14159265358979312 / 180;
 

@@ -8,7 +8,7 @@
 
 #include "harness.h"
 #include "table.h"
-#include "text.h"
+#include "scene_text.h"
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>

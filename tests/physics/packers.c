@@ -16,7 +16,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "../../core/random.h"
+#include "random.h"
 #include "../../plugins/common/placer.h"
 #include "../../plugins/common/radius.h"
 

@@ -7,7 +7,7 @@ import re
 import subprocess
 
 QUERN, PLUGINS = pathlib.Path(os.environ["QUERN"]), pathlib.Path(os.environ["QUERN_PLUGINS_DIR"])
-ENDS = {"exit", "_exit", "_Exit"}  # a plugin that calls them finds the program's, see core/watch.c
+ENDS = {"exit", "_exit", "_Exit"}  # a plugin that calls them finds the program's, see core/plugin/watch.c
 LINKER = {"__bss_start", "_edata", "_end"}  # where sections end
 SANITIZER = re.compile(r"_{0,3}(odr_)?(asan|ubsan|tsan|sanitizer)[._]")
 

@@ -1,5 +1,5 @@
 #include "child.h"
-#include "command.h"
+#include "exit.h"
 #include "h5.h"
 #include "render.h"
 #include "run.h"

@@ -1,6 +1,6 @@
 /* table_read - the parts of reading a table, shared by table.c and table_ops.c */
 #pragma once
-#include "table.h"
+#include "plugin_table.h"
 
 /* Most rows, choices and levels of a table; a table that goes on beyond them has lost its end. */
 enum {

@@ -1,6 +1,6 @@
 #include "loader.h"
 #include "param.h"
-#include "table_read.h"
+#include "plugin_table_read.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* table_ops - the functions of every kind, and the tables that solvers and observers hang on theirs */
 #include "loader.h"
 #include "param.h"
-#include "table_read.h"
+#include "plugin_table_read.h"
 #include <stdlib.h>
 #include <string.h>
 

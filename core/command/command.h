@@ -1,15 +1,7 @@
 /* command - what a program does from the command line */
 #pragma once
+#include "exit.h"
 #include <stdio.h>
-
-enum {
-	QUERN_EXIT_DONE,
-	QUERN_EXIT_USAGE,
-	QUERN_EXIT_SCENE,
-	QUERN_EXIT_FAILED,
-	QUERN_EXIT_IO,
-	QUERN_EXIT_INTERRUPTED = 130
-};
 
 /* "quern NAME ARGUMENTS" and what it does; `run` returns the exit status, argv[0] is the name. */
 typedef struct quern_command {
