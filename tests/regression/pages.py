@@ -68,7 +68,21 @@ def links():
     print("ok  every link leads somewhere")
 
 
+def tour():
+    """Every file of docs/tour.md is there, and every name that stands with a file is in it."""
+    text = (SOURCE / "docs/tour.md").read_text().replace("\n", " ")
+    found = re.findall(r"`(\w+)` in +`((?:core|plugins)/[\w/.]+)`", text)
+    found += [(name, file) for file, name in re.findall(r"`((?:core|plugins)/[\w/.]+)`, `(\w+)`", text)]
+    assert len(found) >= 25, f"{len(found)} names in docs/tour.md"
+    for file in set(re.findall(r"`((?:core|plugins|configs)/[\w/.]+\.\w+)`", text)):
+        assert (SOURCE / file).exists(), f"docs/tour.md names {file}, which is not there"
+    for name, file in found:
+        assert re.search(rf"\b{name}\b", (SOURCE / file).read_text()), f"docs/tour.md looks for {name} in {file}"
+    print(f"ok  {len(found)} names of docs/tour.md are where it says")
+
+
 links()
+tour()
 for page, fewest in PAGES.items():
     play(page, fewest)
 for tool in "reference", "manual":
