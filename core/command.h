@@ -1,4 +1,4 @@
-/* command - what the program does from the command line; each returns the exit status */
+/* command - what a program does from the command line */
 #pragma once
 #include <stdio.h>
 
@@ -11,16 +11,25 @@ enum {
 	QUERN_EXIT_INTERRUPTED = 130
 };
 
-int quern_command_run(int argc, char **argv);
-int quern_command_plan(int argc, char **argv);
-int quern_command_list(int argc, char **argv);
-int quern_command_describe(int argc, char **argv);
-int quern_command_schema(int argc, char **argv);
-int quern_command_new(int argc, char **argv);
-int quern_command_check(int argc, char **argv);
-int quern_command_render(int argc, char **argv);
+/* "quern NAME ARGUMENTS" and what it does; `run` returns the exit status, argv[0] is the name. */
+typedef struct quern_command {
+	const char *name, *arguments, *help;
+	int (*run)(int argc, char **argv);
+} quern_command;
+
+extern const quern_command quern_command_run, quern_command_plan, quern_command_list, quern_command_describe,
+	quern_command_schema, quern_command_new, quern_command_check; /* of quern */
+extern const quern_command quern_command_render;                  /* of quern-render */
 
 /* "usage: quern COMMAND ...", without the end of the line. */
-void quern_print_usage(const char *command, FILE *);
+void quern_print_usage(const quern_command *, FILE *);
 /* A sentence to stderr, and below it how to get help; returns QUERN_EXIT_USAGE. */
-int quern_usage(const char *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+int quern_usage(const quern_command *, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+/* The status that a program ends with: what was printed but could not be written, to a full disk, is not done. */
+int quern_ended(int status);
+
+/* The program that does `quern WORD`, if WORD is none of quern's own commands: quern-WORD, as in git. It is looked for beside
+ * quern, where it is built or installed, and then on PATH. free(); NULL: there is none. */
+char *quern_program_find(const char *word);
+/* The words of those that stand beside quern, NULL-terminated; free() each and the list. */
+char **quern_program_words(void);

@@ -91,7 +91,7 @@ static const quern_plugin_file *open_plugin(
 	return NULL;
 }
 
-int quern_command_check(int argc, char **argv) {
+static int check_plugin(int argc, char **argv) {
 	quern_texts sets = { 0 };
 	int64_t dimension = 0, seconds = 120;
 	quern_words words = { .missing = "a plugin is missing", .least = 1, .most = 1 };
@@ -100,7 +100,7 @@ int quern_command_check(int argc, char **argv) {
 		QUERN_NUMBER(&dimension, "dimension", 2, 3, "try this one alone; default: all it has"),
 		QUERN_NUMBER(&seconds, "seconds", 1, 86400, "when a group of tests is stopped; default: 120"),
 		QUERN_END_OPTIONS };
-	int status = quern_options_read("check", options, &words, argc, argv);
+	int status = quern_options_read(&quern_command_check, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return free(sets.at), status;
 	quern_report *report = quern_report_create();
 	quern_tree *tree = quern_tree_parse("--set", "{}", 2, report);
@@ -121,3 +121,6 @@ int quern_command_check(int argc, char **argv) {
 	free(sets.at);
 	return status;
 }
+
+const quern_command quern_command_check = { "check", "PLUGIN.so [OPTION]...", "conformance tests of a plugin",
+	check_plugin };

@@ -28,11 +28,11 @@ static const quern_plugin_file *load(quern_loader *loader, const char *id, quern
 
 /* ---- list ---- */
 
-int quern_command_list(int argc, char **argv) {
+static int list_plugins(int argc, char **argv) {
 	bool json = false;
 	quern_words words = { 0 };
 	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
-	int status = quern_options_read("list", options, &words, argc, argv);
+	int status = quern_options_read(&quern_command_list, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
@@ -277,11 +277,11 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 	return found;
 }
 
-int quern_command_describe(int argc, char **argv) {
+static int describe_one(int argc, char **argv) {
 	bool json = false;
 	quern_words words = { .missing = "a plugin, a section or `scene` is missing", .least = 1, .most = 1 };
 	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
-	const int status = quern_options_read("describe", options, &words, argc, argv);
+	const int status = quern_options_read(&quern_command_describe, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
@@ -299,3 +299,8 @@ int quern_command_describe(int argc, char **argv) {
 	quern_loader_destroy(loader);
 	return f || scene ? QUERN_EXIT_DONE : QUERN_EXIT_SCENE;
 }
+
+const quern_command quern_command_list = { "list", "[--json]", "installed plugins", list_plugins };
+
+const quern_command quern_command_describe = { "describe", "NAME [--json]",
+	"keys, units, ranges, sources of a plugin, a section (grains), or `scene`", describe_one };

@@ -28,8 +28,9 @@ static int check_kind(const char *kind) {
 	for (size_t k = 0; quern_kind_names[k]; k++)
 		quern_text_add(&all, "%s%s", k ? ", " : "", quern_kind_names[k]);
 	const int status =
-		near ? quern_usage("new", "unknown kind '%s'; did you mean '%s'?", kind, near)
-			 : quern_usage("new", "unknown kind '%s'; there are %s", kind, quern_text_string(&all));
+		near ? quern_usage(&quern_command_new, "unknown kind '%s'; did you mean '%s'?", kind, near)
+			 : quern_usage(
+				   &quern_command_new, "unknown kind '%s'; there are %s", kind, quern_text_string(&all));
 	quern_text_finish(&all);
 	return status;
 }
@@ -37,16 +38,16 @@ static int check_kind(const char *kind) {
 /* Two plugins of one kind and name would stand in each other's way as soon as both are on the search path. */
 static int check_name(const char *kind, const char *name) {
 	if (!is_plain(name))
-		return quern_usage(
-			"new", "'%s' is no name: small letters, digits and underscores, a letter first", name);
+		return quern_usage(&quern_command_new,
+			"'%s' is no name: small letters, digits and underscores, a letter first", name);
 	if (!strcmp(name, "v3") || !strcmp(name, "v4"))
-		return quern_usage("new", "'%s' stands for an instruction set: take another name", name);
+		return quern_usage(&quern_command_new, "'%s' stands for an instruction set: take another name", name);
 	quern_loader *loader = quern_loader_create();
 	char **ids = quern_loader_ids(loader), *id = quern_format("%s.%s", kind, name);
 	int status = QUERN_EXIT_DONE;
 	for (size_t i = 0; ids[i]; i++)
 		if (!strcmp(ids[i], id))
-			status = quern_usage("new", "%s is installed already: take another name", id);
+			status = quern_usage(&quern_command_new, "%s is installed already: take another name", id);
 	free(id);
 	quern_loader_free_ids(ids);
 	quern_loader_destroy(loader);
@@ -111,13 +112,13 @@ static int write_all(const char *folder, const char *kind, const char *name) {
 	return status;
 }
 
-int quern_command_new(int argc, char **argv) {
+static int make_plugin(int argc, char **argv) {
 	const char *out = NULL;
 	quern_words words = { .missing = "a kind and a name are missing", .least = 2, .most = 2 };
 	const quern_option options[] = {
 		QUERN_TEXT(&out, 'o', "output", "DIR", "the folder to make; default: KIND.NAME"), QUERN_END_OPTIONS
 	};
-	int status = quern_options_read("new", options, &words, argc, argv);
+	int status = quern_options_read(&quern_command_new, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	const char *kind = words.at[0], *name = words.at[1];
 	status = check_kind(kind);
@@ -129,3 +130,6 @@ int quern_command_new(int argc, char **argv) {
 	free(folder);
 	return status;
 }
+
+const quern_command quern_command_new = { "new", "KIND NAME [-o DIR]", "a plugin of your own from a template",
+	make_plugin };

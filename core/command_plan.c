@@ -181,14 +181,14 @@ static void warn_of_length(quern_run *run) {
 	if (quern_estimate_is_long(&e, quern_pool_workers(run->pool), say)) fprintf(stderr, "warning: %s\n", say);
 }
 
-int quern_command_plan(int argc, char **argv) {
+static int plan_scene(int argc, char **argv) {
 	quern_texts sets = { 0 };
 	quern_words words = { .missing = "a scene is missing", .least = 1, .most = 1 };
 	bool json = false;
 	const quern_option options[] = { QUERN_TEXTS(&sets, "set", "PATH=VALUE",
 										 "a key of the scene; may stand several times"),
 		QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
-	int status = quern_options_read("plan", options, &words, argc, argv);
+	int status = quern_options_read(&quern_command_plan, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return free(sets.at), status;
 	status = QUERN_EXIT_DONE;
 	quern_watch_begin();
@@ -211,3 +211,6 @@ int quern_command_plan(int argc, char **argv) {
 	free(sets.at);
 	return status;
 }
+
+const quern_command quern_command_plan = { "plan", "SCENE.yaml [OPTION]...", "everything short of running",
+	plan_scene };

@@ -19,7 +19,7 @@ static int check_name(const char *out) {
 	const char *slash = out ? strrchr(out, '/') : NULL, *name = slash ? slash + 1 : out;
 	const char *dot = name ? strrchr(name, '.') : NULL;
 	if (!dot || !strcasecmp(dot, ".png")) return QUERN_OPTIONS_READ;
-	return quern_usage("render", "only PNG can be written: let %s end in .png", out);
+	return quern_usage(&quern_command_render, "only PNG can be written: let %s end in .png", out);
 }
 
 static int read_options(int argc, char **argv, options *o) {
@@ -29,7 +29,7 @@ static int read_options(int argc, char **argv, options *o) {
 		QUERN_TEXT(&o->field, 0, "field", "NAME", "what to colour by: grain.velocity"),
 		QUERN_TEXT(&o->out, 'o', "output", "FILE.png", "where to write it"),
 		QUERN_NUMBER(&o->width, "width", 600, 8000, "in pixels; default: 1600"), QUERN_END_OPTIONS };
-	const int status = quern_options_read("render", known, &words, argc, argv);
+	const int status = quern_options_read(&quern_command_render, known, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	o->folder = words.at[0];
 	return check_name(o->out);
@@ -59,7 +59,7 @@ static int save(cairo_surface_t *surface, const char *path) {
 	return good ? QUERN_EXIT_DONE : QUERN_EXIT_IO;
 }
 
-int quern_command_render(int argc, char **argv) {
+static int draw_frame(int argc, char **argv) {
 	options o = { .frame = -1, .width = 1600 };
 	render_frame frame;
 	quern_text why = { 0 };
@@ -78,3 +78,6 @@ int quern_command_render(int argc, char **argv) {
 	quern_render_frame_finish(&frame);
 	return status;
 }
+
+const quern_command quern_command_render = { "render", "DIR [OPTION]...", "a picture of a frame",
+	draw_frame };

@@ -72,7 +72,7 @@ static int parse(options *o, int argc, char **argv) {
 		QUERN_FLAG(
 			&o->no_cache, "no-cache", "let grains settle even if a state of the same beginning is kept"),
 		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"), QUERN_END_OPTIONS };
-	const int status = quern_options_read("run", known, &words, argc, argv);
+	const int status = quern_options_read(&quern_command_run, known, &words, argc, argv);
 	o->scene = words.at[0];
 	return status;
 }
@@ -352,11 +352,11 @@ static bool parse_until(const options *o, quern_run *run, double *until) {
 	if (!o->until) return true;
 	const bool good = quern_quantity_read(run->scene->units, o->until, "s", until, why);
 	if (good && !signbit(*until)) return true;
-	quern_usage("run", "--until: %s", good ? "must not be negative" : why);
+	quern_usage(&quern_command_run, "--until: %s", good ? "must not be negative" : why);
 	return false;
 }
 
-int quern_command_run(int argc, char **argv) {
+static int run_scene(int argc, char **argv) {
 	options o = { 0 };
 	int status = parse(&o, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return free(o.sets.at), status;
@@ -387,3 +387,5 @@ int quern_command_run(int argc, char **argv) {
 	free(o.sets.at);
 	return status;
 }
+
+const quern_command quern_command_run = { "run", "SCENE.yaml [OPTION]...", "runs a scene", run_scene };

@@ -252,12 +252,12 @@ static json_t *scene_schema(const context *c) {
 	return scene;
 }
 
-int quern_command_schema(int argc, char **argv) {
+static int write_schema(int argc, char **argv) {
 	const char *out = NULL;
 	quern_words words = { 0 };
 	const quern_option options[] = { QUERN_TEXT(&out, 'o', "output", "FILE", "where to write it"),
 		QUERN_END_OPTIONS };
-	int status = quern_options_read("schema", options, &words, argc, argv);
+	int status = quern_options_read(&quern_command_schema, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	context c = { quern_loader_create(), quern_report_create(), NULL };
 	quern_loader_beware(c.loader);
@@ -279,3 +279,6 @@ int quern_command_schema(int argc, char **argv) {
 	quern_loader_destroy(c.loader);
 	return status;
 }
+
+const quern_command quern_command_schema = { "schema", "[-o FILE]", "JSON Schema of scenes, for editors",
+	write_schema };

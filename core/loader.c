@@ -4,6 +4,7 @@
 #include "environment.h"
 #include "file.h"
 #include "level.h"
+#include "platform.h"
 #include "watch.h"
 #include <dirent.h>
 #include <dlfcn.h>
@@ -68,20 +69,24 @@ static void add_folder(quern_loader *loader, const char *path) {
 	loader->folders[loader->n_folders++] = quern_copy(real);
 }
 
-/* Built in place, the plugins lie beside the program; installed, where the build was told. */
+/* Where it is built the plugins lie in a folder beside the program. Installed, they are where the build was told, seen from
+ * quern or from the programs beside it, so that the whole may be moved; last, where it was told in full. */
 static char *own_folder(void) {
-	char exe[PATH_MAX], real[PATH_MAX];
-	const ssize_t n = readlink("/proc/self/exe", exe, sizeof exe - 1);
-	if (n <= 0) return NULL;
-	exe[n] = 0;
-	char *slash = strrchr(exe, '/');
+	static const char *const installed[] = { QUERN_PLUGINS_FROM_BIN, QUERN_PLUGINS_FROM_PROGRAMS };
+	char *exe = quern_platform_program(), *found = NULL, real[PATH_MAX];
+	char *slash = exe ? strrchr(exe, '/') : NULL;
 	if (slash) *slash = 0;
-	char *beside = quern_format("%s/plugins", exe);
-	char *installed = quern_format("%s/%s", exe, QUERN_PLUGINS_FROM_BIN);
-	const char *found = realpath(is_folder(beside) ? beside : installed, real);
-	free(beside);
-	free(installed);
-	return found ? quern_copy(found) : NULL;
+	char *built = quern_format("%s/" QUERN_BUILT_HERE, exe ? exe : "");
+	for (size_t k = 0; k < 3 && exe && !found; k++) {
+		if (k == 0 && access(built, F_OK)) continue;
+		char *folder = quern_format("%s/%s", exe, k == 0 ? "plugins" : installed[k - 1]);
+		if (realpath(folder, real) && is_folder(real)) found = quern_copy(real);
+		free(folder);
+	}
+	if (!found && is_folder(QUERN_PLUGINS_INSTALLED)) found = quern_copy(QUERN_PLUGINS_INSTALLED);
+	free(built);
+	free(exe);
+	return found;
 }
 
 quern_loader *quern_loader_create(void) {

@@ -4,32 +4,25 @@
 #include "h5.h"
 #include "text.h"
 #include <errno.h>
-#include <stdarg.h>
-#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
-static const struct {
-	const char *name, *arguments, *help;
-	int (*run)(int argc, char **argv);
-} commands[] = {
-	{ "run", "SCENE.yaml [OPTION]...", "runs a scene", quern_command_run },
-	{ "plan", "SCENE.yaml [OPTION]...", "everything short of running", quern_command_plan },
-	{ "list", "[--json]", "installed plugins", quern_command_list },
-	{ "describe", "NAME [--json]", "keys, units, ranges, sources of a plugin, a section (grains), or `scene`",
-		quern_command_describe },
-	{ "schema", "[-o FILE]", "JSON Schema of scenes, for editors", quern_command_schema },
-	{ "new", "KIND NAME [-o DIR]", "a plugin of your own from a template", quern_command_new },
-	{ "check", "PLUGIN.so [OPTION]...", "conformance tests of a plugin", quern_command_check },
-	{ "render", "DIR [OPTION]...", "a picture of a frame", quern_command_render },
-};
+static const quern_command *const commands[] = { &quern_command_run, &quern_command_plan, &quern_command_list,
+	&quern_command_describe, &quern_command_schema, &quern_command_new, &quern_command_check };
 
 enum { N_COMMANDS = sizeof commands / sizeof *commands };
 
 static int help(FILE *out) {
+	char **words = quern_program_words();
 	fputs("quern " QUERN_VERSION "\n\n", out);
 	for (size_t i = 0; i < N_COMMANDS; i++)
 		fprintf(
-			out, "  quern %s %s\n        %s\n", commands[i].name, commands[i].arguments, commands[i].help);
+			out, "  quern %s %s\n        %s\n", commands[i]->name, commands[i]->arguments, commands[i]->help);
+	for (size_t i = 0; words[i]; i++)
+		fprintf(out, "  quern %s ...\n        a program of its own, quern-%s\n", words[i], words[i]),
+			free(words[i]);
+	free(words);
 	fputs("\nquern COMMAND --help says what a command takes.\n"
 		  "Exit status: 0 done, 1 usage, 2 a bad scene, plugin or file, 3 the run failed, 4 files could "
 		  "not be written,\n"
@@ -38,31 +31,31 @@ static int help(FILE *out) {
 	return QUERN_EXIT_DONE;
 }
 
-void quern_print_usage(const char *command, FILE *out) {
-	for (size_t i = 0; i < N_COMMANDS; i++)
-		if (!strcmp(commands[i].name, command))
-			fprintf(out, "usage: quern %s %s", command, commands[i].arguments);
-}
-
-int quern_usage(const char *command, const char *fmt, ...) {
-	va_list list;
-	va_start(list, fmt);
-	fprintf(stderr, "quern %s: ", command);
-	vfprintf(stderr, fmt, list);
-	va_end(list);
-	fputc('\n', stderr);
-	quern_print_usage(command, stderr);
-	fprintf(stderr, "; see quern %s --help\n", command);
-	return QUERN_EXIT_USAGE;
-}
-
 static int unknown(const char *name) {
-	const char *known[N_COMMANDS + 1] = { NULL };
-	for (size_t i = 0; i < N_COMMANDS; i++) known[i] = commands[i].name;
+	char **words = quern_program_words();
+	const char **known = quern_take(N_COMMANDS + 1, sizeof *known);
+	size_t n = 0, capacity = N_COMMANDS + 1;
+	for (; n < N_COMMANDS; n++) known[n] = commands[n]->name;
+	for (size_t i = 0; words[i]; i++) {
+		known = quern_grow(known, n + 1, &capacity, sizeof *known);
+		known[n++] = words[i];
+	}
+	known[n] = NULL;
 	const char *near = quern_nearest(name, known);
 	fprintf(stderr, "quern: unknown command '%s'%s%s%s; see quern --help\n", name,
 		near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+	for (size_t i = 0; words[i]; i++) free(words[i]);
+	free(words);
+	free(known);
 	return QUERN_EXIT_USAGE;
+}
+
+/* Takes this process's place; comes back if it cannot. */
+static int become(const char *path, char **argv) {
+	fflush(NULL);
+	execv(path, argv);
+	fprintf(stderr, "quern: error: %s cannot be started: %s\n", path, strerror(errno));
+	return QUERN_EXIT_FAILED;
 }
 
 static int run(int argc, char **argv) {
@@ -73,15 +66,14 @@ static int run(int argc, char **argv) {
 	if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help")) return help(stdout);
 	if (!strcmp(argv[1], "--version")) return puts("quern " QUERN_VERSION), QUERN_EXIT_DONE;
 	for (size_t i = 0; i < N_COMMANDS; i++)
-		if (!strcmp(commands[i].name, argv[1])) return commands[i].run(argc - 1, argv + 1);
-	return unknown(argv[1]);
+		if (!strcmp(commands[i]->name, argv[1])) return commands[i]->run(argc - 1, argv + 1);
+	char *path = quern_program_find(argv[1]);
+	const int status = path ? become(path, argv + 1) : unknown(argv[1]);
+	free(path);
+	return status;
 }
 
-/* What was printed but could not be written, to a full disk, is not done. */
 int main(int argc, char **argv) {
 	quern_h5_quiet();
-	const int status = run(argc, argv);
-	if (!fflush(stdout) && !ferror(stdout)) return status;
-	fprintf(stderr, "quern: error: the output cannot be written: %s\n", strerror(errno));
-	return status == QUERN_EXIT_DONE ? QUERN_EXIT_IO : status;
+	return quern_ended(run(argc, argv));
 }

@@ -38,7 +38,7 @@ static const quern_option *option_of(const quern_option *options, int code) {
 	return NULL;
 }
 
-static int help(const char *command, const quern_option *options) {
+static int help(const quern_command *command, const quern_option *options) {
 	quern_print_usage(command, stdout);
 	printf("\n\n");
 	for (const quern_option *o = options; o->name; o++) {
@@ -63,7 +63,7 @@ static bool is_whole(const char *text, bool negative) {
 	return n && !text[n] && (*text != '0' || n == 1);
 }
 
-static int take_number(const char *command, const quern_option *o, const char *text) {
+static int take_number(const quern_command *command, const quern_option *o, const char *text) {
 	errno = 0;
 	const bool whole = is_whole(text, o->least < 0);
 	const int64_t value = whole ? strtoll(text, NULL, 10) : 0;
@@ -76,7 +76,7 @@ static int take_number(const char *command, const quern_option *o, const char *t
 	return quern_usage(command, "--%s must be a whole number %s, not '%s'", o->name, range, text);
 }
 
-static int take(const char *command, const quern_option *o, const char *text) {
+static int take(const quern_command *command, const quern_option *o, const char *text) {
 	if (o->flag) return *o->flag = true, QUERN_OPTIONS_READ;
 	if (o->number) return take_number(command, o, text);
 	if (!*text) return quern_usage(command, "--%s needs %s, not nothing", o->name, o->value);
@@ -89,7 +89,7 @@ static int take(const char *command, const quern_option *o, const char *text) {
 
 /* ---- faults ---- */
 
-static int unknown(const char *command, const quern_option *options, const char *given) {
+static int unknown(const quern_command *command, const quern_option *options, const char *given) {
 	if (strncmp(given, "--", 2) != 0) return quern_usage(command, "unknown option '-%c'", optopt);
 	const char *known[MOST_OPTIONS + 2] = { NULL };
 	const size_t n = count(options);
@@ -104,14 +104,14 @@ static int unknown(const char *command, const quern_option *options, const char 
 	return status;
 }
 
-static int fault(const char *command, const quern_option *options, int code, const char *given) {
+static int fault(const quern_command *command, const quern_option *options, int code, const char *given) {
 	const quern_option *o = optopt ? option_of(options, optopt) : NULL;
 	if (code == ':' && o) return quern_usage(command, "--%s needs %s", o->name, o->value);
 	if (o || optopt == 'h') return quern_usage(command, "--%s takes no value", o ? o->name : "help");
 	return unknown(command, options, given);
 }
 
-static int take_words(const char *command, quern_words *words, int argc, char **argv) {
+static int take_words(const quern_command *command, quern_words *words, int argc, char **argv) {
 	for (int i = optind; i < argc; i++) {
 		if (words->n == words->most)
 			return words->most ? quern_usage(command, "'%s' is one word too many", argv[i])
@@ -122,7 +122,7 @@ static int take_words(const char *command, quern_words *words, int argc, char **
 }
 
 int quern_options_read(
-	const char *command, const quern_option *options, quern_words *words, int argc, char **argv) {
+	const quern_command *command, const quern_option *options, quern_words *words, int argc, char **argv) {
 	struct option table[MOST_OPTIONS + 2];
 	char letters[2 * MOST_OPTIONS + 3];
 	int status = QUERN_OPTIONS_READ, code;

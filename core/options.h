@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+typedef struct quern_command quern_command;
+
 /* What an option that may stand several times was given, NULL-terminated; free(at). */
 typedef struct quern_texts {
 	const char **at;
@@ -48,4 +50,4 @@ enum { QUERN_OPTIONS_READ = -1 };
 /* QUERN_OPTIONS_READ if the command may begin, else the status to end with: usage was printed because it was asked for,
  * or one sentence says what is wrong. `options` end with QUERN_END_OPTIONS. */
 int quern_options_read(
-	const char *command, const quern_option *options, quern_words *, int argc, char **argv);
+	const quern_command *, const quern_option *options, quern_words *, int argc, char **argv);

@@ -1,8 +1,11 @@
 #include "platform.h"
+#include "text.h"
+#include <limits.h>
 #include <math.h>
 #include <sched.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 /* Quota over period of a container, in processors; INFINITY where there is none. */
 static double quota_of(const char *quota_file, const char *period_file) {
@@ -38,4 +41,12 @@ void quern_platform_pause(void) {
 #elif defined(__aarch64__)
 	__asm__ volatile("isb");
 #endif
+}
+
+char *quern_platform_program(void) {
+	char path[PATH_MAX];
+	const ssize_t n = readlink("/proc/self/exe", path, sizeof path - 1);
+	if (n <= 0) return NULL;
+	path[n] = 0;
+	return quern_copy(path);
 }

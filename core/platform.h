@@ -15,3 +15,5 @@
 uint32_t quern_platform_processors(void);
 /* Tells the processor that this thread waits in a loop. */
 void quern_platform_pause(void);
+/* The file of the running program; free(). NULL: it cannot be known. */
+char *quern_platform_program(void);

@@ -196,10 +196,11 @@ static bool look(quern_run *run, quern_h5 *h, const char *depends, taking *t, si
 
 static bool read_clock(quern_run *run, quern_h5 *h) {
 	quern_clock *c = &run->clock;
+	const int64_t most = (int64_t)1 << 53; /* as in a checkpoint */
 	int64_t steps = 0;
 	double dt = 0;
 	if (!quern_h5_read_integer(h->file, "steps", &steps) || !quern_h5_read_number(h->file, "dt", &dt) ||
-		steps < 1 || !(dt >= 0 && dt < 1e300))
+		steps < 1 || steps > most || !(dt >= 0 && dt < 1e300))
 		return false;
 	c->settle_step = steps;
 	c->settle_dt = dt;

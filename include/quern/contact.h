@@ -27,8 +27,7 @@ typedef struct quern_onset {
 /* `approach` is the rate at which the overlap grows; `power` p of a dashpot ~ overlap^p: 0 linear, 1/4 Hertz. */
 QUERN_INLINE quern_onset quern_first_touch(
 	quern_real overlap, quern_real approach, quern_real dt, quern_real power) {
-	const bool first =
-		(overlap > 0) & (overlap < approach * dt); /* a pair apart has no time that is finite */
+	const bool first = (overlap > 0) & (overlap < approach * dt); /* a pair that is apart has not touched */
 	const quern_real time = first ? overlap / (approach > 0 ? approach : 1) : dt;
 	return QUERN_VALUE(quern_onset, time, first ? 0.5 + time / ((1 + power) * dt) : 1);
 }

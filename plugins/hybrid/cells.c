@@ -161,42 +161,58 @@ void quern_hybrid_averages(update *d) {
 	}
 }
 
-/* Of the room that bodies leave. A grain counts as the square or cube of its volume: sums are exact, and a cell of a diameter
- * or more hardly sees the difference. A cell with a tenth of the mass that fills it in points is full: so is what points
- * stand for. */
+/* A grain counts as the square or cube of its volume: sums are exact, and a cell of a diameter or more hardly sees the
+ * difference. */
+static void spread_grain(const update *d, uint32_t i, quern_real times, quern_real *out) {
+	const quern_column *u = d->u;
+	const uint32_t dim = d->s->dim;
+	const quern_real h = d->g->cell, r = u[U_GRAIN_RADIUS].real[0][i], volume = quern_grid_cell_volume(d->g);
+	const quern_real half =
+		(dim == 2 ? 0.886226925452758 : 0.805995977008235) * r; /* of the square, of the cube */
+	int32_t first[3] = { 0 }, last[3] = { 0 };
+	for (uint32_t k = 0; k < dim; k++) {
+		first[k] = quern_grid_cell(d->g, k, u[U_GRAIN_POSITION].real[k][i] - half);
+		last[k] = quern_grid_cell(d->g, k, u[U_GRAIN_POSITION].real[k][i] + half);
+	}
+	for (int32_t z = first[2]; z <= last[2]; z++)
+		for (int32_t y = first[1]; y <= last[1]; y++)
+			for (int32_t x = first[0]; x <= last[0]; x++) {
+				int32_t cell[3] = { x, y, z };
+				quern_real part = 1;
+				for (uint32_t k = 0; k < dim; k++) {
+					const quern_real low = d->g->lower[k] + cell[k] * h, at = u[U_GRAIN_POSITION].real[k][i];
+					const quern_real from = at - half > low ? at - half : low,
+									 to = at + half < low + h ? at + half : low + h;
+					part *= to > from ? to - from : 0;
+				}
+				const int32_t c = quern_hybrid_entry(d, cell);
+				if (c >= 0) out[c] += times * (part / volume);
+			}
+}
+
+/* Fixed grains are walls: as densely as they may lie, they leave no room. Where nothing moves between them nothing will. */
+void quern_hybrid_fixed(update *d) {
+	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
+	quern_real *taken = fixed ? take(d, d->n_cells, sizeof(quern_real)) : NULL;
+	if (!taken) return;
+	for (uint32_t i = 0; i < d->n_grains; i++)
+		if (fixed[i]) spread_grain(d, i, d->h->density / d->h->packed, taken);
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		if (!(taken[c] > 0)) continue;
+		const quern_real left = d->open[c] - taken[c];
+		d->open[c] = left >= 0.25 ? left : d->mass[c] > 0 ? 0.125 : 0;
+	}
+}
+
+/* Of the room that bodies and fixed grains leave. A cell with a tenth of the mass that fills it in points is full: so is what
+ * points stand for. */
 void quern_hybrid_fractions(update *d) {
 	const quern_column *u = d->u;
 	quern_real *fraction = u[U_FRACTION].real[0];
-	const uint32_t dim = d->s->dim;
-	const quern_real h = d->g->cell, volume = quern_grid_cell_volume(d->g);
 	if (!fraction) return;
 	memset(fraction, 0, d->n_cells * sizeof(quern_real));
-	for (uint32_t i = 0; i < d->n_grains; i++) {
-		const quern_real r = u[U_GRAIN_RADIUS].real[0][i];
-		const quern_real half =
-			(dim == 2 ? 0.886226925452758 : 0.805995977008235) * r; /* of the square, of the cube */
-		int32_t first[3] = { 0 }, last[3] = { 0 };
-		if (d->grain_cell[i] < 0) continue;
-		for (uint32_t k = 0; k < dim; k++) {
-			first[k] = quern_grid_cell(d->g, k, u[U_GRAIN_POSITION].real[k][i] - half);
-			last[k] = quern_grid_cell(d->g, k, u[U_GRAIN_POSITION].real[k][i] + half);
-		}
-		for (int32_t z = first[2]; z <= last[2]; z++)
-			for (int32_t y = first[1]; y <= last[1]; y++)
-				for (int32_t x = first[0]; x <= last[0]; x++) {
-					int32_t cell[3] = { x, y, z };
-					quern_real part = 1;
-					for (uint32_t k = 0; k < dim; k++) {
-						const quern_real low = d->g->lower[k] + cell[k] * h,
-										 at = u[U_GRAIN_POSITION].real[k][i];
-						const quern_real from = at - half > low ? at - half : low,
-										 to = at + half < low + h ? at + half : low + h;
-						part *= to > from ? to - from : 0;
-					}
-					const int32_t c = quern_hybrid_entry(d, cell);
-					if (c >= 0) fraction[c] += part / volume;
-				}
-	}
+	for (uint32_t i = 0; i < d->n_grains; i++)
+		if (d->grain_cell[i] >= 0) spread_grain(d, i, 1, fraction);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		quern_real mass = 0;
 		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
@@ -206,13 +222,14 @@ void quern_hybrid_fractions(update *d) {
 	}
 }
 
-/* The share of a cell's hat in which there can be contacts: bodies hold none. What lies behind a face of the domain is
+/* The share of a cell's hat in which there can be contacts: bodies and fixed grains hold none. What lies behind a face of the domain is
  * sampled before it. */
 static quern_real room_of(const update *d, uint32_t c) {
 	const int depth = d->s->dim == 3 ? 1 : 0;
 	int32_t cell[3];
 	quern_real room = 0;
-	if (d->wall[c] >= 2 * d->g->cell || !quern_hybrid_cell(d, c, cell)) return 1;
+	const bool alone = d->wall[c] >= 2 * d->g->cell && !d->u[U_GRAIN_FIXED].index;
+	if (alone || !quern_hybrid_cell(d, c, cell)) return 1;
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {

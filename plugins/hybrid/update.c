@@ -10,6 +10,7 @@ static quern_status reckon(update *d) {
 	quern_hybrid_averages(d);
 	quern_status status = quern_hybrid_walls(d);
 	if (status != QUERN_OK) return status;
+	quern_hybrid_fixed(d);
 	quern_hybrid_fractions(d);
 	quern_hybrid_rates(d);
 	if (d->failed) return QUERN_E_MEMORY;

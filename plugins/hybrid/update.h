@@ -25,7 +25,7 @@ typedef struct update {
 	int32_t *grain, *point;
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
-	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that lies in none */
+	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that is open */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
 	int32_t *zone;            /* by cell: the new one; the old one stands in the field until the end */
 	bool *drop_grain, *drop_point;
@@ -50,6 +50,7 @@ int32_t quern_hybrid_beside(const update *, const int32_t cell[3], uint32_t axis
 /* ---- cells.c ---- */
 quern_status quern_hybrid_sort(update *);
 void quern_hybrid_averages(update *);
+void quern_hybrid_fixed(update *);
 void quern_hybrid_fractions(update *);
 void quern_hybrid_rates(update *);
 /* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is none. */

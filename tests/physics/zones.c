@@ -127,8 +127,46 @@ static void walls_are_no_surface(void **state) {
 	assert_true(good);
 }
 
+/* The same of a heap on fixed grains, one cell deep, that reach out from under it into the open: what they leave is as full as
+ * elsewhere, and the open does not come in between them. */
+static void rough_floors_are_no_surface(void **state) {
+	static const double thick[] = { 0, 0.002, 0.004 };
+	bool good = true;
+	(void)state;
+	table_head("cells above a rough floor, below the zones of top and slope, that are no continuum");
+	for (size_t k = 0; k < sizeof thick / sizeof *thick; k++) {
+		char floor[160] = "", name[40];
+		if (k)
+			snprintf(floor, sizeof floor,
+				"{region: {box: {lower: [0, 0.001], upper: [0.16, %g]}}, fixed: true}, ", thick[k] - 0.001);
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.16, 0.08]}\n"
+			"time: {end: 1e-6, step: 1e-9}\nbodies: [{plane: {point: [0, 0], normal: [0, 1]}}, {plane: "
+			"{point: [0, "
+			"0], normal: [1, 0]}}]\n"
+			"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
+			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
+			"  fill: [%s{region: {box: {lower: [0, %g], upper: [0.08, 0.05]}}}]}\n"
+			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+			"hybrid: {oracle: [{packing_fraction: {depth: 10 mm, half_width: 4 mm}}], substeps: 1, update: "
+			"1}\n",
+			floor, thick[k] + 0.001, cell);
+		harness_steps(run, 4);
+		int others = 0;
+		for (int j = 1; j < 6; j++)
+			for (int i = 5; i < 14; i++)
+				others +=
+					harness_field(run, "cell.zone").index[cell_at(run, (i + 0.5) * cell, (j + 0.5) * cell)] !=
+					QUERN_CONTINUUM;
+		snprintf(name, sizeof name, "%zu layers of fixed grains", k);
+		good &= table_row(name, others, 0, 0);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell),
-		cmocka_unit_test(walls_are_no_surface) };
+		cmocka_unit_test(walls_are_no_surface), cmocka_unit_test(rough_floors_are_no_surface) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -116,6 +116,37 @@ def damaged(place, cache):
     run(place / "off", "", "--until=0")
 
 
+def seal(path):
+    """Gives a file that was altered a checksum that holds."""
+    data, checksum = bytearray(path.read_bytes()), 1469598103934665603
+    for byte in data[512:]:
+        checksum = (checksum ^ byte) * 1099511628211 % 2**64
+    data[16:24] = checksum.to_bytes(8, "little")
+    path.write_bytes(data)
+
+
+def forged(place, cache):
+    """What no settling leaves is passed over, or ends the run before its first step; a number is given to one grain."""
+    shutil.rmtree(cache)
+    run(place / "sound", cache, "--until=0")
+    path, = files(cache)
+    sound = path.read_bytes()
+    for k, (name, value) in enumerate([("grain/id.0", None), ("steps", 2**60), ("grain/position.0", 1e300), ("contact/first.0", 1 << 30)]):
+        path.write_bytes(sound)
+        with h5py.File(path, "r+") as file:
+            if "/" in name:
+                file[name][4] = file[name][5] if value is None else value
+            else:
+                file.attrs[name] = value
+        seal(path)
+        if k < 2:
+            assert KEPT in run(place / f"forged{k}", cache, "--until=0"), name
+        else:
+            assert "remove it" in lab.run("column", place / f"forged{k}", *OPTIONS, "--until=0", status=4, QUERN_CACHE=str(cache))
+    path.write_bytes(sound)
+    assert TAKEN in run(place / "sound_again", cache, "--until=0")
+
+
 def changed_on_the_way(place, cache):
     """A state is kept for what settling began with, whatever has become of the files since."""
     table, out = place / "dropped.txt", place / "on_the_way"
@@ -186,6 +217,6 @@ if __name__ == "__main__":
     with lab.workplace() as name:
         place = pathlib.Path(name)
         cache = place / "cache"
-        for test in (same_bits, shared, apart, damaged, changed_on_the_way, resumed, helped, together, renamed):
+        for test in (same_bits, shared, apart, damaged, forged, changed_on_the_way, resumed, helped, together, renamed):
             test(place, cache)
             print(test.__name__.replace("_", " "), "holds")

@@ -1,0 +1,8 @@
+/* quern-render - `quern render`: pictures of frames, a program of its own since it alone needs Cairo */
+#include "command.h"
+#include "h5.h"
+
+int main(int argc, char **argv) {
+	quern_h5_quiet();
+	return quern_ended(quern_command_render.run(argc, argv));
+}
