@@ -28,7 +28,7 @@ for plugin in plugins:
 print(f"{len(plugins)} plugins export quern_library_1 alone")
 
 archives = sorted(QUERN.parent.glob("core/**/*.a")) + sorted(QUERN.parent.glob("plugins/**/*.a"))
-objects = sorted(QUERN.parent.glob("quern.p/*.o"))
+objects = sorted(QUERN.parent.glob("quern*.p/*.o"))
 assert archives and len(objects) > 20
 names = set().union(*(symbols(path, "-g") for path in [*archives, *objects]))
 assert len(names) > 200

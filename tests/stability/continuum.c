@@ -52,10 +52,9 @@ static double fastest(quern_run *run, uint32_t dim) {
 typedef struct block {
 	const char *name, *shape;
 	uint32_t dim;
-	bool random; /* points anywhere in their quarter of a cell */
-	double cut;  /* share of a full cell's mass below which a node's force is limited */
-	double sound,
-		failing; /* as in the page: up to this factor nothing is gained; from this one on the run ends */
+	bool random;           /* points anywhere in their quarter of a cell */
+	double cut;            /* share of a full cell's mass below which a node's force is limited */
+	double sound, failing; /* nothing is gained up to this factor; from that one on the run ends */
 } block;
 
 /* No gravity, no contact with walls; FLIP keeps every motion that the grid can carry. */

@@ -159,8 +159,7 @@ static void one_collision(void **unused) {
 typedef struct bed {
 	const char *name, *contact, *integrator;
 	uint32_t dim;
-	double sound,
-		failing; /* as in the page: up to this factor nothing is gained; from this one on the run ends */
+	double sound, failing; /* nothing is gained up to this factor; from that one on the run ends */
 } bed;
 
 static quern_run *open_bed(const bed *b) {
