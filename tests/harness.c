@@ -18,7 +18,6 @@ static quern_run *make_ready(quern_scene *scene, uint32_t workers) {
 		return NULL;
 	}
 	if (quern_run_setup(run) != QUERN_OK) fail_msg("%s", run->message);
-	run->mass_initial = quern_run_account(run).mass;
 	return run;
 }
 
@@ -48,17 +47,17 @@ quern_run *harness_open_file(uint32_t workers, const char *path, const char *con
 void harness_close(quern_run *run) { quern_run_destroy(run); }
 
 void harness_settle(quern_run *run) {
-	while (!run->clock.settled && run->status == QUERN_OK) quern_run_settle(run);
+	while (!run->clock.settled && quern_run_next(run) == QUERN_SETTLING) {}
 	if (run->status != QUERN_OK) fail_msg("%s", run->message);
 }
 
 quern_status harness_try(quern_run *run, int64_t n) {
-	quern_clock *c = &run->clock;
 	harness_settle(run);
-	if (c->frame < 0) quern_run_frame(run);
-	for (int64_t i = 0; i < n && run->status == QUERN_OK; i++) {
-		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
-		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) quern_run_frame(run);
+	for (int64_t i = 0; (i < n || quern_run_awaits_frame(run)) && run->status == QUERN_OK;) {
+		const quern_event event = quern_run_next(run);
+		if (event == QUERN_FRAME_IS_DUE) quern_run_frame(run);
+		if (event == QUERN_STEPPED) i++;
+		if (event == QUERN_OVER) fail_msg("the scene is over after %lld steps", (long long)run->clock.step);
 	}
 	quern_plan_refresh(run->plan);
 	return run->status;

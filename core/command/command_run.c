@@ -144,8 +144,7 @@ static quern_status settle(session *s) {
 	if (s->alike) quern_settled_take(run, s->alike);
 	const int warnings = quern_log_warnings(run->log); /* what was cut off would be taken for settled */
 	const bool settles = !run->clock.settled;
-	while (!run->clock.settled && !interrupted && run->status == QUERN_OK) {
-		quern_run_settle(run);
+	while (!run->clock.settled && !interrupted && quern_run_next(run) == QUERN_SETTLING) {
 		progress(s, true);
 		if (due(s)) checkpoint(s);
 	}
@@ -179,19 +178,21 @@ static bool has_come(const quern_run *run, double time) {
 	return time >= 0 && run->clock.frame >= 0 && quern_run_time(run) >= time - 1e-9 * run->clock.dt;
 }
 
+static bool is_to_stop(const session *s) {
+	return !quern_run_awaits_frame(s->run) && (interrupted || has_come(s->run, s->until));
+}
+
 static quern_status step_on(session *s) {
 	quern_run *run = s->run;
-	quern_clock *c = &run->clock;
-	/* what settling has cost is not lost again */
-	if (c->frame < 0 && output(s) == QUERN_OK) checkpoint(s);
-	while (run->status == QUERN_OK && !quern_run_over(run) && !has_come(run, s->until) && !interrupted) {
-		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
-		if (c->step == 0 && c->at == 0)
-			quern_log_add(run->log, 1, "step %.4g s, set by %s", c->dt, run->limit_reason);
-		if (quern_run_step(run) != QUERN_OK) break;
-		if (c->at == c->steps_in && output(s) != QUERN_OK) break;
-		progress(s, false);
-		if (due(s)) checkpoint(s);
+	while (!is_to_stop(s)) {
+		const quern_event event = quern_run_next(run);
+		if (event == QUERN_FRAME_IS_DUE) {
+			if (output(s) != QUERN_OK) break;
+			if (run->clock.frame == 0) checkpoint(s); /* what settling has cost is not lost again */
+		} else if (event == QUERN_STEPPED) {
+			progress(s, false);
+			if (!quern_run_awaits_frame(run) && due(s)) checkpoint(s);
+		} else break;
 	}
 	return run->status;
 }
@@ -266,7 +267,6 @@ static quern_status begin_anew(session *s, const options *o) {
 	if (o->resume) quern_log_add(run->log, 1, "no checkpoint yet: starting from the beginning");
 	quern_run_identity(run); /* of the files as they are now */
 	if (quern_run_setup(run) != QUERN_OK) return run->status;
-	run->mass_initial = quern_run_account(run).mass;
 	/* what goes on from a checkpoint may have begun with other plugins, or another file of grains */
 	if (!o->no_cache) s->alike = quern_settled_key(run);
 	quern_run_folder_clear(&s->folder, run->scene);

@@ -1,7 +1,7 @@
 /* loader - finds plugins by kind and name, maps exactly the object that is asked for, and never unmaps it */
 #pragma once
-#include "report.h"
 #include "plugin_table.h"
+#include "report.h"
 
 /* A plugin as the host sees it: its tables are copies in the host's own layout, see table.h. */
 typedef struct quern_plugin_file {

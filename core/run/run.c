@@ -269,7 +269,8 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 		g->step, hard, hard_reason, recommended);
 }
 
-quern_status quern_run_interval(quern_run *run) {
+/* Begins the interval to the next frame that is due, and chooses its steps from the state as it is. */
+static quern_status begin_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
 	const double end = due(run, c->end), length = end - c->end;
@@ -296,6 +297,8 @@ quern_status quern_run_interval(quern_run *run) {
 	c->at = 0;
 	c->begin = c->end;
 	c->end = end;
+	if (c->step == 0 && run->log)
+		quern_log_add(run->log, 1, "step %.4g s, set by %s", c->dt, run->limit_reason);
 	return QUERN_OK;
 }
 
@@ -347,7 +350,11 @@ static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
 	return QUERN_OK;
 }
 
-quern_status quern_run_setup(quern_run *run) { return run_phase(run, QUERN_SETUP, 0); }
+quern_status quern_run_setup(quern_run *run) {
+	const quern_status status = run_phase(run, QUERN_SETUP, 0);
+	if (status == QUERN_OK) run->mass_initial = quern_run_account(run).mass;
+	return status;
+}
 
 /* The least limit of those who step grains, not the continuum's. */
 static double settle_dt(quern_run *run) {
@@ -378,7 +385,8 @@ double quern_run_settling(quern_run *run, double *dt) {
 	return most;
 }
 
-bool quern_run_settle(quern_run *run) {
+/* One grain step of the settling phase, or none if all is at rest. */
+static void settle(quern_run *run) {
 	quern_clock *c = &run->clock;
 	bool rest = true;
 	if (c->settle_step == 0) c->settle_dt = settle_dt(run);
@@ -392,11 +400,10 @@ bool quern_run_settle(quern_run *run) {
 	}
 	if (rest || run->status != QUERN_OK) {
 		c->settled = 1;
-		return true;
+		return;
 	}
 	run_phase(run, QUERN_GRAINS, c->settle_dt);
 	c->settle_step++;
-	return run->status != QUERN_OK;
 }
 
 static uint32_t count(const quern_run *run, const char *set) {
@@ -404,7 +411,7 @@ static uint32_t count(const quern_run *run, const char *set) {
 	return i < 0 ? 0 : run->plan->store.sets[i].n;
 }
 
-quern_status quern_run_step(quern_run *run) {
+static quern_status do_step(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const uint32_t substeps = quern_run_substeps(run);
 	quern_status status = run_phase(run, QUERN_CONVERT, c->dt);
@@ -419,6 +426,23 @@ quern_status quern_run_step(quern_run *run) {
 	c->step++;
 	c->at++;
 	return status;
+}
+
+bool quern_run_awaits_frame(const quern_run *run) {
+	const quern_clock *c = &run->clock;
+	return run->status == QUERN_OK && c->settled && (c->frame < 0 || (c->steps_in && c->at == c->steps_in));
+}
+
+quern_event quern_run_next(quern_run *run) {
+	if (run->status == QUERN_OK && !run->clock.settled) {
+		settle(run);
+		return run->status == QUERN_OK ? QUERN_SETTLING : QUERN_STOPPED;
+	}
+	if (quern_run_awaits_frame(run)) return QUERN_FRAME_IS_DUE;
+	if (run->status == QUERN_OK && quern_run_over(run)) return QUERN_OVER;
+	if (run->status == QUERN_OK && !run->clock.steps_in) begin_interval(run);
+	if (run->status == QUERN_OK) do_step(run);
+	return run->status == QUERN_OK ? QUERN_STEPPED : QUERN_STOPPED;
 }
 
 quern_status quern_run_look(quern_run *run) { return run_phase(run, QUERN_OUTPUT, run->clock.dt); }

@@ -51,20 +51,28 @@ struct quern_run {
 quern_run *quern_run_create(quern_scene *, uint32_t workers);
 void quern_run_destroy(quern_run *);
 
-/* Runs the stages of the set-up phase. */
+/* Runs the stages of the set-up phase, and notes the mass that there is. */
 quern_status quern_run_setup(quern_run *);
+
+/* What a run has done last, or waits for. */
+typedef enum quern_event {
+	QUERN_STOPPED,      /* run->message says why */
+	QUERN_SETTLING,     /* one step of the grains alone */
+	QUERN_FRAME_IS_DUE, /* at the release and at the end of an interval; nothing is done before quern_run_frame */
+	QUERN_STEPPED,
+	QUERN_OVER
+} quern_event;
+
+/* The one way to drive a run: does the next thing. A step that begins an interval chooses its length first. */
+quern_event quern_run_next(quern_run *);
+/* True if that would be a frame. */
+bool quern_run_awaits_frame(const quern_run *);
 /* About how many steps settling takes from here, by what its solvers say, and their length; 0: none. */
 double quern_run_settling(quern_run *, double *dt);
-/* One grain step of the settling phase; true when at rest. */
-bool quern_run_settle(quern_run *);
 /* Refuses the scene's own step if it is beyond the hard limit of the state as it is. */
 quern_status quern_run_check_step(quern_run *, double hard, const char *hard_reason, double recommended);
-/* Begins the interval to the next frame that is due, and chooses its steps from the state as it is. */
-quern_status quern_run_interval(quern_run *);
 /* Runs the stages that make what is only wanted when somebody looks: before observers and frames. */
 quern_status quern_run_look(quern_run *);
-/* One long step. */
-quern_status quern_run_step(quern_run *);
 /* Ends the interval, or the time before the first one, with a frame. */
 void quern_run_frame(quern_run *);
 /* Once a checkpoint's clock is there: leads the running interval to where the scene now wants a frame. False, and nothing

@@ -27,12 +27,12 @@ quern_run *kit_open(void) {
 }
 
 void kit_steps(quern_run *run, int n) {
-	quern_clock *c = &run->clock;
-	c->settled = 1;
-	if (c->frame < 0) quern_run_frame(run);
-	for (int i = 0; i < n && run->status == QUERN_OK; i++) {
-		if (!c->steps_in && quern_run_interval(run) != QUERN_OK) break;
-		if (quern_run_step(run) == QUERN_OK && c->at == c->steps_in) quern_run_frame(run);
+	run->clock.settled = 1;
+	for (int i = 0; i < n || quern_run_awaits_frame(run);) {
+		const quern_event event = quern_run_next(run);
+		if (event == QUERN_FRAME_IS_DUE) quern_run_frame(run);
+		else if (event == QUERN_STEPPED) i++;
+		else break;
 	}
 }
 
@@ -47,7 +47,6 @@ quern_run *kit_run(const char *name, int n) {
 	quern_h5_quiet();
 	quern_run *run = kit_open();
 	if (quern_run_setup(run) != QUERN_OK) abort();
-	run->mass_initial = quern_run_account(run).mass;
 	kit_steps(run, n);
 	run->folder = quern_format("%s/%s", folder ? folder : "/tmp", name);
 	char *frames = quern_format("%s/frames", run->folder);

@@ -9,8 +9,8 @@
 #include <cmocka.h>
 
 #include "harness.h"
-#include "table.h"
 #include "scene_text.h"
+#include "table.h"
 #include <math.h>
 #include <stdlib.h>
 #include <unistd.h>

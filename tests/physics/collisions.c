@@ -9,8 +9,8 @@
 #include <cmocka.h>
 
 #include "harness.h"
-#include "table.h"
 #include "scene_text.h"
+#include "table.h"
 
 enum { PHASES = 32 };
 static const double radius = 5e-3, speed = 1; /* m, m/s: of approach */

@@ -8,8 +8,8 @@
 #include <cmocka.h>
 
 #include "harness.h"
-#include "table.h"
 #include "scene_text.h"
+#include "table.h"
 
 static const double pi = 3.14159265358979312, radius = 5e-3, stiffness = 1e5, density = 2500, gravity = 10;
 static const char *const integrators[] = { "symplectic_euler", "velocity_verlet" };

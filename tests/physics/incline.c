@@ -8,8 +8,8 @@
 #include <cmocka.h>
 
 #include "harness.h"
-#include "table.h"
 #include "scene_text.h"
+#include "table.h"
 
 static const double radius = 5e-3, gravity = 9.81, degree = 3.14159265358979312 / 180;
 

@@ -7,8 +7,8 @@
 #include <cmocka.h>
 
 #include "harness.h"
-#include "table.h"
 #include "scene_text.h"
+#include "table.h"
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>

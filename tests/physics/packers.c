@@ -16,9 +16,9 @@
 #include <string.h>
 #include <time.h>
 
-#include "random.h"
 #include "../../plugins/common/placer.h"
 #include "../../plugins/common/radius.h"
+#include "random.h"
 
 static const double pi = 3.14159265358979312;
 static const quern_host host = { .abi = QUERN_ABI, .random = quern_random };
