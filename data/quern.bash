@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Completion of quern for bash: commands and options are what `--help` says.
 _quern() {
 	local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]}

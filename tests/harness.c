@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* harness - scenes in a test's own process */
 #include <setjmp.h>
 #include <stdarg.h>

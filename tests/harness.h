@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* harness - scenes in a test's own process: read from text, run step by step, and looked into */
 #pragma once
 #include <run.h>

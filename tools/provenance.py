@@ -1,4 +1,5 @@
 #!/usr/bin/python3 -I
+# SPDX-License-Identifier: MIT
 """provenance - what a measured figure depends on: processor, compiler and commit, as one line: tools/provenance.py [BUILD]
 
 Scripts that measure import `of` and `line`. BUILD is the build folder, by default build.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """report - the key numbers of a run's summary, and where its files are: tools/report.py DIR..."""
 import json
 import sys

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* child - work that may crash, hang, end the program or multiply, done by a process of its own
  *
  * The child has a session of its own, which ends with it, and limits: time, memory, open files, the size of files. It

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* environment - what a call of a plugin must leave as it was, since it belongs to the whole program */
 #pragma once
 #include <sys/types.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* exit - the statuses that programs end with */
 #pragma once
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* file - bytes on the disk: files that are whole or absent, and hashes that tell one content from another */
 #pragma once
 #include <stdbool.h>

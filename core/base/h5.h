@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* h5 - HDF5 files that are whole or absent: built in memory, written aside, flushed, renamed */
 #pragma once
 #include "file.h"

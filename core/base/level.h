@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* level - which of the instruction sets x86-64-v1, v3 and v4 a processor has, all of each */
 #pragma once
 #include <stdint.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* log - log.txt, warnings, and the progress line of the terminal */
 #pragma once
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* platform - what differs between operating systems, processors and builds */
 #pragma once
 #include <stdint.h>

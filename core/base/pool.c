@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* pool - threads that wait for work a short while, then sleep. docs/decisions/0018-threads.md */
 #include "pool.h"
 #include "platform.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* pool - the only place that knows about threads */
 #pragma once
 #include <stddef.h>

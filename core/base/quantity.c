@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "quantity.h"
 #include "text.h"
 #include <ctype.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quantity - numbers with units: "5 mm", "24 deg", "70 GPa", "10 %"; bare numbers are SI */
 #pragma once
 #include <stdbool.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "random.h"
 
 void quern_philox(const uint32_t counter[4], const uint32_t key[2], uint32_t out[4]) {

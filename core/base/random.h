@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* random - Philox 4x32-10 (Salmon et al. 2011): a function of (stream, key, counter), so order and threads do not
  * matter */
 #pragma once

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* report - every fault found in a scene, each with its place; printed together, in the order of the file */
 #pragma once
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* text - growing strings, and the nearest known name to a misspelt one */
 #pragma once
 #include <stdarg.h>

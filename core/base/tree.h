@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* tree - a YAML document as a tree that remembers where every key and value stood */
 #pragma once
 #include "report.h"

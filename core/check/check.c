@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* check - places, random numbers, tallies, and kernels called in batches with guards around every column */
 #include "check.h"
 #include "random.h"

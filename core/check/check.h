@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* check - what the conformance tests of all kinds share: instances, kernels called in batches, tallies.
  *
  * A kernel is a function of a plugin that is called with batches, together with the columns it gets. Every call gets

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_body - geometry: unit normals, gaps that grow along them, surfaces that go with the pose */
 #include "check.h"
 #include <math.h>

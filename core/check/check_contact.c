@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_contact - laws between two grains: action and reaction, silence when apart, no energy out of nothing */
 #include "check.h"
 #include <math.h>

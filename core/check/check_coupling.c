@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_coupling - exchanges at nodes: momentum is kept, equal velocities stay, no energy is gained */
 #include "check.h"
 #include <math.h>

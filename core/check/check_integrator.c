@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_integrator - steps in time: free flight is exact, a constant force gives its momentum, a spring keeps its energy */
 #include "check.h"
 #include <math.h>

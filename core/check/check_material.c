@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_material - constitutive models: stress and history belong together, yield is obeyed, rotation does not matter */
 #include "check.h"
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_neighbours - searches: the same pairs as by looking at all of them, each once in its block */
 #include "check.h"
 #include "text.h"

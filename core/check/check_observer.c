@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_observer - numbers about a whole set: what leaves give does not depend on who computes them, and sums of parts
  * are sums of the whole */
 #include "check.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_oracle - marks and wishes of cells: local, finite, and one of the three zones */
 #include "check.h"
 #include <math.h>

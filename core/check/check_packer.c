@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_packer - placing grains in a region: no overlap, nothing outside, the radius that waits, the same again */
 #include "check.h"
 #include "random.h"

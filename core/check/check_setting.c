@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* check_setting - instances with parameters of ordinary size, at their bounds, or mixed; written as a scene would */
 #include "check.h"
 #include "random.h"

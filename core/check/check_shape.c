@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_shape - shape functions: they sum to one, reproduce a line, know their slopes and stay inside walls */
 #include "check.h"
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_table - rows of parameters and uses, wherever a table holds them */
 #pragma once
 #include "check.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern_check_transfer - from grid to particles and back, on a line of nodes: uniform motion stays, momentum is kept */
 #include "check.h"
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* command - what a program does from the command line */
 #pragma once
 #include "exit.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern check - conformance tests of one plugin, each group in a process of its own, so that a crash is one sentence */
 #include "check.h"
 #include "child.h"

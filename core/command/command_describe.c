@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern list, quern describe - what is installed and what a scene may say, from the tables of plugins and core */
 #include "command.h"
 #include "loader.h"

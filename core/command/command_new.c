@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern new - a plugin of one's own, from a template that works */
 #include "command.h"
 #include "folder.h"

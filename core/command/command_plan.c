@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern plan - everything short of running: what is loaded, in which order it works, what is allocated and what not */
 #include "command.h"
 #include "config.h"

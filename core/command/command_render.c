@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern render - a picture of a frame, to look at and to print */
 #include "command.h"
 #include "h5.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern run - reads, settles, steps, writes; ends with a checkpoint whatever stops it in between */
 #include "checkpoint.h"
 #include "command.h"

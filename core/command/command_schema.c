@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern schema - a JSON Schema of scenes from the rows of all installed plugins, for completion in editors */
 #include "command.h"
 #include "h5.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern - simulates granular material with grains where grains matter and a continuum everywhere else */
 #include "command.h"
 #include "config.h"

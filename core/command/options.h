@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* options - a command line, read alike by every command
  *
  * GNU style: --name value and --name=value, -n value, options and words in any order, -- before words that begin with a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* programs beside quern - quern-WORD does `quern WORD` */
 #include "command.h"
 #include "config.h"

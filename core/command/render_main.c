@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern-render - `quern render`: pictures of frames, a program of its own since it alone needs Cairo */
 #include "command.h"
 #include "h5.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* templates - the files that `quern new` writes, made from core/templates when the program is built */
 #pragma once
 

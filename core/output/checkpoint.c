@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "checkpoint.h"
 #include "config.h"
 #include "state.h"

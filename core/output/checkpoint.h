@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* checkpoint - all state of a run in one file, from which it goes on to the same bits */
 #pragma once
 #include "identity.h"

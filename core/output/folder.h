@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* folder - folders on the disk */
 #pragma once
 #include <stdbool.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* frame - one plain HDF5 file per output */
 #pragma once
 #include "run.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observe - asks the scene's observers, keeps series.csv and what the summary says of each column */
 #pragma once
 #include "run.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* run_folder - the folder of a run: who holds it, what of it a run has left, and the scene that lies in it */
 #pragma once
 #include "scene.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "settled.h"
 #include "config.h"
 #include "folder.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* settled - states in which grains have come to rest, kept for the next run that would settle alike. docs/decisions/0020 */
 #pragma once
 #include "run.h"

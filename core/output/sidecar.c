@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "sidecar.h"
 #include "child.h"
 #include "h5.h"

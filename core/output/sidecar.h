@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* sidecar - run.xdmf and views/: small files that let ParaView and VisIt open a whole run, without a copy of the data */
 #pragma once
 #include <stdbool.h>

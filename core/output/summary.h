@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* summary - summary.json: what a run was, what it cost, and what it kept */
 #pragma once
 #include "observe.h"

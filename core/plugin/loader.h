@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* loader - finds plugins by kind and name, maps exactly the object that is asked for, and never unmaps it */
 #pragma once
 #include "plugin_table.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "param.h"
 #include "text.h"
 #include <errno.h>

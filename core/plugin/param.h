@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* param - from the rows of a plugin's table to its instance and back */
 #pragma once
 #include "quantity.h"

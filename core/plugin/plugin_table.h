@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* table - what a plugin says of itself, asked once, when it is loaded, and copied into the host's own layout
  *
  * Rows are read with the plugin's strides and ops by their size, so that a plugin built with an older, shorter header is

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* table_ops - the functions of every kind, and the tables that solvers and observers hang on theirs */
 #include "loader.h"
 #include "param.h"

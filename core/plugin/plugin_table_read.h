@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* table_read - the parts of reading a table, shared by table.c and table_ops.c */
 #pragma once
 #include "plugin_table.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* watch - which plugin is being called, so that a crash in it, or its end of the program, is a sentence and status 3
  *
  * Calls are marked from the main thread alone; of a crash in a worker the address tells the plugin. What a signal

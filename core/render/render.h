@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* render - a frame as a picture: what is read from it, how numbers become colours, and who paints what */
 #pragma once
 #include "scene.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* estimate - what a run will cost, before its first step */
 #pragma once
 #include "run.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* host - the table of services that plugins get */
 #include "random.h"
 #include "run.h"

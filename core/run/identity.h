@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* identity - what a checkpoint and the run that goes on from it must have in common: the scene, but for what may change,
  * and the plugins */
 #pragma once

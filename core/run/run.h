@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* run - a scene in motion: its plan, its grid, its counters; and the loop over steps */
 #pragma once
 #include "grid.h"

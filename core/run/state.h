@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* state - sets and their fields in a file: what checkpoints and settled states have in common */
 #pragma once
 #include "h5.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* resolved - the scene with every default written out, so that it reruns the same */
 #include "scene.h"
 #include "text.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scene - a scene file read, checked and resolved: every section's solver, every slot's plugins, every default */
 #pragma once
 #include "file.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* section - a section of a scene: its solver, and the plugins in the solver's slots */
 #pragma once
 #include "scene.h"

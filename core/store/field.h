@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* field - sets of entities and their columns: allocated, carried, reordered, and nothing else; what a column means is
  * for the plugins to know */
 #pragma once

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* grid - the sparse grid: which blocks exist, which nodes a block's tile reaches, which blocks may add at once */
 #pragma once
 #include "field.h"

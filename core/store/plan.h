@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* plan - from declared uses to stages in order, fields that exist, and conflicts refused by name */
 #pragma once
 #include "field.h"

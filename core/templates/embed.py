@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Writes the templates into one C file, line by line: embed.py OUT FILE..."""
 import pathlib
 import sys

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern/abi.h - everything a plugin needs, and the only promise Quern makes to it. C17 and C++17.
  *
  * A plugin is one shared object, KIND.NAME.so, that exports one constant table, quern_library_1. Nothing

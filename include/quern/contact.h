@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern/contact.h - what contact laws share: restitution, first touch, the Coulomb cone. docs/theory/contacts.md */
 #pragma once
 #include <quern/math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern/grid.h - the sparse grid as a solver sees it: rows of eight numbers per node, one dense tile per block */
 #pragma once
 #include <quern/abi.h>

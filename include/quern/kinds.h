@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern/kinds.h - what the host and a plugin of each kind tell each other: batches, jobs and tables of functions. The second
  * half of quern/abi.h, which includes it; the rules at the head of that file hold for every function here. */
 #pragma once

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern/math.h - elementary functions that give the same bits everywhere.
  *
  * libm's exp, log, pow and trigonometry differ between versions and, inside one version, between processors,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* quern/vec.h - small vectors by value. A struct of scalars, never an array: loops over it vectorise. In 2-D z stays
  * zero, and `dim` is a constant in every caller, so what a plane does not need vanishes. */
 #pragma once

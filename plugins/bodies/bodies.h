@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* bodies - what every body takes besides its own shape; the keys of a scene's `bodies` entries */
 #pragma once
 #include <math.h>

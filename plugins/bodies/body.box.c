@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* body.box - a solid rectangle or cuboid, along the axes of its pose. docs/theory/bodies.md */
 #include <math.h>
 #include <quern/vec.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* body.plane - a half-space: everything on the side that the normal does not point to. docs/theory/bodies.md */
 #include <math.h>
 #include <quern/vec.h>

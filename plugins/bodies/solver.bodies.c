@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* solver.bodies - walls and bodies: who is there, and what impulse each has given to the material */
 #include "../common/tools.h"
 #include "bodies.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "cover.h"
 #include "sort.h"
 #include "tools.h"

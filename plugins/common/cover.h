@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* cover - which grid blocks the material needs, and points in the order of blocks and cells */
 #pragma once
 #include <quern/grid.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "placer.h"
 #include "../bodies/bodies.h"
 #include <math.h>

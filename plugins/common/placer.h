@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
 #pragma once
 #include <quern/abi.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* radius - the distribution of grain radii, by the number of the draw */
 #pragma once
 #include <quern/abi.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* rotation - what is done with symmetric tensors, and a stress carried along with the material: what the materials share.
  * `dim` is a constant in every caller. docs/theory/materials.md, 1 and 2 */
 #pragma once

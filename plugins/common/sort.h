@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* sort - a stable sort of keys, as the order that remap() takes */
 #pragma once
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* stencil - particles of one grid block and the nodes they reach, in the block's tile; for points and grains alike */
 #pragma once
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 #include "stressed.h"
 #include "tools.h"
 

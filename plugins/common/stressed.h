@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* stressed - points whose stress is given: the rest of their state by the material's state-from-stress */
 #pragma once
 #include <quern/abi.h>

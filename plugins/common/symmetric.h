@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* symmetric - a symmetric tensor by value, and the one place that knows in which order a SYMMETRIC field keeps its
  * components. In 2-D zz, yz and xz stay zero, and `dim` is a constant where it matters. */
 #pragma once

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* tools - what several solvers need and no plugin author would miss */
 #pragma once
 #include <quern/abi.h>

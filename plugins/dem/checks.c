@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* checks - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains out of the
  * domain. docs/decisions/0015-too-deep.md */
 #include "forces.h"

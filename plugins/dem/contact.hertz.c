@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* contact.hertz - Hertz's normal force and Mindlin's tangential stiffness, from the constants of the grains' material.
  * docs/theory/contacts.md, section 3 */
 #include <quern/contact.h>

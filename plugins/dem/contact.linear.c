@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* contact.linear - spring and dashpot, with a tangential spring and dashpot under a Coulomb cone.
  * docs/theory/contacts.md, section 2. Start here to write a law of your own. */
 #include <quern/contact.h>

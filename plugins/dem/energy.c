@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* energy - what dashpots and sliding take in every step, and what there is when somebody looks. docs/theory/contacts.md,
  * section 5.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* fill - the first grains: packed cell by cell, given one by one, or read from a table; and when they have settled */
 #include "../common/placer.h"
 #include "dem.h"

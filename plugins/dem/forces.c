@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* forces - the stage that takes most of a run: block by block, distance test, laws, sums and integration.
  *
  * A block's grains are written by one worker alone. A pair inside a block is computed once; a pair across two blocks

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* forces - what the parts of the force stage share: pairs of grains, grains on bodies, integration */
 #pragma once
 #include "dem.h"

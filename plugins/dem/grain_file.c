@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* grain_file - a table of grains: a header line of column names, then one line per grain; commas or blanks between */
 #include "dem.h"
 #include <errno.h>

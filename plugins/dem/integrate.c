@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* integrate - moves the grains of one block, holds those that are fixed, and looks for those that are lost */
 #include "forces.h"
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* integrator.symplectic_euler - velocities first, positions with the new ones. docs/theory/grains.md, section 3 */
 #include <quern/abi.h>
 

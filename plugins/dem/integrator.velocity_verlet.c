@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* integrator.velocity_verlet - second order, also with dashpots: forces see v + dt a, the velocity that the old
  * acceleration predicts. docs/theory/grains.md, section 3 */
 #include <quern/abi.h>

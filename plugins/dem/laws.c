@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* laws - what pairs and touches share: a law's own columns gathered, the call, and what is put back */
 #include "forces.h"
 #include <string.h>

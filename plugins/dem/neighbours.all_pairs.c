@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* neighbours.all_pairs - every pair is looked at: the reference that faster searches are held against */
 #include <quern/abi.h>
 

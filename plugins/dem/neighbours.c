@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* neighbours - the stage that sorts grains, lists near pairs and near bodies, and carries their history over */
 #include "../common/sort.h"
 #include "dem.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* open - the integrator's part before the forces, where it has one */
 #include "dem.h"
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* pairs - contacts between grains of one block: distance test, laws, sums in list order */
 #include "forces.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* solver.dem - grains: discs and spheres with contact laws. docs/theory/grains.md */
 #include "../common/height.h"
 #include "dem.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* touches - grains of one block on bodies: the same laws, with the body for a second grain that never moves */
 #include "forces.h"
 

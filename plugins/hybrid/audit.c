@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* audit - the ledger's two invariants, asserted after every step: docs/theory/hybrid.md, section 5 */
 #include "hybrid.h"
 #include <math.h>

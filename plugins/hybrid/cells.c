@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* cells - who is in which cell, and what cells hold on average */
 #include "../common/cover.h"
 #include "update.h"

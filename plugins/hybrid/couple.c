@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* couple - grains and continuum meet at the nodes: grains to nodes, an exchange of momentum, and back to the grains */
 #include "../common/stencil.h"
 #include "hybrid.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* coupling.affine - the same exchange of momentum at each node, between clouds that send v + L (x_i - x): so both speak
  * of the velocity at the node, and strain rates and rotations pass unchanged. docs/theory/hybrid.md, section 2 */
 #include "exchange.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* coupling.lumped - an inelastic exchange of momentum at each node. docs/theory/hybrid.md, section 2 */
 #include "exchange.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* enrich - mass owed to the grains becomes grains: a packer places them, the flow around gives them their motion */
 #include "../common/placer.h"
 #include "update.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* exchange - the inelastic exchange of momentum that both couplings make, node by node */
 #pragma once
 #include <quern/abi.h>

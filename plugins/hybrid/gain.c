@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* gain - motion that nobody has given: docs/theory/hybrid.md, section 5 */
 #include "../common/symmetric.h"
 #include "hybrid.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* hybrid - the parameters of the hybrid solver and the rows of its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* ledger - what grains and points owe each other, by cell: mass and momentum. docs/theory/hybrid.md, section 5 */
 #include "update.h"
 #include <math.h>

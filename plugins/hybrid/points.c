@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* points - mass owed to the continuum becomes points, or joins those that are there; few are split, many are merged */
 #include "../common/stressed.h"
 #include "update.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* sample - contact stress by cell, for points that are made there: docs/theory/hybrid.md, section 4 */
 #include "../common/symmetric.h"
 #include "hybrid.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* solver.hybrid - who is where: zones, conversions, the coupling of grains and continuum. docs/theory/hybrid.md */
 #include "hybrid.h"
 

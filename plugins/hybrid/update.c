@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* update - the order of a zone update. docs/theory/hybrid.md, section 6, says why it is this one */
 #include "update.h"
 #include <math.h>

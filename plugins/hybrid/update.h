@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* update - what the parts of a zone update share: who is in which cell, what cells hold, and what shall come and go */
 #pragma once
 #include "hybrid.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* zones - oracles mark a surface, the distance inwards from it is made once for each, they wish, and the least continuous
  * wish becomes a zone, with hysteresis and one step at a time */
 #include "update.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* fill - the first points: a lattice in each region, with the stress of the overburden if wished */
 #include "../common/stressed.h"
 #include "mpm.h"

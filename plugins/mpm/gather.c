@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* gather - nodes to points, chunk by chunk: velocity, position, volume, stress */
 #include "../common/stencil.h"
 #include "mpm.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* mpm - the continuum solver's own parameters and the rows of its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* nodes - the grid between scatter and gather: velocities from momenta and forces, and what bodies do to them */
 #include "mpm.h"
 #include <math.h>

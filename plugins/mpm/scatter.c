@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scatter - points to nodes: mass, momentum and internal force in one row, block by block in coloured order */
 #include "../common/stencil.h"
 #include "../common/symmetric.h"

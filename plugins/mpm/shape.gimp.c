@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* shape.gimp - uniform generalised interpolation: hats averaged over a particle of half-width l. At walls the nodes
  * outside are folded back, which leaves the hat and keeps completeness. docs/theory/mpm.md, section 2 */
 #include <quern/math.h>

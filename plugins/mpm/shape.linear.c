@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* shape.linear - hats: two nodes per axis. Their slopes jump at cell faces; for comparison. docs/theory/mpm.md */
 #include <quern/math.h>
 

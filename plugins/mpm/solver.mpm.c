@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
 #include "../common/height.h"
 #include "mpm.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* sort - the stage that keeps points in the order of blocks and cells */
 #include "../common/cover.h"
 #include "mpm.h"

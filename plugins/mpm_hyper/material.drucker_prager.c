@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no tension.
  * docs/theory/materials.md, section 4
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* material.mu_i - hypoelastic up to a yield stress that grows with the inertial number, no tension, and no stress below
  * the critical density. docs/theory/materials.md, section 3 */
 #include "../common/rotation.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observer.discrete_share - the share of the mass that grains carry: sum of w m over all carried mass */
 #include "observers.h"
 

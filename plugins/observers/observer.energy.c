@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section 5 */
 #include "observers.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observer.ledger - what grains and continuum owe each other, and how well mass is carried. docs/theory/hybrid.md, 5 */
 #include "observers.h"
 #include <math.h>

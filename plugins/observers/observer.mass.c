@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observer.mass - the mass that grains and points carry */
 #include "observers.h"
 

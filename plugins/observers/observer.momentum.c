@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observer.momentum - the momentum that grains and points carry together */
 #include "observers.h"
 

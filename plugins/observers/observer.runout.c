@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observer.runout - how far and how high the material lies, by quantiles of the connected mass */
 #include "../common/height.h"
 #include "observers.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observer.wall_force - the mean force of the material on a body, between two observations */
 #include "observers.h"
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* observers - what several observers look at: the grains and points that are carried, and how much of each */
 #pragma once
 #include "../common/tools.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* oracle.packing_fraction - grains near the free surface, continuum deep inside. docs/theory/hybrid.md, section 3 */
 #include <quern/abi.h>
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* oracle.strain_rate - grains where the flow shears fast. docs/theory/hybrid.md, section 3 */
 #include <math.h>
 #include <quern/abi.h>

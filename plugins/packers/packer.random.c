@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* packer.random - darts thrown at the region until too many in a row miss. docs/theory/packers.md, section 2 */
 #include <quern/abi.h>
 

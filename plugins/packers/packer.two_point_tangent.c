@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* packer.two_point_tangent - grains that touch two others, in 3-D three; a wall counts as one.
  * docs/theory/packers.md, section 3 */
 #include <quern/math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* transfer.mixed - PIC along the normal of the hybrid zone, FLIP along its tangents; what this takes from one particle
  * goes back through the grid, so that momentum is kept where the normal turns. docs/theory/transfers.md */
 #include <quern/vec.h>

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """column - the main scene as hybrid, as pure grains and as pure continuum, over seeds: how far apart they end.
 
     studies/column/study.py [--out DIR] [--threads 2] [--only column]

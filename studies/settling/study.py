@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """settling - what the quick way to settle leaves, beside a slow one: packing fraction, and the run that follows.
 
     studies/settling/study.py [--out DIR] [--seeds 3] [--threads 2]

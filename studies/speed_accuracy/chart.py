@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """chart - draws docs/speed_accuracy.svg and writes the table of docs/speed_accuracy.md: chart.py results.json"""
 import json
 import pathlib

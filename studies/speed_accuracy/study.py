@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """speed_accuracy - what a setting of the hybrid costs, and how far it ends from Quern's own grains.
 
     studies/speed_accuracy/study.py [--out DIR] [--seeds 3] [--only NAME]...

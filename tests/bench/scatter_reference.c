@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* scatter_reference - what Quern's continuum is timed against: the same step written the plain way. Points are structs,
  * sorted by cell; the grid is dense, one array per quantity; each point adds to its 9 or 27 nodes one by one.
  *

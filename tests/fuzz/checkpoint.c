@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* fuzz checkpoint - a good checkpoint with some of its values, sizes and types changed is refused, or taken and looked
  * through; the unchanged one is taken and stepped on. Bytes that begin like a checkpoint are taken for a whole file. */
 #include "edits.h"

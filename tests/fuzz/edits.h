@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* edits - a good file of HDF5 with some of its values, sizes and types changed
  *
  * The fuzzer's bytes are a list of edits: which attribute or dataset, what to do, how. HDF5 itself is not the target:

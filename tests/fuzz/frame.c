@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* fuzz frame - a good frame with some of its values, sizes and types changed is refused with a sentence, or drawn; the
  * unchanged one is drawn. The last byte says which field colours it. */
 #include "edits.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* fuzz grains - any bytes as a table of grains; the first says whether of discs or of spheres */
 #include <dem.h>
 #include <math.h>

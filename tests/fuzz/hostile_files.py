@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Checkpoints and frames that were damaged: bits and words overwritten, ends cut off; and checkpoints whose values, counters
 and sizes were changed by somebody who puts the checksum right. Each is resumed from or drawn, under a limit of time; what
 a run leaves that ends well is looked at (nonsense.py).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Scenes that somebody has spoilt: types, units, signs, sizes, structure, extreme numbers. Each is planned and run for a
 while under a limit of time, and what a run leaves that ends well is looked at (nonsense.py).
 

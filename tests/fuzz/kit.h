@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* kit - a small run of every part, from which the targets take the files that they damage */
 #pragma once
 #include <run.h>

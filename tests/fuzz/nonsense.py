@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs that must end as promised, whatever they were given, and what a run that ends well must not have left.
 
 A run ends with 0, 2, 3 or 4 and without a signal; where it fails it says why in a sentence. A run that ends with 0 left

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* fuzz scene - any bytes as a scene, with every plugin that they may name, up to where the first step could begin */
 #include <run.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* fuzz series - what a run reads back of its own when it goes on. An even first byte: the rest is series.csv, behind its
  * heading or, if the second byte is odd, whole; it is taken up to the rows that are asked for and cut there, or refused.
  * An odd first byte: the rest edits a frame, which run.xdmf and the lists in views/ name or leave out. */

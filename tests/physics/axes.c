@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The names of the axes mean nothing: a scene whose axes are interchanged runs as before, component by component, grains and
  * continuum, contacts, bodies, fixed grains, seams, conversions and energies alike. Cells are so full that no choice among
  * their parts is left to the order of their numbers. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Restitution measured against restitution asked: pairs of equal and of unequal grains and grains on a wall, with both
  * laws, both integrators and in both dimensions, at the default step and in every phase of it in which a pair may
  * happen to touch. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The stress that the hybrid samples from contacts: summed over all cells, times a cell's volume, it is minus the sum over
  * contacts of force times branch, symmetric, component by component in the order that quern/abi.h states. Two spheres
  * along many directions, a grain on a slanting plane and on a fixed grain, and lattices under every unit strain. */

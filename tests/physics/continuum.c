@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The continuum solver against closed forms: waves at their speed, weight carried at rest, and no ghost of a volume left in
  * a body that flew apart and fell back. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Free flight, in which nothing may happen that no force causes: transfers keep momentum, uniform motion stays as it is to
  * round-off, a body that turns as a whole feels no stress, and what a transfer takes from a turning body is what it
  * promises. */

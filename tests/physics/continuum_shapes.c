@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The shape functions alone. Whatever the place of a point, up to the walls and into the corners, its weights sum to one
  * and reproduce positions, their slopes sum to zero and reproduce a unit gradient: without that neither momentum nor a
  * uniform strain rate survives the way to the grid and back. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The order of both integrators: a contact that swings with and without its dashpot, one that swings along the wall, and a
  * rebound, whose force sets in with a jump. Errors are taken at a fixed time, and the step is halved. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Couples, which a law gives beside its force: grains that roll with resistance are slowed down as a couple of mu r f slows
  * them, none comes out of nothing, weights share them, and the energy that they store and take is in the books. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What must pass through the hybrid zone unchanged: uniform motion with every transfer and coupling, uniform strain rate and
  * rigid rotation with `affine`. And what must not be made there: momentum. docs/theory/hybrid.md, section 2 */
 #include <setjmp.h>

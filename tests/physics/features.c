@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A body of several features, here a corner of two planes: a grain touches each with a history of its own, so that it moves
  * as between two bodies of one plane each, to the last bit. */
 #include <setjmp.h>

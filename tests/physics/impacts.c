@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Single impacts in closed form, after the benchmark of Chung & Ooi, Granul. Matter 13 (2011) 643: the peak of an elastic
  * collision, oblique impacts that slide, and spins that a contact must not change. All at the default step. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Grains on an incline: the angle at which they begin to slide, held from turning and free to roll, and how fast they
  * go below and above it. The incline is a plane across y, and gravity is turned. */
 #include <setjmp.h>

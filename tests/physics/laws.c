@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A list of laws: as many as a scene names, each with up to sixteen rows of its own, of every kind. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is seen when somebody looks is the state as it is: before the first step too, whatever near grains do; of bodies that
  * are there alone. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* material_kit - materials without a scene */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* material_kit - materials without a scene: points in columns, tensors in long double to check them with, and random
  * states that are the same everywhere */
 #pragma once

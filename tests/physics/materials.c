@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The materials alone, point by point: against vectors, against the formulas of docs/theory/materials.md in long
  * double, and back from a stress. */
 #include <setjmp.h>

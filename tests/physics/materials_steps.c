@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The materials alone, over steps and as programs: what must hold for any of them, whoever looks, however points are
  * cut into batches and whatever the compiler. */
 #include <setjmp.h>

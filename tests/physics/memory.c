@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A transfer that remembers, of points and of grains alike: what it writes is there the next time. */
 #include <setjmp.h>
 #include <stdarg.h>

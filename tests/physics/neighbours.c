@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The search by linked cells against the one that looks at every pair: the same pairs, and the same motion to the bit. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What is written out is seen, not made: asking for a field changes no bit of a run, and does not turn a scene into
  * another one, such as a hybrid. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Guards that look at grains now and then: contacts that lie deep for long, grains behind a body's surface or out of the
  * domain, and spins that no step resolves. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the packers reach and what they must never do, on regions filled cell by cell as plugins/dem/fill.c does.
  * The folder of the plugins is QUERN_PLUGINS_DIR, or "plugins". docs/theory/packers.md quotes the table. */
 #define _POSIX_C_SOURCE 200809L /* clock_gettime */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* plugin_alone - one plugin without a scene */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* plugin_alone - one plugin without a scene: its defaults, and what the test gives. Comes from the folder
  * QUERN_PLUGINS_DIR, of the instruction set QUERN_PLUGINS_LEVEL: v1, v3 or v4. Where the processor has not all of it the test
  * is skipped. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a zone update makes of points that are too many in a cell, or too few: mass, momentum and volume are kept to
  * round-off, so is the sum of volume times stress, and a point that was open is open afterwards, as loose as before. The
  * stage itself is called, between two steps, on points that the test has crowded. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* text - a scene's text written piece by piece */
 #pragma once
 #include <assert.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How a scene starts: how high its material lies, and what of it may stand where. */
 #include <setjmp.h>
 #include <stdarg.h>

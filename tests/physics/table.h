@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* table - rows of what was measured, what was asked and how far apart they may be */
 #pragma once
 #include <math.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Where the energy of grains goes: the change of kinetic energy in a step is the work of the contacts and of gravity, what
  * dashpots take is what the program books, and the books of a whole collapse close. */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Zones of the hybrid: which cells lie near a surface, and which is the nearest hybrid one. */
 #include <setjmp.h>
 #include <stdarg.h>

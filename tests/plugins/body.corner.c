@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* body.corner - two planes that meet, feature 0 and feature 1: what lies behind either is inside. For tests. */
 #include <math.h>
 #include <quern/vec.h>

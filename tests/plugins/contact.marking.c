@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* contact.marking - a law without force that has as many rows as a plugin may have, of every kind: it counts the steps of
  * a contact and writes down who touches. For tests. */
 #include <quern/abi.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* contact.pulling - a constant pull between grains that are apart by less than a share of the effective radius. For tests. */
 #include <quern/vec.h>
 

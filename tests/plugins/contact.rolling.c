@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* contact.rolling - resistance to rolling, as a couple that no force goes with: spring and dashpot along the rolling
  * velocity v_r = r (w_i - w_j) x n under a cone of mu_r times the normal force of the laws before it in the list. For
  * tests: after Luding, Granul. Matter 10 (2008) 235. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* oracle.layer - a plugin in C++17: grains above a height, continuum below. The tables are constant, as in C: nothing runs
  * when the object is loaded. */
 #include <quern/abi.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* transfer.counting - FLIP that remembers how often it was called and what it changed last. For tests. */
 #include <quern/abi.h>
 

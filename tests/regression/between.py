@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Stopped in the last step of settling, before anything was written of the run itself: it goes on to the same first frame, series
 and checkpoint, with all that frames and observers look at. A contact law of our own stops the run, at a call that it counts."""
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The same scene leaves the same bits: for any number of threads, batch, instruction set, C library and compiler, and
 across stops by Ctrl-C and by kill -9.
 

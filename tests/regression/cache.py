@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Settled states are kept: a second run of the same beginning starts from one, to the same bits, whoever made it."""
 import os
 import pathlib

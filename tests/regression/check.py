@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """quern check: every installed plugin passes, and every property that it states is seen to fail on a plugin that breaks it
 on purpose."""
 import concurrent.futures

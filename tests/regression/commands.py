@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The command line: every command reads its options alike, says how it is used, and says so when it could not print."""
 import os
 import pathlib

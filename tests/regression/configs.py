@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The scenes of configs/ do what they say, as they stand; the two columns do so in bits.py and rerun.py, made shorter."""
 import math
 import pathlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """No multiplication is fused with an addition in what the compiler made: results would differ between instruction sets.
 
 Looks into the program and every plugin for instructions of the kind vfmadd, vfmsub, vfnmadd, vfnmsub.

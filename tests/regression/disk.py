@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A full disk: exit status 4 and a sentence, what was written before is whole, and the run goes on when there is space.
 
 `disk.py`: with a limit on the size of a file. `disk.py full`: on a small file system of its own, where one may be mounted

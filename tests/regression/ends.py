@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Ends that change on resume, and --until: frames are due at whole multiples of output.every and at time.end, none is missing
 and none comes twice, and where nothing is asked for otherwise the bits are those of a run in one go."""
 import contextlib

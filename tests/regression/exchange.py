@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One plugin for another, by one option: same program, the named object mapped and the replaced one not, other results
 (but for the search for neighbours, which must not matter), closed books."""
 import hashlib

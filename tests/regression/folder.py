@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The folder of a run: not replaced without --force, and then no more than what a run has left; never what the run was given;
 held by one run at a time, and free again once that is gone, however it went."""
 import os

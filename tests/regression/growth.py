@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Interfaces grow at the end of their structs: a program built with longer tables takes the plugins of this build, which
 have shorter ones, and gives the same lists, plans and bits; this program refuses plugins of the longer ones by a sentence."""
 import concurrent.futures

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Every public header compiles alone, without a warning, as C17 and as C++17, and a plugin in C++ is as good as one in C.
 
 With the compilers that are there; skipped, with exit status 77, where there is none of C++.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plugins that misbehave while a scene is read or runs: one sentence with plugin and function, status 3 or 2, and what was
 written before stays."""
 import json

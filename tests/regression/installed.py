@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """An installed Quern works wherever its folders are: libraries in a place of their own, without Cairo, moved as a whole."""
 import os
 import pathlib

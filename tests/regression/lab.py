@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs to experiment with: small columns that convert within a second, runs stopped on the way, folders compared."""
 import json
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Objects that are no plugins, or broken ones: one clear sentence each, and exit status 2."""
 import json
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Ten thousand frames cost five times as much as two thousand, in time and in bytes written, and the lists of them that
 ParaView reads are well formed."""
 import json

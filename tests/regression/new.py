@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`quern new`: a plugin of every kind, built outside the source tree against an installed Quern, checked, described
 and run."""
 import concurrent.futures

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What observers leave: an object each in the summary and columns of their own in the series, under labels that differ; any
 number of outputs; and no number that is not finite."""
 import os

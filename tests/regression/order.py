@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A solver of our own whose first set points into its second: a resume does not depend on the order in which sets are named."""
 import os
 import pathlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What the pages show works as it stands there: commands, scenes, Python, and the words that the program is said to print.
 
 In a page, an indented line `build/quern ...` is run, with the status that `# status N` behind it says; a block of yaml whose first

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """ParaView opens a whole run, by run.xdmf and by the series of views/: times, counts, arrays and values are those of the
 frames. Skipped where python3-paraview is not installed; tools/setup paraview installs it."""
 import importlib.util

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A plugin that is rebuilt between a stop and a resume: refused by name with both versions, or taken with --force and noted. The
 same plugin for another processor is the same plugin."""
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """`quern render`: pictures of frames of every sort, looked at pixel by pixel, and its refusals."""
 import os
 import pathlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """scene.yaml reruns the same, to the byte and from any folder: every scene of configs/, its twins, and a scene whose grains stand
 in a file. Such a file is known by what is in it, not by how its path is spelt."""
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """kill -9 at any moment: what is there is whole, and the run goes on to the same end.
 
 `resume.py [KILLS]`, 50 by default.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The core's rooms can be read in the order that core/README.md gives: no file includes one of a later room, no header leads back
 to itself, and nothing in the core includes a plugin."""
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Malformed scenes: every one is refused with exit status 2 and the very message that lies beside it.
 
 malformed/NAME.yaml goes with malformed/NAME.err, what the program prints (but for lists of installed plugins). `--update` rewrites the .err files; read

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The JSON Schema of scenes: it knows what the tables say, takes every scene that this tree ships or a run leaves, and refuses
 most that the program refuses."""
 import copy

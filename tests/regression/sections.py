@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """No more than a scene needs: which objects are mapped, which sets and fields exist and what an entry weighs."""
 import pathlib
 import re

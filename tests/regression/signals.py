@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Signals: the first one stops the run after its step, with a checkpoint; the second one ends it at once; what the run was started
 to ignore, and a reader that has gone away, stop nothing."""
 import os

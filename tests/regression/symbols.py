@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A plugin exports its table and nothing else; all that has external linkage, in every object of the program and in every
 archive, begins with quern_; and the program gives plugins nothing else than that.
 """

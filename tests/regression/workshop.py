@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plugins made and broken at test time: compiles sources with cc and runs the program on them."""
 import os
 import pathlib

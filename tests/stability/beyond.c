@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* beyond - tables of what happened beyond a limit */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* beyond - tables of what happened beyond a limit: to the terminal and, where a folder is given, as a page of Markdown */
 #pragma once
 #include <run.h>

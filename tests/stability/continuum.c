@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The continuum with steps beyond its limit: a block that is shaken, a column at rest, nodes with hardly any mass.
  * docs/stability.md, section 2 */
 #include <setjmp.h>

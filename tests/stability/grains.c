@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Grains with steps beyond their limit: one contact that swings, and a bed at rest. docs/stability.md, section 1 */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* held - a hybrid column held by walls on both sides, which must not move */
 #pragma once
 #include <run.h>

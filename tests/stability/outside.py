@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """From outside: a run that goes past its limit ends with exit status 3 and one sentence that names the culprit, and what it
 wrote before is whole: frames, summary, series and the last checkpoint. docs/stability.md"""
 import json

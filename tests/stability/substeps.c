@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A hybrid column at rest with more and more grain steps in a step of the continuum, up to beyond the continuum's own limit.
  * docs/stability.md, section 3 */
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A hybrid column at rest whose zone is swept down by ten diameters and back, four times: grains become continuum and
  * continuum grains, and nothing else may happen. docs/stability.md, section 4 */
 #include <setjmp.h>

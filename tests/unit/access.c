@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a stage changes it declares: each stage of a scene is called by itself, and every field that is another one after it
  * than before must stand among its uses, or those of the plugins that it calls, as more than read. The scenes have one
  * grain or one point, so that sorting moves nothing, and things for every stage to do: one is beyond a periodic face. */

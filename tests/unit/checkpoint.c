@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Checkpoints: what comes back is all that is looked at next, forged values are refused, and memory is taken once. */
 #include <setjmp.h>
 #include <stdarg.h>

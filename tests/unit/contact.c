@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What contact laws share: the Coulomb cone. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sets and fields: reordering carries every column, indices follow their target, and who lost it goes. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The sparse grid: which blocks exist, what tiles reach, and colours that never meet. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Instruction sets: an object built for a level may use all of it, so a processor that lacks one part has not the level. */
 #include <setjmp.h>
 #include <stdarg.h>

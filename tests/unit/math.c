@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Accuracy, special values and reproducibility of quern/math.h. */
 #include <math.h>
 #include <setjmp.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Memory that runs out while a set is reordered: whichever allocation fails, the store can still be looked at. */
 #include <setjmp.h>
 #include <stdarg.h>

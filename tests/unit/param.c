@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Rows of parameters: from a map to an instance and back. */
 #include <setjmp.h>
 #include <stdarg.h>

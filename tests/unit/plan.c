@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The plan: from uses to order, fields and state; what the uses do not decide is refused by name. The solvers here are
  * tables and nothing else. */
 #include <setjmp.h>

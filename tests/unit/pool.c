@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Workers: every index once, scratch of one's own, sums that do not depend on how many there are. */
 #include <setjmp.h>
 #include <stdarg.h>

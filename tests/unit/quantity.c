@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Numbers with units: what is read, and what is refused with a reason. */
 #include <setjmp.h>
 #include <stdarg.h>

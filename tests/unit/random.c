@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Random numbers: the generator's known answers, and uniforms that depend on their three numbers alone. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The same bits with one worker and with many, in process: what a thread sanitizer looks at. Conversions happen. */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Trees: marks, limits, --set, and what is written reads back as the same. */
 #include <setjmp.h>
 #include <stdarg.h>
