@@ -10,7 +10,6 @@ import json
 import pathlib
 import random
 import sys
-import tempfile
 
 try:
     import yaml

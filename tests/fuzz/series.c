@@ -43,7 +43,6 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
 
 static void try_series(const uint8_t *data, size_t size) {
 	quern_series series;
-	quern_text text = { 0 };
 	char why[256];
 	const bool headed = !(size && data[0] & 1);
 	const int64_t rows = size ? 1 + data[0] / 2 % 4 : 1;
@@ -63,7 +62,6 @@ static void try_series(const uint8_t *data, size_t size) {
 	run->message = NULL;
 	run->status = QUERN_OK;
 	quern_series_finish(&series);
-	quern_text_finish(&text);
 }
 
 static void try_sidecars(const uint8_t *data, size_t size) {
