@@ -6,18 +6,6 @@
  * kick, which is known only after the sum. What sliding takes goes to the first grain of a pair, in a lane of its row. */
 #include "forces.h"
 
-enum { LANES = 8 };
-
-/* A sum in an order that no vector width changes. */
-QUERN_INLINE quern_real lane_sum(const quern_real *restrict x, uint32_t n) {
-	quern_real lane[LANES] = { 0 };
-	uint32_t i = 0;
-	for (; i + LANES <= n; i += LANES)
-		for (uint32_t l = 0; l < LANES; l++) lane[l] += x[i + l];
-	for (uint32_t l = 0; i + l < n; l++) lane[l] += x[i + l];
-	return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
-}
-
 /* ---- contacts ---- */
 
 void quern_dem_look(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t n,
@@ -38,38 +26,43 @@ static bool is_fixed(const forces_shared *sh, uint32_t i) {
 	return sh->use[FORCE_FIXED].index && sh->use[FORCE_FIXED].index[i];
 }
 
-QUERN_INLINE void lose(const forces_work *w, uint32_t row, uint32_t n, const int dim, const bool spin) {
+/* -sum F.v of the dashpots in the lanes of forces and torques, and what sliding took in its own. Four sums go side by side,
+ * so that none waits for the one before. */
+QUERN_INLINE void lose(const forces_work *w, const int32_t *fixed, uint32_t row, uint32_t n, const int dim,
+	const bool spin, lanes8 *out) {
 	const quern_real(*restrict drag)[8] =
 		(const quern_real(*)[8])(const void *)((dim == 2 ? w->row : w->drag_row) + row);
 	const quern_real *restrict vx = w->grains[G_MEAN], *restrict vy = w->grains[G_MEAN + 1],
 							   *restrict vz = w->grains[G_MEAN + 2];
 	const quern_real *restrict sx = w->grains[G_MEAN_SPIN], *restrict sy = w->grains[G_MEAN_SPIN + 1],
 							   *restrict sz = w->grains[G_MEAN_SPIN + 2];
-	quern_real *restrict work = w->grains[G_LOST], *restrict rubbed = w->grains[G_LOST + 1];
-	const int lane = dim == 2 ? LANE_DRAG : 0;
-	QUERN_SIMD
+	static const lanes8 slid = { 0, 0, 0, 0, 0, 0, 1, 0 };
+	lanes8 sum[4] = { { 0 } };
 	for (uint32_t i = 0; i < n; i++) {
-		const quern_real *d = drag[i] + lane;
-		quern_real sum = d[0] * vx[i] + d[1] * vy[i];
-		if (dim == 3) sum += d[2] * vz[i];
-		if (spin) sum += d[dim] * sx[i];
-		if (spin && dim == 3) sum += d[4] * sy[i] + d[5] * sz[i];
-		work[i] = -sum;
-		rubbed[i] = drag[i][LANE_RUBBED];
+		lanes8 v = slid;
+		if (fixed && fixed[i]) v = slid;
+		else if (dim == 2) v = (lanes8) { 0, 0, 0, -vx[i], -vy[i], spin ? -sx[i] : 0, 1, 0 };
+		else
+			v = (lanes8) { -vx[i], -vy[i], -vz[i], spin ? -sx[i] : 0, spin ? -sy[i] : 0, spin ? -sz[i] : 0, 1,
+				0 };
+		sum[i % 4] += *(const lanes8 *)(const void *)drag[i] * v;
 	}
+	*out = (sum[0] + sum[2]) + (sum[1] + sum[3]);
 }
 
 void quern_dem_lose(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t row, uint32_t n,
 	quern_real *sums) {
-	quern_real *work = w->grains[G_LOST];
-	if (sh->s->dim == 2 && sh->spin) lose(w, row, n, 2, true);
-	else if (sh->s->dim == 2) lose(w, row, n, 2, false);
-	else if (sh->spin) lose(w, row, n, 3, true);
-	else lose(w, row, n, 3, false);
-	for (uint32_t i = 0; i < n && sh->use[FORCE_FIXED].index; i++)
-		if (is_fixed(sh, begin + i)) work[i] = 0;
-	sums[E_DAMPED] += lane_sum(work, n) * sh->s->dt;
-	sums[E_RUBBED] += lane_sum(w->grains[G_LOST + 1], n);
+	const int32_t *fixed = sh->use[FORCE_FIXED].index ? sh->use[FORCE_FIXED].index + begin : NULL;
+	const bool flat = sh->s->dim == 2;
+	lanes8 of;
+	if (flat && sh->spin) lose(w, fixed, row, n, 2, true, &of);
+	else if (flat) lose(w, fixed, row, n, 2, false, &of);
+	else if (sh->spin) lose(w, fixed, row, n, 3, true, &of);
+	else lose(w, fixed, row, n, 3, false, &of);
+	const quern_real damped =
+		flat ? (of[3] + of[4]) + of[5] : ((of[0] + of[1]) + of[2]) + ((of[3] + of[4]) + of[5]);
+	sums[E_DAMPED] += damped * sh->s->dt;
+	sums[E_RUBBED] += of[LANE_RUBBED];
 }
 
 void quern_dem_have(

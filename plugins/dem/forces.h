@@ -5,7 +5,7 @@
 #include <quern/vec.h>
 
 enum { GRAINS = 128 }; /* integrated at once */
-enum { N_GRAIN_COLUMNS = 42 };
+enum { N_GRAIN_COLUMNS = 34 };
 enum {
 	G_FORCE,
 	G_TORQUE = 3,
@@ -15,15 +15,17 @@ enum {
 	G_MEAN = 17,
 	G_MEAN_SPIN = 20,
 	G_WAY = 23,
-	G_LOST = 25,
-	G_NEW_POSITION = 27,
-	G_NEW_VELOCITY = 30,
-	G_NEW_SPIN = 33
+	G_NEW_POSITION = 25,
+	G_NEW_VELOCITY = 28,
+	G_NEW_SPIN = 31
 };
 /* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in 3-D
  * have a row of their own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
+
+/* A row at once: the same bits for any instruction set. */
+typedef quern_real lanes8 __attribute__((vector_size(64)));
 
 /* A contact deeper than is allowed. */
 typedef struct deep_contact {

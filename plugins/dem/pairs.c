@@ -149,8 +149,6 @@ static void masses(const forces_shared *sh, const forces_work *w, uint32_t n) {
 }
 
 /* ---- sums ---- */
-typedef quern_real lanes8 __attribute__((vector_size(64)));
-
 /* The row of a grain of the block; a partner outside has the spare row. */
 QUERN_INLINE uint32_t row_of(int32_t grain, uint32_t begin, uint32_t end) {
 	const uint32_t i = (uint32_t)grain - begin;
