@@ -1,26 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-#include "plan.h"
+#include "order.h"
 #include "text.h"
 #include <stdlib.h>
 #include <string.h>
 
 const char *const quern_phase_names[] = { "setup", "convert", "grains", "to grid", "couple", "from grid",
 	"observe", "output" };
-
-static bool mandatory(const quern_plan_use *u) {
-	return u->counts && !(u->row->flags & (QUERN_OPTIONAL | QUERN_WANTED));
-}
-static bool changes(const quern_use *row) { return row->access != QUERN_READ; }
-
-/* Inside a phase: readers of the old value, writers, adders, updaters, readers. */
-static int rank(const quern_use *row) {
-	switch (row->access) {
-	case QUERN_WRITE: return 1;
-	case QUERN_ADD: return 2;
-	case QUERN_UPDATE: return 3;
-	default: return row->flags & QUERN_BEFORE ? 0 : 4;
-	}
-}
 
 /* ---- sets ---- */
 
@@ -233,18 +218,18 @@ static void leave_out_sets(quern_plan *p) {
 	for (size_t i = 0; i < p->n_uses; i++) {
 		quern_plan_use *u = &p->uses[i];
 		const bool here = set_of(p, u->field) >= 0;
-		if (!here && mandatory(u) && !u->row->with && !set_left_out(p, u->field))
+		if (!here && quern_plan_demands(u) && !u->row->with && !set_left_out(p, u->field))
 			quern_report_add(p->scene->report, u->mark,
 				"%s needs %s, and nothing in the scene has a set of that name", u->owner, u->field);
 		u->counts = u->counts && here;
 	}
 }
 
-static bool add_mandatory(quern_plan *p, bool with_others) {
+static bool add_quern_plan_demands(quern_plan *p, bool with_others) {
 	bool any = false;
 	for (size_t i = 0; i < p->n_uses; i++) {
 		const quern_plan_use *u = &p->uses[i];
-		if (!mandatory(u) || (u->row->with != NULL) != with_others || !in_force(p, u)) continue;
+		if (!quern_plan_demands(u) || (u->row->with != NULL) != with_others || !in_force(p, u)) continue;
 		if (quern_store_field(&p->store, u->field) < 0) any = add_field(p, u);
 	}
 	return any;
@@ -259,7 +244,7 @@ static bool add_wanted(quern_plan *p) {
 		if (!(u->row->flags & QUERN_WANTED) || !in_force(p, u) || quern_store_field(&p->store, u->field) >= 0)
 			continue;
 		for (size_t k = 0; k < p->n_uses && !makable; k++)
-			makable = k != i && in_force(p, &p->uses[k]) && changes(p->uses[k].row) &&
+			makable = k != i && in_force(p, &p->uses[k]) && quern_use_changes(p->uses[k].row) &&
 					  !strcmp(p->uses[k].field, u->field);
 		if (makable) any = add_field(p, u);
 	}
@@ -274,7 +259,8 @@ static bool add_asked(quern_plan *p) {
 		for (size_t i = 0; i < p->n_uses; i++) {
 			const quern_plan_use *u = &p->uses[i];
 			if (quern_store_field(&p->store, s->fields[k]) >= 0) break;
-			if (in_force(p, u) && changes(u->row) && !strcmp(u->field, s->fields[k])) any = add_field(p, u);
+			if (in_force(p, u) && quern_use_changes(u->row) && !strcmp(u->field, s->fields[k]))
+				any = add_field(p, u);
 		}
 	return any;
 }
@@ -301,8 +287,8 @@ static void miss_asked(quern_plan *p, size_t k) {
 /* A field that is made may bring others along: rows that go with it. */
 static void make_fields(quern_plan *p) {
 	leave_out_sets(p);
-	add_mandatory(p, false);
-	while (add_mandatory(p, true) || add_wanted(p) || add_asked(p)) {}
+	add_quern_plan_demands(p, false);
+	while (add_quern_plan_demands(p, true) || add_wanted(p) || add_asked(p)) {}
 	for (size_t i = 0; i < p->n_uses; i++) p->uses[i].counts = in_force(p, &p->uses[i]);
 	for (size_t k = 0; k < p->scene->n_fields; k++)
 		if (quern_store_field(&p->store, p->scene->fields[k]) < 0) miss_asked(p, k);
@@ -311,7 +297,7 @@ static void make_fields(quern_plan *p) {
 /* Who else takes a field, and how: "solver.dem: an index". The first one has made it. */
 static const quern_plan_use *first_use_of(const quern_plan *p, const char *field) {
 	for (size_t i = 0; i < p->n_uses; i++)
-		if (mandatory(&p->uses[i]) && !strcmp(p->uses[i].field, field)) return &p->uses[i];
+		if (quern_plan_demands(&p->uses[i]) && !strcmp(p->uses[i].field, field)) return &p->uses[i];
 	return NULL;
 }
 
@@ -382,192 +368,6 @@ static void lay_rows(quern_plan *p) {
 	free(laid);
 }
 
-/* ---- order ---- */
-
-static bool before(const quern_plan *p, int a, int b) {
-	const quern_plan_stage *sa = &p->stages[a], *sb = &p->stages[b];
-	if (sa->solver == sb->solver) return sa->sequence < sb->sequence;
-	for (size_t i = 0; i < p->n_uses; i++) {
-		const quern_plan_use *u = &p->uses[i];
-		if (u->stage != a || u->target < 0) continue;
-		for (size_t k = 0; k < p->n_uses; k++) {
-			const quern_plan_use *v = &p->uses[k];
-			if (v->stage == b && v->target == u->target && rank(u->row) < rank(v->row)) return true;
-		}
-	}
-	return false;
-}
-
-static void order_stages(quern_plan *p) {
-	p->order = quern_take(p->n_stages, sizeof(int));
-	int n = 0;
-	for (int phase = 0; phase < QUERN_PHASES; phase++)
-		for (;;) {
-			int next = -1, left[2] = { -1, -1 };
-			for (int a = 0; a < (int)p->n_stages; a++) {
-				if ((int)p->stages[a].phase != phase || p->stages[a].order >= 0) continue;
-				bool ready = true;
-				left[left[0] >= 0] = a;
-				for (int b = 0; b < (int)p->n_stages && ready; b++)
-					ready = b == a || (int)p->stages[b].phase != phase || p->stages[b].order >= 0 ||
-							!before(p, b, a);
-				if (ready && next < 0) next = a;
-			}
-			if (left[0] < 0) break;
-			if (next < 0) {
-				quern_report_add(p->scene->report,
-					p->stages[left[0]].section ? p->stages[left[0]].section->mark : (quern_mark) { 0 },
-					"%s and %s each need the other to come first among the stages '%s'",
-					p->stages[left[0]].name, left[1] >= 0 ? p->stages[left[1]].name : "itself",
-					quern_phase_names[phase]);
-				next = left[0];
-			}
-			p->stages[next].order = n;
-			p->order[n++] = next;
-		}
-}
-
-/* ---- what the order implies for each field ---- */
-
-typedef struct {
-	const quern_plan_use *last;
-	bool read, first_seen, begins, fresh, written;
-	bool whole; /* a stage itself looks at the column, not only the plugins that it calls */
-	int stages, previous;
-} history;
-
-static void conflicts(quern_plan *p, const quern_field *field, const quern_plan_use *u, history *h) {
-	const quern_plan_use *last = h->last;
-	if (last && last->stage != u->stage) {
-		const quern_plan_stage *was = &p->stages[last->stage], *now = &p->stages[u->stage];
-		if (u->row->access == QUERN_WRITE && last->row->access == QUERN_WRITE && was->phase != QUERN_SETUP)
-			quern_report_add(p->scene->report, u->mark, "%s: %s overwrites what %s wrote and nobody read",
-				field->name, u->owner, last->owner);
-		if (u->row->access == QUERN_UPDATE && last->row->access == QUERN_UPDATE && was->phase == now->phase &&
-			was->solver != now->solver && !now->observer) /* observers go in the order of their list */
-			quern_report_add(p->scene->report, u->mark,
-				"%s: %s and %s both change it and nothing says which comes first", field->name, last->owner,
-				u->owner);
-	}
-	if (u->row->access == QUERN_ADD && h->fresh)
-		quern_report_add(p->scene->report, u->mark, "%s: %s adds to it after %s has read it", field->name,
-			u->owner, last->owner);
-}
-
-static void follow_field(quern_plan *p, int k) {
-	quern_field *field = &p->store.fields[k];
-	history h = { .read = field->shown, .previous = -1 };
-	for (size_t o = 0; o < p->n_stages; o++) {
-		const int s = p->order[o];
-		const bool setup = p->stages[s].phase == QUERN_SETUP;
-		bool others = false, changed = false;
-		for (int r = 0; r < 5; r++)
-			for (size_t i = 0; i < p->n_uses; i++) {
-				const quern_plan_use *u = &p->uses[i];
-				if (u->target != k || u->stage != s || rank(u->row) != r) continue;
-				const bool fills = u->row->access == QUERN_WRITE || u->row->access == QUERN_ADD;
-				h.read = h.read || u->row->access == QUERN_READ || u->row->access == QUERN_UPDATE;
-				h.written = h.written || changes(u->row);
-				h.whole = h.whole ||
-						  (i >= p->stages[s].first_use && i < p->stages[s].first_use + p->stages[s].n_uses);
-				others = others || u->row->flags & QUERN_OTHERS;
-				changed = changed || u->row->access == QUERN_UPDATE || u->row->access == QUERN_WRITE;
-				if (s != h.previous) h.stages++, h.previous = s;
-				if (setup) continue;
-				if (!h.first_seen) h.begins = fills, field->state = !fills || p->stages[s].sometimes;
-				h.first_seen = true;
-				conflicts(p, field, u, &h);
-				h.fresh = u->row->access == QUERN_READ;
-				h.last = u;
-			}
-		field->twice = field->twice || (others && changed);
-	}
-	if (!h.written)
-		for (size_t i = 0; i < p->n_uses; i++)
-			if (p->uses[i].target == k && mandatory(&p->uses[i])) {
-				quern_report_add(p->scene->report, p->uses[i].mark,
-					"%s needs %s, and nothing in this scene makes it", p->uses[i].owner, field->name);
-				break;
-			}
-	field->local = !field->shown && ((h.stages <= 1 && h.begins && !h.whole) || !h.read);
-	field->state = field->state && !field->local;
-}
-
-/* The first stage whose uses a solver's limit and account go by. */
-static bool is_first_of_section(const quern_plan *p, int stage) {
-	for (int s = 0; s < stage; s++)
-		if (p->stages[s].section == p->stages[stage].section) return false;
-	return p->stages[stage].section != NULL;
-}
-
-/* Frames, observers, limits and accounts look at fields before anything is computed anew. What they see must come back
- * with a checkpoint, state or not. */
-static void mark_kept(quern_plan *p) {
-	quern_store *store = &p->store;
-	for (size_t i = 0; i < p->n_uses; i++) {
-		const quern_plan_use *u = &p->uses[i];
-		if (u->target < 0 || u->stage < 0) continue;
-		if (p->stages[u->stage].observer || is_first_of_section(p, u->stage))
-			store->fields[u->target].kept = true;
-	}
-	for (size_t k = 0; k < store->n_fields; k++) {
-		quern_field *field = &store->fields[k];
-		bool shown = field->shown; /* a contact's grains go with its force */
-		for (size_t i = 0; i < store->n_fields && field->target >= 0; i++)
-			shown = shown || (store->fields[i].set == field->set && store->fields[i].shown);
-		field->kept = !field->local && (field->kept || shown || field->state || field->shape == QUERN_ID);
-	}
-}
-
-bool quern_plan_settles(const quern_use *row) { return changes(row) && !(row->flags & QUERN_RELEASED); }
-
-static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(const quern_use *)) {
-	for (size_t i = 0; i < p->n_uses; i++)
-		if (p->uses[i].stage == stage && p->uses[i].target == field && test(p->uses[i].row)) return true;
-	return false;
-}
-static bool reads_others(const quern_use *row) { return row->flags & QUERN_OTHERS; }
-static bool renews(const quern_use *row) { return row->access == QUERN_UPDATE || row->access == QUERN_WRITE; }
-static bool adds(const quern_use *row) { return row->access == QUERN_ADD; }
-
-/* Before the first frame, whoever looks at it finds it as the grains' own phase has left it. */
-static bool is_looked_at(const quern_plan *p, int field) {
-	bool renewed = false;
-	for (int i = 0; i < (int)p->n_stages; i++)
-		renewed = renewed || (p->stages[i].phase == QUERN_OUTPUT && stage_has(p, i, field, renews));
-	return p->store.fields[field].kept && !renewed;
-}
-
-/* What a settled state consists of. */
-static void mark_settles(quern_plan *p) {
-	for (size_t i = 0; i < p->n_uses; i++) {
-		const quern_plan_use *u = &p->uses[i];
-		if (u->target < 0 || u->stage < 0 || p->stages[u->stage].phase != QUERN_GRAINS) continue;
-		quern_field *field = &p->store.fields[u->target];
-		if (quern_plan_settles(u->row) && (field->state || is_looked_at(p, u->target))) field->settles = true;
-	}
-}
-
-static void mark_swaps_and_zeros(quern_plan *p) {
-	bool *zeroed = quern_take(p->store.n_fields, sizeof(bool));
-	for (size_t o = 0; o < p->n_stages; o++) {
-		quern_plan_stage *stage = &p->stages[p->order[o]];
-		stage->swaps = quern_take(p->store.n_fields + 1, sizeof(int));
-		stage->zeros = quern_take(p->store.n_fields + 1, sizeof(int));
-		size_t swaps = 0, zeros = 0;
-		for (size_t k = 0; k < p->store.n_fields; k++) {
-			const quern_field *field = &p->store.fields[k];
-			const int s = p->order[o], f = (int)k;
-			if (field->twice && stage_has(p, s, f, reads_others) && stage_has(p, s, f, renews))
-				stage->swaps[swaps++] = f;
-			if (!field->local && !zeroed[k] && stage_has(p, s, f, adds))
-				stage->zeros[zeros++] = f, zeroed[k] = true;
-		}
-		stage->swaps[swaps] = stage->zeros[zeros] = -1;
-	}
-	free(zeroed);
-}
-
 /* ---- columns ---- */
 
 static bool swapped_in(const quern_plan_stage *stage, int field) {
@@ -579,7 +379,7 @@ static bool swapped_in(const quern_plan_stage *stage, int field) {
 static quern_column column_of(const quern_plan *p, const quern_plan_use *u, const quern_plan_stage *stage) {
 	if (u->target < 0) return (quern_column) { .real = { NULL } };
 	const quern_field *field = &p->store.fields[u->target];
-	const bool other = stage && field->twice && renews(u->row) && swapped_in(stage, u->target);
+	const bool other = stage && field->twice && quern_use_renews(u->row) && swapped_in(stage, u->target);
 	return quern_field_column(&p->store, field, other ? !field->now : field->now);
 }
 
@@ -613,11 +413,7 @@ quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
 	make_fields(p);
 	bind_uses(p);
 	lay_rows(p);
-	order_stages(p);
-	for (size_t k = 0; k < p->store.n_fields; k++) follow_field(p, (int)k);
-	mark_kept(p);
-	mark_settles(p);
-	mark_swaps_and_zeros(p);
+	quern_plan_order(p);
 	for (size_t i = 0; i < p->n_stages; i++)
 		p->stages[i].column = quern_take(p->stages[i].n_uses, sizeof(quern_column));
 	return p;
