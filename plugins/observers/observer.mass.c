@@ -31,4 +31,4 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.params = params,
 	.uses = uses,
 	.ops = &ops };
-QUERN_LIBRARY(plugin, QUERN_VERSION, "MIT");
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -64,4 +64,4 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.uses = uses,
 	.init = init,
 	.ops = &ops };
-QUERN_LIBRARY(plugin, QUERN_VERSION, "MIT");
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");
