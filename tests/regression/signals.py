@@ -10,7 +10,7 @@ import time
 import lab
 import workshop
 
-OPTIONS = [*lab.SMALL["column"], "--set=time.end=40 ms", "--set=grains.settle.energy=0.02"]
+OPTIONS = [*lab.SMALL["column"], "--set=time.end=120 ms", "--set=grains.settle.energy=0.02"]
 HANGS = [('.id = "contact.linear"', '.id = "contact.mine"'),
          ("static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }",
           "#include <stdio.h>\n#include <stdlib.h>\n"
