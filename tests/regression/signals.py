@@ -10,7 +10,7 @@ import time
 import lab
 import workshop
 
-OPTIONS = [*lab.SMALL["column"], "--set=time.end=120 ms", "--set=grains.settle.energy=0.02"]
+OPTIONS = [*lab.SMALL["column"], "--set=time.end=60 ms", "--set=grains.settle.energy=0.02"]
 HANGS = [('.id = "contact.linear"', '.id = "contact.mine"'),
          ("static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }",
           "#include <stdio.h>\n#include <stdlib.h>\n"
@@ -23,12 +23,18 @@ def start(folder, *options, **how):
     return subprocess.Popen(words, stdout=subprocess.DEVNULL, text=True, **how)
 
 
+def heard():
+    """Whoever started the tests may have had signals ignored, as nohup does."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def stops(place):
     base = place / "base"
     lab.run("column", base, *OPTIONS)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         out = place / number.name
-        process = start(out, stderr=subprocess.PIPE)
+        process = start(out, stderr=subprocess.PIPE, preexec_fn=heard)
         assert lab.wait_for(out / "frames/000001.h5", process)
         process.send_signal(number)
         said = process.communicate(timeout=60)[1]
@@ -47,7 +53,7 @@ def twice(place):
     words = [lab.QUERN, "run", "--threads", "1", lab.scene("two_grains"), "-o", str(out),
              "--set=grains.contact={mine: {stiffness: 1e6}}", "--set=grains.place.0.position=[-5.001 mm, 0]",
              "--set=grains.place.1.position=[5.001 mm, 0]"]
-    process = subprocess.Popen(words, stderr=subprocess.DEVNULL, 
+    process = subprocess.Popen(words, stderr=subprocess.DEVNULL, preexec_fn=heard,
                                env={**os.environ, "QUERN_PLUGIN_PATH": str(plugins), "HANGS": str(place / "hangs")})
     try:
         assert lab.wait_for(place / "hangs", process)
