@@ -41,6 +41,7 @@ def run(words, **options):
 def newer_program(folder, include):
     """The program of this build again, by the build's own commands, with other headers and unoptimised."""
     commands = [shlex.split(line) for line in run(["ninja", "-C", BUILD, "-t", "commands", "quern"]).splitlines()]
+    ours = f"-I{os.path.relpath(SOURCE / 'include', BUILD)}"
     objects, steps = [], []
     for words in commands:
         if "-c" not in words:
@@ -48,8 +49,8 @@ def newer_program(folder, include):
         objects.append(folder / f"{len(objects)}.o")
         words[words.index("-o") + 1] = objects[-1]
         words[words.index("-MF") + 1] = f"{objects[-1]}.d"
-        assert "-I../include" in words
-        steps.append([f"-I{include}" if word == "-I../include" else word for word in words] + ["-O0"])
+        assert ours in words, f"{ours} is not among {words}"
+        steps.append([f"-I{include}" if word == ours else word for word in words] + ["-O0"])
     assert len(steps) > 50
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda words: run(words, cwd=BUILD), steps))
