@@ -30,18 +30,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 	render_frame frame;
 	quern_text why = { 0 };
 	edits_make(path, data, size);
-	const int status = render_frame_read_file(&frame, path, 0, field, &why);
+	const int status = quern_render_frame_read_file(&frame, path, 0, field, &why);
 	if (status ? !why.length : why.length > 0) abort();
 	if (!size && status) {
 		fprintf(stderr, "the frame as it was written is refused: %s\n", why.data);
 		abort();
 	}
 	if (!status) {
-		cairo_surface_t *picture = render_page(&frame, WIDTH);
+		cairo_surface_t *picture = quern_render_page(&frame, WIDTH);
 		if (cairo_surface_status(picture) != CAIRO_STATUS_SUCCESS) abort();
 		cairo_surface_destroy(picture);
 	}
 	quern_text_finish(&why);
-	render_frame_finish(&frame);
+	quern_render_frame_finish(&frame);
 	return 0;
 }
