@@ -10,6 +10,7 @@
 #include "harness.h"
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static quern_run *make_ready(quern_scene *scene, uint32_t workers) {
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, workers);
@@ -43,6 +44,13 @@ quern_run *harness_open(uint32_t workers, const char *fmt, ...) {
 quern_run *harness_open_file(uint32_t workers, const char *path, const char *const *sets) {
 	find_plugins();
 	return make_ready(quern_scene_read(path, sets, &quern_host_table), workers);
+}
+
+FILE *harness_file(char path[HARNESS_PATH]) {
+	snprintf(path, HARNESS_PATH, "/tmp/quern-%ld.txt", (long)getpid());
+	FILE *file = fopen(path, "wx");
+	if (!file) fail_msg("%s cannot be made", path);
+	return file;
 }
 
 void harness_close(quern_run *run) { quern_run_destroy(run); }

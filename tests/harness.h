@@ -2,6 +2,9 @@
 /* harness - scenes in a test's own process: read from text, run step by step, and looked into */
 #pragma once
 #include <run.h>
+#include <stdio.h>
+
+enum { HARNESS_PATH = 40 };
 
 /* Reads the text (printf-like, in YAML) and makes it ready to run, set-up phase included. A fault fails the test with
  * the program's own message. `workers` 0: all. Plugins come from QUERN_PLUGINS_DIR. */
@@ -9,6 +12,9 @@ quern_run *harness_open(uint32_t workers, const char *fmt, ...) __attribute__((f
 /* A scene file with NULL-terminated --set options. */
 quern_run *harness_open_file(uint32_t workers, const char *path, const char *const *sets);
 void harness_close(quern_run *);
+/* A file of this process's own for a scene to read, such as a table of grains; its name comes back in `path`. Whoever
+ * asks closes it, and removes it once the scene is open. */
+FILE *harness_file(char path[HARNESS_PATH]);
 
 /* Settles to the end, if there is anything to settle. */
 void harness_settle(quern_run *);

@@ -96,11 +96,9 @@ static void add_bodies(text *t, const setting *s, const order *o) {
 }
 
 static quern_run *open_scene(const setting *s, const order *o) {
-	char path[] = "/tmp/quern-axes-XXXXXX", a[120], b[120], c[120];
+	char path[HARNESS_PATH], a[120], b[120], c[120];
 	static text t;
-	const int file = mkstemp(path);
-	FILE *out = file < 0 ? NULL : fdopen(file, "w");
-	assert_non_null(out);
+	FILE *out = harness_file(path);
 	write_grains(out, o);
 	fclose(out);
 	t.length = 0;

@@ -144,12 +144,10 @@ static void laws_reach_the_farthest(void **state) {
 	(void)state;
 	table_head("pull of 2 N at a distance");
 	for (int from_file = 0; from_file <= 1; from_file++) {
-		char path[] = "/tmp/quern-laws-XXXXXX", source[160];
+		char path[HARNESS_PATH], source[160];
 		const double apart = 2 * large + 0.99 * 0.5 * (0.5 * large);
 		if (from_file) {
-			const int file = mkstemp(path);
-			FILE *out = file < 0 ? NULL : fdopen(file, "w");
-			assert_non_null(out);
+			FILE *out = harness_file(path);
 			fprintf(out, "x y radius\n0.02 0.05 %g\n%.17g 0.05 %g\n", large, 0.02 + apart, large);
 			fclose(out);
 			snprintf(source, sizeof source, "file: %s", path);
