@@ -20,8 +20,7 @@ static const quern_plugin_file *load(quern_loader *loader, const char *id, quern
 	char *kind = quern_copy(id);
 	kind[strcspn(kind, ".")] = 0;
 	const quern_plugin_file *f = NULL;
-	if (name)
-		f = quern_loader_find(loader, (quern_kind)quern_kind_of(kind), name, report, (quern_mark) { 0 });
+	if (name) f = quern_loader_find(loader, kind, name, report, (quern_mark) { 0 });
 	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id such as contact.linear", id);
 	free(kind);
 	return f;
@@ -149,7 +148,7 @@ static void print_solver(const quern_solver_ops *ops) {
 	puts("\nslots");
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		if (s->same_as) continue;
-		printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", quern_kind_name(s->kind),
+		printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", s->kind->name,
 			s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "");
 		for (const quern_param *row = s->rows; row && row->name; row++) print_param(row, 6);
 	}
@@ -184,19 +183,20 @@ static void print_plugin(const quern_plugin_file *f) {
 		}
 	if (p->uses->field) puts("\nfields");
 	print_uses(p->uses);
-	if (p->kind == QUERN_SOLVER) print_solver(p->ops);
-	if (p->kind == QUERN_OBSERVER) print_outputs(p->ops);
+	if (quern_id_is_of(p->id, quern_solver_kind.name)) print_solver(p->ops);
+	if (quern_id_is_of(p->id, quern_observer_kind.name)) print_outputs(p->ops);
 }
 
 /* The keys of a scene that belong to no section. */
-static void print_scene(void) {
+static void print_scene(quern_loader *loader) {
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(loader, &n);
 	puts("scene - the keys of a scene that belong to no section\n\nkeys");
 	for (const quern_param *row = quern_general_rows; row->name; row++) print_param(row, 2);
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		printf("  %-24s  list of %s\n      %s\n", l->name, l->item, l->doc);
 	puts("\nsections");
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		printf("  %-24s  quern describe %s\n", n->section, n->section);
+	for (size_t i = 0; i < n; i++) printf("  %-24s  quern describe %s\n", known[i].section, known[i].section);
 	printf("  %-24s  observers, one or a list; each takes `label`\n", quern_observe_slot.name);
 }
 
@@ -205,8 +205,8 @@ static json_t *slots_json(const quern_solver_ops *ops) {
 	for (const quern_slot *s = ops->slots; s && s->name; s++)
 		if (!s->same_as)
 			json_array_append_new(slots,
-				json_pack("{s:s, s:s, s:s, s:b, s:b, s:s*, s:o}", "name", s->name, "kind",
-					quern_kind_name(s->kind), "doc", s->doc ? s->doc : "", "list", (int)s->list, "required",
+				json_pack("{s:s, s:s, s:s, s:b, s:b, s:s*, s:o}", "name", s->name, "kind", s->kind->name,
+					"doc", s->doc ? s->doc : "", "list", (int)s->list, "required",
 					!s->def && (!s->list || s->required), "default", s->def, "rows", params_json(s->rows)));
 	return slots;
 }
@@ -219,13 +219,15 @@ static json_t *outputs_json(const quern_observer_ops *ops) {
 	return outputs;
 }
 
-static json_t *scene_json(void) {
+static json_t *scene_json(quern_loader *loader) {
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(loader, &n);
 	json_t *keys = params_json(quern_general_rows), *sections = json_object();
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		json_array_append_new(keys, json_pack("{s:s, s:s+, s:s, s:b, s:b}", "name", l->name, "type",
 										"list of ", l->item, "doc", l->doc, "required", 0, "advanced", 0));
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		json_object_set_new(sections, n->section, json_sprintf("solver.%s", n->solver));
+	for (size_t i = 0; i < n; i++)
+		json_object_set_new(sections, known[i].section, json_sprintf("solver.%s", known[i].solver));
 	return json_pack("{s:s, s:o, s:o, s:o}", "id", "scene", "params", keys, "sections", sections, "observe",
 		params_json(quern_observe_slot.rows));
 }
@@ -240,15 +242,18 @@ static json_t *plugin_json(const quern_plugin_file *f) {
 		p->brief ? p->brief : "", "doc", p->doc ? p->doc : "", "cite", p->cite ? p->cite : "", "version",
 		f->library->version, "license", f->library->license, "file", f->path, "dims", (int)p->dims, "params",
 		params, "uses", uses);
-	if (p->kind == QUERN_SOLVER) json_object_set_new(all, "slots", slots_json(p->ops));
-	if (p->kind == QUERN_OBSERVER) json_object_set_new(all, "outputs", outputs_json(p->ops));
+	if (quern_id_is_of(p->id, quern_solver_kind.name)) json_object_set_new(all, "slots", slots_json(p->ops));
+	if (quern_id_is_of(p->id, quern_observer_kind.name))
+		json_object_set_new(all, "outputs", outputs_json(p->ops));
 	return all;
 }
 
 /* The section's solver, or NULL. */
-static const char *solver_of(const char *section) {
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		if (!strcmp(n->section, section)) return n->solver;
+static const char *solver_of(quern_loader *loader, const char *section) {
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(loader, &n);
+	for (size_t i = 0; i < n; i++)
+		if (!strcmp(known[i].section, section)) return known[i].solver;
 	return NULL;
 }
 
@@ -256,8 +261,8 @@ static const char *solver_of(const char *section) {
 static const quern_plugin_file *find(quern_loader *loader, const char *name, quern_report *report) {
 	if (strchr(name, '/')) return quern_loader_open(loader, name, report, (quern_mark) { 0 });
 	if (strchr(name, '.')) return load(loader, name, report);
-	const char *solver = solver_of(name);
-	if (solver) return quern_loader_find(loader, QUERN_SOLVER, solver, report, (quern_mark) { 0 });
+	const char *solver = solver_of(loader, name);
+	if (solver) return quern_loader_find(loader, quern_solver_kind.name, solver, report, (quern_mark) { 0 });
 	char **ids = quern_loader_ids(loader);
 	const quern_plugin_file *found = NULL;
 	size_t n = 0;
@@ -290,10 +295,10 @@ static int describe_one(int argc, char **argv) {
 	const bool scene = !strcmp(words.at[0], "scene");
 	const quern_plugin_file *f = scene ? NULL : find(loader, words.at[0], report);
 	if (json && (f || scene)) {
-		json_t *root = scene ? scene_json() : plugin_json(f);
+		json_t *root = scene ? scene_json(loader) : plugin_json(f);
 		json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 		json_decref(root);
-	} else if (scene) print_scene();
+	} else if (scene) print_scene(loader);
 	else if (f) print_plugin(f);
 	quern_report_print(report, stderr);
 	quern_report_destroy(report);

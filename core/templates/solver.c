@@ -5,7 +5,7 @@
  * A solver owns sets of entities and stages that work on their fields. Nothing is allocated by hand: a field exists
  * because a stage names it, and is written out, saved and restored because of how stages use it. The order of stages
  * follows from their phases. */
-#include <quern/abi.h>
+#include <quern/solver.h>
 #include <stdio.h>
 
 typedef struct {
@@ -124,7 +124,7 @@ static const quern_stage stages[] = { { .name = "my_name.fill",
 										  .run = fill },
 	{ .name = "my_name.move",
 		.doc = "Gravity, motion, the floor.",
-		.phase = QUERN_GRAINS,
+		.phase = QUERN_SUBSTEP,
 		.uses = move_uses,
 		.run = move },
 	{ .name = NULL } };
@@ -160,7 +160,6 @@ static const quern_solver_ops ops = {
 	.size = sizeof ops, .sets = sets, .slots = slots, .stages = stages, .limit = limit, .account = account
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SOLVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.my_name",

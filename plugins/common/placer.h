@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
 #pragma once
-#include <quern/abi.h>
+#include <quern/packer.h>
+#include <quern/solver.h>
 
 typedef struct placer {
 	uint32_t dim;

@@ -2,8 +2,13 @@
 /* dem - the grain solver's own parameters and the rows of its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"
+#include "../common/account.h"
 #include "../common/radius.h"
 #include "../common/tools.h"
+#include <quern/contact.h>
+#include <quern/integrator.h>
+#include <quern/neighbours.h>
+#include <quern/packer.h>
 
 typedef struct dem {
 	quern_real density, skin, rest, settle_step; /* from the scene */

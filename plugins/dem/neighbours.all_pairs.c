@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* neighbours.all_pairs - every pair is looked at: the reference that faster searches are held against */
-#include <quern/abi.h>
+#include <quern/neighbours.h>
 
 typedef struct {
 	int32_t unused;
@@ -39,7 +39,6 @@ static uint32_t pairs(
 
 static const quern_neighbour_ops ops = { .size = sizeof ops, .keys = keys, .pairs = pairs };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_NEIGHBOURS,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "neighbours.all_pairs",

@@ -2,6 +2,7 @@
 /* observers - what several observers look at: the grains and points that are carried, and how much of each */
 #pragma once
 #include "../common/tools.h"
+#include <quern/observer.h>
 
 /* The first rows of every observer of both clouds, in this order. */
 #define CLOUD_USES                                                                                           \

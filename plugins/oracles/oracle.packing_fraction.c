@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* oracle.packing_fraction - grains near the free surface, continuum deep inside. docs/theory/hybrid.md, section 3 */
-#include <quern/abi.h>
+#include <quern/oracle.h>
 
 typedef struct {
 	quern_real critical, depth, half_width, cell;
@@ -60,7 +60,6 @@ static uint32_t flags(const void *self) {
 
 static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide, .surface = flags };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_ORACLE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "oracle.packing_fraction",

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* oracle.strain_rate - grains where the flow shears fast. docs/theory/hybrid.md, section 3 */
 #include <math.h>
-#include <quern/abi.h>
+#include <quern/oracle.h>
 
 typedef struct {
 	quern_real shear_rate, inertial_number, release, depth, half_width, cell;
@@ -77,7 +77,6 @@ static void decide(const void *self, const quern_cell_batch *b) {
 
 static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_ORACLE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "oracle.strain_rate",

@@ -61,8 +61,7 @@ constexpr quern_oracle_ops ops = operations();
 constexpr quern_plugin table() {
 	quern_plugin out {};
 	out.size = sizeof out;
-	out.kind = QUERN_ORACLE;
-	out.revision = 1;
+		out.revision = 1;
 	out.dims = QUERN_2D | QUERN_3D;
 	out.id = "oracle.layer";
 	out.brief = "Grains above a height.";

@@ -47,8 +47,8 @@ def library(rows="", uses="", ops=".force = { force, force }", more="", head="",
             f"static const quern_{kind}_ops ops = {{ .size = sizeof ops, {ops} }};\n"
             f"static const quern_plugin plugin = {{ .size = sizeof plugin, .kind = QUERN_{kind.upper()}, .dims = 3,\n"
             f'\t.id = "{kind}.bad", .instance_size = 64, .params = params, .uses = uses, .ops = &ops, {more} }};\n'
-            "QUERN_EXPORT extern const quern_library quern_library_1;\n"
-            f"const quern_library quern_library_1 = {{ {members} }};\n"
+            "QUERN_EXPORT extern const quern_library quern_library_2;\n"
+            f"const quern_library quern_library_2 = {{ {members} }};\n"
             "QUERN_EXPORT const void *used(void);\nconst void *used(void) { return &plugin; }\n")
 
 
@@ -59,7 +59,7 @@ def check_interfaces(folder):
     refused(library(size="8"), "contact.bad", folder, "is built for interface")
     refused(library(real_size="4"), "contact.bad", folder, "is built for another number format")
     refused(library(plugin="0"), "contact.bad", folder, "describes no plugin")
-    refused("int quern_library_2 = 1; const char *name = \"x\";", "contact.bad", folder, "exports no quern_library_1",
+    refused("int quern_library_2 = 1; const char *name = \"x\";", "contact.bad", folder, "exports no quern_library_2",
             "QUERN_LIBRARY")
     newer = "__attribute__((visibility(\"default\"))) extern const int quern_library_2; const int quern_library_2 = 1;"
     refused(newer, "contact.bad", folder, "is built for interface 2, this program speaks 1")
