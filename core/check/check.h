@@ -17,7 +17,7 @@ typedef struct check_shared {
 
 typedef struct check {
 	const quern_plugin_file *file;
-	const void *ops; /* as the kind's header has them */
+	const void *ops;         /* as the kind's header has them */
 	const quern_node *given; /* parameters of --set */
 	uint32_t dimension;      /* 0: all that the plugin has */
 	unsigned seconds;        /* for a group of tests */

@@ -15,6 +15,13 @@
 static const char *const type_names[] = { "", "number", "whole number", "true or false", "text", "vector",
 	"list" };
 
+/* What can be known of its functions without the scene: a kind that a solver describes. */
+static const quern_plugin_file *looked_at(
+	quern_loader *loader, const quern_plugin_file *f, quern_report *report) {
+	const quern_kind *kind = f ? quern_loader_kind(loader, f->table.kind) : NULL;
+	return kind && !quern_loader_ops(loader, f, kind, report, (quern_mark) { 0 }) ? NULL : f;
+}
+
 static const quern_plugin_file *load(quern_loader *loader, const char *id, quern_report *report) {
 	const char *name = quern_id_name(id);
 	char *kind = quern_copy(id);
@@ -23,7 +30,7 @@ static const quern_plugin_file *load(quern_loader *loader, const char *id, quern
 	if (name) f = quern_loader_find(loader, kind, name, report, (quern_mark) { 0 });
 	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id such as contact.linear", id);
 	free(kind);
-	return f;
+	return looked_at(loader, f, report);
 }
 
 /* ---- list ---- */
@@ -259,7 +266,8 @@ static const char *solver_of(quern_loader *loader, const char *section) {
 
 /* A bare name is enough where only one kind has it. */
 static const quern_plugin_file *find(quern_loader *loader, const char *name, quern_report *report) {
-	if (strchr(name, '/')) return quern_loader_open(loader, name, report, (quern_mark) { 0 });
+	if (strchr(name, '/'))
+		return looked_at(loader, quern_loader_open(loader, name, report, (quern_mark) { 0 }), report);
 	if (strchr(name, '.')) return load(loader, name, report);
 	const char *solver = solver_of(loader, name);
 	if (solver) return quern_loader_find(loader, quern_solver_kind.name, solver, report, (quern_mark) { 0 });

@@ -178,7 +178,8 @@ static void ask_leaf(void *arg, uint32_t leaf, uint32_t worker) {
 	quern_observer_batch b = a->batch;
 	b.n = a->n - begin < LEAF ? a->n - begin : LEAF;
 	for (uint32_t r = 0; r < n_uses; r++)
-		own[r] = a->along[r] ? from(a->bound->column[r], a->bound->uses[r].shape, begin) : a->bound->column[r];
+		own[r] =
+			a->along[r] ? from(a->bound->column[r], a->bound->uses[r].shape, begin) : a->bound->column[r];
 	b.use = own;
 	a->ops->map(a->bound->self, &b, a->partial + (size_t)leaf * a->n_outputs);
 }

@@ -43,6 +43,8 @@ struct quern_loader {
 	size_t n_files, files_capacity;
 	quern_section_of *sections; /* of all solvers that can be found, once somebody has asked */
 	size_t n_sections, sections_capacity;
+	quern_kind **kinds; /* that they call; all that hangs on one is in its own memory */
+	size_t n_kinds, kinds_capacity;
 	int level;
 	bool wary, asked; /* for sections */
 };
@@ -117,6 +119,8 @@ void quern_loader_destroy(quern_loader *loader) {
 	for (size_t i = 0; i < loader->n_folders; i++) free(loader->folders[i]);
 	for (size_t i = 0; i < loader->n_sections; i++) section_of_finish(&loader->sections[i]);
 	free(loader->sections);
+	for (size_t i = 0; i < loader->n_kinds; i++) free(loader->kinds[i]);
+	free(loader->kinds);
 	free(loader->files);
 	free(loader->own);
 	free(loader->folders);
@@ -379,7 +383,7 @@ static int by_name(const void *a, const void *b) {
 	return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* "contact.linear" of "contact.linear.v3.so", or NULL if that is no object whose name is of two parts, a word first. */
+/* "contact.linear" of "contact.linear.v3.so", or NULL if that is no object whose name begins with a word. */
 static char *id_of_object(const char *name) {
 	const size_t length = strlen(name), n = strcspn(name, ".");
 	if (length < 4 || strcmp(name + length - 3, ".so") != 0) return NULL;
@@ -388,7 +392,7 @@ static char *id_of_object(const char *name) {
 	const bool word = quern_is_name(id);
 	memcpy(id, name, n + 1);
 	id[length - (level_of(name) == 1 ? 3 : 6)] = 0;
-	if (word && strlen(id) > n) return id;
+	if (word) return id;
 	free(id);
 	return NULL;
 }
@@ -439,17 +443,25 @@ char **quern_loader_ids(const quern_loader *loader) {
 	return list.at;
 }
 
+typedef struct {
+	quern_loader *loader;
+	quern_report *report;
+} stray_report;
+
+/* What has no second word is a library of somebody's, unless the word is a kind. */
 static void report_stray(void *to, const char *folder, const char *object, char *id) {
-	if (!quern_id_name(id))
-		quern_report_add(to, (quern_mark) { 0 },
+	const stray_report *r = to;
+	if (!quern_id_name(id) && (strchr(id, '.') || quern_loader_kind(r->loader, id)))
+		quern_report_add(r->report, (quern_mark) { 0 },
 			"plugin %s/%s cannot be asked for by its name: call it KIND.NAME.so, NAME in letters, digits and "
 			"underscores",
 			folder, object);
 	free(id);
 }
 
-void quern_loader_report_strays(const quern_loader *loader, quern_report *report) {
-	visit(loader, report_stray, report);
+void quern_loader_report_strays(quern_loader *loader, quern_report *report) {
+	stray_report r = { loader, report };
+	visit(loader, report_stray, &r);
 }
 
 void quern_loader_free_ids(char **ids) {
@@ -479,6 +491,12 @@ const void *quern_loader_ops(quern_loader *loader, const quern_plugin_file *of, 
 
 /* ---- which solver reads which section ---- */
 
+bool quern_solver_steps(const quern_solver_ops *ops) {
+	for (const quern_stage *stage = ops->stages; stage->name; stage++)
+		if (stage->phase > QUERN_SETUP && stage->phase < QUERN_OUTPUT) return true;
+	return false;
+}
+
 static char **names_of(const quern_set *sets, size_t *n) {
 	char **names = NULL;
 	size_t capacity = 0;
@@ -489,18 +507,56 @@ static char **names_of(const quern_set *sets, size_t *n) {
 	return names;
 }
 
+/* One block: the kind, its functions, all names. */
+static quern_kind *copy_kind(const quern_kind *kind) {
+	size_t n = 0, letters = strlen(kind->name) + 1;
+	while (kind->functions[n].name) letters += strlen(kind->functions[n++].name) + 1;
+	quern_kind *own = quern_take(1, sizeof *own + (n + 1) * sizeof(quern_function) + letters);
+	quern_function *functions = (quern_function *)(void *)(own + 1);
+	char *names = (char *)(functions + n + 1);
+	*own = *kind;
+	own->functions = functions;
+	own->doc = NULL;
+	own->name = strcpy(names, kind->name);
+	names += strlen(names) + 1;
+	for (size_t i = 0; i < n; i++) {
+		functions[i] = kind->functions[i];
+		functions[i].name = strcpy(names, kind->functions[i].name);
+		names += strlen(names) + 1;
+	}
+	return own;
+}
+
+/* The longest table of a kind that any solver knows. */
+static void note_kind(quern_loader *loader, const quern_kind *kind) {
+	for (size_t i = 0; i < loader->n_kinds; i++) {
+		if (strcmp(loader->kinds[i]->name, kind->name) != 0) continue;
+		if (loader->kinds[i]->ops_size >= kind->ops_size) return;
+		free(loader->kinds[i]);
+		loader->kinds[i] = copy_kind(kind);
+		return;
+	}
+	loader->kinds =
+		quern_grow(loader->kinds, loader->n_kinds, &loader->kinds_capacity, sizeof *loader->kinds);
+	loader->kinds[loader->n_kinds++] = copy_kind(kind);
+}
+
 static void note_section(quern_loader *loader, const quern_library *lib) {
 	quern_table table;
 	quern_text why = { 0 };
 	if (quern_table_read(&table, lib, &why)) { /* what is wrong with it is said when somebody asks for it */
 		const quern_solver_ops *ops = table.plugin.ops;
-		if (!strcmp(table.kind, quern_solver_kind.name) && ops->section) {
+		const bool solver = !strcmp(table.kind, quern_solver_kind.name);
+		for (const quern_slot *slot = solver ? ops->slots : NULL; slot && slot->name; slot++)
+			note_kind(loader, slot->kind);
+		if (solver && ops->section) {
 			loader->sections = quern_grow(
 				loader->sections, loader->n_sections, &loader->sections_capacity, sizeof *loader->sections);
 			quern_section_of *s = &loader->sections[loader->n_sections++];
 			*s = (quern_section_of) { quern_copy(ops->section), quern_copy(quern_id_name(table.plugin.id)),
 				NULL, 0 };
 			s->sets = names_of(ops->sets, &s->n_sets);
+			s->steps = quern_solver_steps(ops);
 		}
 	}
 	quern_table_finish(&table);
@@ -528,7 +584,7 @@ static int by_section(const void *a, const void *b) {
 	return order ? order : strcmp(x->solver, y->solver);
 }
 
-const quern_section_of *quern_loader_sections(quern_loader *loader, size_t *n) {
+static void ask_solvers(quern_loader *loader) {
 	if (!loader->asked) {
 		quern_report *nobody = quern_report_create();
 		char **ids = quern_loader_ids(loader);
@@ -540,8 +596,22 @@ const quern_section_of *quern_loader_sections(quern_loader *loader, size_t *n) {
 		quern_report_destroy(nobody);
 		loader->asked = true;
 	}
+}
+
+const quern_section_of *quern_loader_sections(quern_loader *loader, size_t *n) {
+	ask_solvers(loader);
 	*n = loader->n_sections;
 	return loader->sections;
+}
+
+const quern_kind *quern_loader_kind(quern_loader *loader, const char *name) {
+	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind };
+	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+		if (!strcmp(own[i]->name, name)) return own[i];
+	ask_solvers(loader);
+	for (size_t i = 0; i < loader->n_kinds; i++)
+		if (!strcmp(loader->kinds[i]->name, name)) return loader->kinds[i];
+	return NULL;
 }
 
 char *quern_loader_data(const quern_loader *loader, const char *name) {

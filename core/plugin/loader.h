@@ -30,6 +30,7 @@ typedef struct quern_plugin_file {
 typedef struct quern_section_of {
 	char *section, *solver, **sets;
 	size_t n_sets;
+	bool steps; /* it has something to do in a step */
 } quern_section_of;
 
 typedef struct quern_loader quern_loader;
@@ -58,6 +59,10 @@ const void *quern_loader_ops(
 
 /* All sections that an installed solver reads by itself, sorted. Asks every solver once, and keeps none of them mapped. */
 const quern_section_of *quern_loader_sections(quern_loader *, size_t *n);
+/* Whether any of its stages runs in a step. */
+bool quern_solver_steps(const quern_solver_ops *);
+/* A kind by its name, as whoever calls such plugins describes it; NULL if no installed solver does. */
+const quern_kind *quern_loader_kind(quern_loader *, const char *name);
 /* The path of a file that lies among the plugins, such as a template; NULL if there is none; free() it. */
 char *quern_loader_data(const quern_loader *, const char *name);
 
@@ -68,7 +73,7 @@ const quern_plugin_file *quern_loader_at(const quern_loader *, size_t);
 /* Every id in the search path, sorted, NULL-terminated; free with quern_loader_free_ids. Loads nothing. */
 char **quern_loader_ids(const quern_loader *);
 /* One sentence for every object there whose name begins with a word and is no id, so that nobody can ask for it. */
-void quern_loader_report_strays(const quern_loader *, quern_report *);
+void quern_loader_report_strays(quern_loader *, quern_report *);
 void quern_loader_free_ids(char **);
 
 /* "linear" of "contact.linear"; NULL if it is no id */

@@ -9,7 +9,7 @@
 #include <quern/observer.h>
 #include <quern/solver.h>
 
-/* Most numbers that an observer or a solver's account may give. */
+/* Most sums that the account of a solver may give, and that all of them may give together. */
 enum { QUERN_MOST_SUMS = 64 };
 
 /* The copies; all of them belong to `owned`. */

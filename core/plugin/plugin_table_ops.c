@@ -89,9 +89,9 @@ static bool is_label(const char *name) {
 
 /* ---- numbers that come out ---- */
 
-static bool outputs(
-	quern_table_reader *r, const char *what, const quern_output **table, uint32_t stride, size_t *n) {
-	if (!count(r, what, *table, stride, QUERN_MOST_SUMS, n)) return false;
+static bool outputs(quern_table_reader *r, const char *what, const quern_output **table, uint32_t stride,
+	size_t most, size_t *n) {
+	if (!count(r, what, *table, stride, most, n)) return false;
 	quern_output *own = copy(r, *table, stride, sizeof *own, *n);
 	for (size_t i = 0; i < *n; i++) {
 		if (!quern_table_text(own[i].name, QUERN_LONGEST_NAME) || !quern_is_name(own[i].name) ||
@@ -109,7 +109,7 @@ static bool observer(quern_table_reader *r, quern_observer_ops *ops) {
 	size_t n;
 	if ((ops->map != NULL) == (ops->whole != NULL) || (ops->map && !ops->set))
 		return quern_table_refuse(r, "ops has map, with the set that it runs over, or whole, and not both");
-	if (!outputs(r, "outputs", &ops->outputs, ops->output_size, &n)) return false;
+	if (!outputs(r, "outputs", &ops->outputs, ops->output_size, QUERN_MOST_ROWS, &n)) return false;
 	return n || quern_table_refuse(r, "an observer without outputs");
 }
 
@@ -246,7 +246,7 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 	if (!count(r, "sets", ops->sets, ops->set_size, MOST_SETS, &n_sets) ||
 		!count(r, "slots", ops->slots, ops->slot_size, MOST_SLOTS, &n_slots) ||
 		!count(r, "stages", ops->stages, ops->stage_size, MOST_STAGES, &n_stages) ||
-		!outputs(r, "sums", &ops->sums, ops->output_size, &n_sums))
+		!outputs(r, "sums", &ops->sums, ops->output_size, QUERN_MOST_SUMS, &n_sums))
 		return false;
 	if (!n_stages) return quern_table_refuse(r, "a solver without stages");
 	if (!n_sums != !ops->account) return quern_table_refuse(r, "sums and account go together");

@@ -215,22 +215,16 @@ static void read_all(parts *p) {
 
 /* ---- what is left ---- */
 
-static bool steps(const quern_section *section) {
-	for (const quern_stage *stage = section->ops->stages; stage->name; stage++)
-		if (stage->phase > QUERN_SETUP && stage->phase < QUERN_OUTPUT) return true;
-	return false;
-}
-
 static void refuse_stillness(quern_scene *s, quern_mark mark) {
 	size_t n;
 	const quern_section_of *known = quern_loader_sections(s->loader, &n);
 	quern_text names = { 0 };
 	for (size_t i = 0; i < s->n_sections; i++)
-		if (steps(&s->sections[i])) return;
-	for (size_t i = 0; i < n; i++) quern_text_add(&names, "%s%s", i ? ", " : "", known[i].section);
-	quern_report_add(s->report, mark,
-		"scene: nothing to simulate: add a section that moves something; there are %s",
-		n ? quern_text_string(&names) : "none, since no solver is installed");
+		if (quern_solver_steps(s->sections[i].ops)) return;
+	for (size_t i = 0; i < n; i++)
+		if (known[i].steps) quern_text_add(&names, "%s%s", names.length ? ", " : "", known[i].section);
+	quern_report_add(s->report, mark, "scene: nothing to simulate: add a section of these: %s",
+		names.length ? names.data : "none, since no solver is installed");
 	quern_text_finish(&names);
 }
 

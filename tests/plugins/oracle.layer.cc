@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* oracle.layer - a plugin in C++17: grains above a height, continuum below. The tables are constant, as in C: nothing runs
  * when the object is loaded. */
-#include <quern/abi.h>
 #include <quern/contact.h>
 #include <quern/grid.h>
 #include <quern/math.h>
+#include <quern/oracle.h>
 #include <quern/vec.h>
 
 namespace {
