@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* quern - simulates granular material with grains where grains matter and a continuum everywhere else */
+/* quern - the program: its commands, and what it says of itself */
 #include "command.h"
 #include "config.h"
 #include "h5.h"

@@ -71,7 +71,7 @@ static json_t *observers(const quern_run *run, const quern_series *s) {
 	return all;
 }
 
-/* The share of the mass that single bodies carry: the mean of what an observer of it saw, or as it is now. */
+/* The share of the mass that is carried by single ones: the mean of what an observer of it saw, or as it is now. */
 static double discrete_share(const quern_run *run, const quern_series *s, const quern_account *a) {
 	const double mass = quern_account_of(a, "mass");
 	for (size_t c = 0; c < s->n; c++) {
