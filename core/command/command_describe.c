@@ -151,7 +151,21 @@ static void print_uses(const quern_use *row) {
 	}
 }
 
+static void print_sections(const char *what, const char *const *names) {
+	if (!names) return;
+	printf("%-10s", what);
+	for (; *names; names++) printf(" %s", *names);
+	puts("");
+}
+
 static void print_solver(const quern_solver_ops *ops) {
+	printf("\nsection    %s\n", ops->section ? ops->section : "whichever names it by `solver:`");
+	print_sections("needs", ops->needs);
+	print_sections("with", ops->with);
+	print_sections("after", ops->after);
+	puts("\nsets");
+	for (const quern_set *s = ops->sets; s->name; s++)
+		printf("  %-16s %s%s\n", s->name, s->doc ? s->doc : "", s->counted ? " Counted." : "");
 	puts("\nslots");
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		if (s->same_as) continue;
