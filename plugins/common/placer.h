@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
 #pragma once
-#include <quern/abi.h>
+#include <quern/space.h>
 
 typedef struct placer {
 	uint32_t dim;
 	bool periodic[3];
-	quern_real lower[3], length[3]; /* of the domain; length matters along periodic axes */
-	quern_real cell[3];             /* m, at least the largest diameter */
+	quern_real lower[3], length[3]; /* of the domain */
+	quern_real half[3];             /* of the length along periodic axes, infinite elsewhere */
+	quern_real inverse[3];          /* 1/m, of a cell, at least as wide as the largest diameter */
 	int32_t wrap[3];                /* cells along a periodic axis */
 	quern_spot *spot;
 	int32_t *next;

@@ -18,13 +18,11 @@ typedef struct stencil {
 QUERN_INLINE void stencil_place(const quern_grid_view *g, uint32_t block, uint32_t axis, const quern_real *x,
 	const int32_t *index, uint32_t n, quern_real *restrict position) {
 	const int32_t edge = (int32_t)g->edge, begin = g->at[block][axis] * edge, rest = g->cells[axis] - begin;
-	const quern_real length = g->periodic[axis] ? g->cells[axis] * g->cell : INFINITY;
+	const quern_images images = quern_grid_images(g);
 	const quern_real middle = (begin + 0.5 * (rest < edge ? rest : edge)) * g->cell;
-	for (uint32_t i = 0; i < n; i++) {
-		const quern_real d = x[index[i]] - g->lower[axis];
-		const quern_real low = d - middle > 0.5 * length ? d - length : d;
-		position[i] = low - middle < -0.5 * length ? low + length : low;
-	}
+	for (uint32_t i = 0; i < n; i++)
+		position[i] =
+			quern_image_at(x[index[i]] - g->lower[axis], middle, images.half[axis], images.length[axis]);
 }
 
 /* x: whole columns; the particles are entries begin .. begin + n, or those that `index` names. */

@@ -131,11 +131,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 		const uint32_t n = grains.block[b + 1] - grains.block[b];
 		sh->most_grains = n > sh->most_grains ? n : sh->most_grains;
 	}
-	for (uint32_t k = 0; k < 3; k++) {
-		const bool periodic = k < s->dim && s->periodic[k];
-		sh->length[k] = periodic ? s->upper[k] - s->lower[k] : 0;
-		sh->half[k] = periodic ? 0.5 * sh->length[k] : INFINITY;
-	}
+	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
 	sh->impulse =
 		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * 3 * sizeof(quern_real));
 	sh->sums = s->host->memory(s->run, (size_t)grains.n_blocks * N_ENERGIES * sizeof(quern_real));

@@ -2,7 +2,7 @@
 /* forces - what the parts of the force stage share: pairs of grains, grains on bodies, integration */
 #pragma once
 #include "dem.h"
-#include <quern/vec.h>
+#include <quern/space.h>
 
 enum { GRAINS = 128 }; /* integrated at once */
 enum { N_GRAIN_COLUMNS = 34 };
@@ -45,8 +45,7 @@ typedef struct forces_shared {
 	bool books;    /* losses of this step are booked */
 	bool looks;    /* nothing moves: forces and energies of the state as it is */
 	bool starts;   /* losses will be booked from now on: what springs hold is noted */
-	quern_real half[3],
-		length[3]; /* periodic: half the domain's length and the length; infinite and 0 otherwise */
+	quern_images images;
 	const uint32_t *grain, *contact, *touch; /* partitions */
 	quern_real *impulse;  /* [block][body + 1][dim]: on the material, by bodies and by fixed grains */
 	quern_real *sums;     /* [block][N_ENERGIES] */

@@ -2,26 +2,6 @@
 /* pairs - contacts between grains of one block: distance test, laws, sums in list order */
 #include "forces.h"
 
-/* Half a periodic domain's length and the length; infinity and zero where it is not periodic. */
-typedef struct {
-	quern_vec half, length;
-} period;
-
-static period period_of(const forces_shared *sh) {
-	return (period) { { sh->half[0], sh->half[1], sh->half[2] },
-		{ sh->length[0], sh->length[1], sh->length[2] } };
-}
-
-QUERN_INLINE quern_real image(quern_real d, quern_real half, quern_real length) {
-	d = d > half ? d - length : d;
-	return d < -half ? d + length : d;
-}
-
-QUERN_INLINE quern_vec nearest(quern_vec d, period p, const int dim) {
-	return (quern_vec) { image(d.x, p.half.x, p.length.x), image(d.y, p.half.y, p.length.y),
-		dim == 3 ? image(d.z, p.half.z, p.length.z) : 0 };
-}
-
 /* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what it
  * held is booked. */
 QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n,
@@ -33,14 +13,14 @@ QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t 
 																			sh->use[FORCE_SECOND].index +
 																			begin;
 	const quern_real reach = sh->d->reach;
-	const period p = period_of(sh);
+	const quern_images p = sh->images;
 	int32_t *restrict near = w->slot;
 	uint32_t kept = 0;
 	QUERN_SIMD
 	for (uint32_t k = 0; k < n; k++) {
 		const int32_t i = first[k], j = second[k];
 		const quern_vec d =
-			nearest((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
+			quern_vec_image((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
 		const quern_real most = radius[i] + radius[j] + reach;
 		near[k] = (quern_vec_dot(d, d, dim) < most * most);
 	}
@@ -63,7 +43,7 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	const quern_real *restrict x = at.real[0], *restrict y = at.real[1], *restrict z = at.real[2];
 	const quern_real *restrict radius = sh->use[FORCE_RADIUS].real[0];
 	const int32_t *restrict first = w->first, *restrict second = w->second;
-	const period p = period_of(sh);
+	const quern_images p = sh->images;
 	quern_real *restrict overlap = w->overlap, *restrict effective = w->radius;
 	quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
 	quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
@@ -71,7 +51,7 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	for (uint32_t q = 0; q < n; q++) {
 		const int32_t i = first[q], j = second[q];
 		const quern_vec d =
-			nearest((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
+			quern_vec_image((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
 		const quern_real ri = radius[i], rj = radius[j];
 		const quern_real length = __builtin_sqrt(quern_vec_dot(d, d, dim)),
 						 one_over = length > 0 ? 1 / length : 0;

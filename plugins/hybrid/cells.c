@@ -7,51 +7,25 @@
 
 enum { N = QUERN_BLOCK_CELLS };
 
-bool quern_hybrid_cell(const update *d, uint32_t entry, int32_t cell[3]) {
-	const uint32_t edge = d->g->edge, k = entry % N, b = entry / N;
-	const uint32_t place[3] = { k % edge, k / edge % edge, d->g->dim == 3 ? k / (edge * edge) : 0 };
-	bool inside = true;
-	for (uint32_t a = 0; a < 3; a++) {
-		cell[a] = a < d->g->dim ? d->g->at[b][a] * (int32_t)edge + (int32_t)place[a] : 0;
-		inside = inside && cell[a] < d->g->cells[a];
-	}
-	return inside;
-}
-
 void quern_hybrid_centre(const update *d, const int32_t cell[3], quern_real x[3]) {
 	for (uint32_t a = 0; a < 3; a++) x[a] = a < d->g->dim ? d->g->lower[a] + (cell[a] + 0.5) * d->g->cell : 0;
-}
-
-int32_t quern_hybrid_entry(const update *d, int32_t cell[3]) {
-	for (uint32_t k = 0; k < d->g->dim; k++) {
-		const int32_t n = d->g->cells[k];
-		if (d->g->periodic[k]) cell[k] = (cell[k] % n + n) % n;
-		if (cell[k] < 0 || cell[k] >= n) return -2;
-	}
-	return quern_grid_entry(d->g, cell);
-}
-
-int32_t quern_hybrid_number(const update *d, const int32_t cell[3]) {
-	return (cell[2] * d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0];
 }
 
 int32_t quern_hybrid_beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]) {
 	memcpy(out, cell, 3 * sizeof(int32_t));
 	out[axis] += step;
-	return quern_hybrid_entry(d, out);
+	return quern_grid_entry_back(d->g, out);
 }
 
 /* ---- sorting ---- */
 
-static int32_t cell_of(const update *d, quern_real *const x[3], uint32_t i) {
-	const quern_real at[3] = { x[0][i], x[1][i], d->g->dim == 3 ? x[2][i] : 0 };
+/* Entry of the cell that entry i of a set lies in; a point on an upper wall belongs to the last cell. */
+static int32_t cell_of(const update *d, quern_real *const x[3], uint32_t i, quern_grid_cursor *last) {
+	quern_real at[3];
 	int32_t cell[3];
-	if (!quern_grid_cell_at(d->g, at, cell)) /* a point on the upper wall belongs to the last cell */
-		for (uint32_t k = 0; k < d->g->dim; k++) {
-			cell[k] = cell[k] < 0 ? 0 : cell[k];
-			cell[k] = cell[k] < d->g->cells[k] ? cell[k] : d->g->cells[k] - 1;
-		}
-	return quern_grid_entry(d->g, cell);
+	quern_grid_position(d->g, x, i, at);
+	quern_grid_cell_inside(d->g, at, cell);
+	return quern_grid_entry_near(d->g, last, cell);
 }
 
 static void bucket(uint32_t n, const int32_t *cell, uint32_t n_cells, uint32_t *begin, int32_t *list) {
@@ -95,6 +69,7 @@ quern_status quern_hybrid_sort(update *d) {
 	if (status != QUERN_OK) return status;
 	d->g = s->host->grid(s->run);
 	d->u = s->use;
+	d->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
 	d->n_cells = d->g->n_blocks * N;
 	d->n_grains = s->host->set(s->run, "grain").n;
 	d->n_points = s->host->set(s->run, "point").n;
@@ -114,9 +89,11 @@ quern_status quern_hybrid_sort(update *d) {
 	for (uint32_t k = 0; k < s->dim; k++) d->velocity[k] = take(d, d->n_cells, sizeof(quern_real));
 	if (d->failed) return QUERN_E_MEMORY;
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
+	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < d->n_grains; i++)
-		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i);
-	for (uint32_t i = 0; i < d->n_points; i++) d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i);
+		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i, &last);
+	for (uint32_t i = 0; i < d->n_points; i++)
+		d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i, &last);
 	bucket(d->n_grains, d->grain_cell, d->n_cells, d->grain_begin, d->grain);
 	bucket(d->n_points, d->point_cell, d->n_cells, d->point_begin, d->point);
 	return QUERN_OK;
@@ -186,7 +163,7 @@ static void spread_grain(const update *d, uint32_t i, quern_real times, quern_re
 									 to = at + half < low + h ? at + half : low + h;
 					part *= to > from ? to - from : 0;
 				}
-				const int32_t c = quern_hybrid_entry(d, cell);
+				const int32_t c = quern_grid_entry_back(d->g, cell);
 				if (c >= 0) out[c] += times * (part / volume);
 			}
 }
@@ -230,12 +207,12 @@ static quern_real room_of(const update *d, uint32_t c) {
 	int32_t cell[3];
 	quern_real room = 0;
 	const bool alone = d->wall[c] >= 2 * d->g->cell && !d->u[U_GRAIN_FIXED].index;
-	if (alone || !quern_hybrid_cell(d, c, cell)) return 1;
+	if (alone || !quern_grid_cell_of(d->g, c, cell)) return 1;
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
 				const int32_t i =
-					quern_hybrid_entry(d, (int32_t[3]) { cell[0] + x, cell[1] + y, cell[2] + z });
+					quern_grid_entry_back(d->g, (int32_t[3]) { cell[0] + x, cell[1] + y, cell[2] + z });
 				const quern_real part =
 					(x ? 0.125 : 0.75) * (y ? 0.125 : 0.75) * (depth ? z ? 0.125 : 0.75 : 1);
 				room += part * (i >= 0 ? d->open[i] : 1);
@@ -296,7 +273,7 @@ void quern_hybrid_rates(update *d) {
 	if (!rate && !inertial) return;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
-		const bool there = quern_hybrid_cell(d, c, cell) && d->mass[c] > 0;
+		const bool there = quern_grid_cell_of(d->g, c, cell) && d->mass[c] > 0;
 		const quern_real shear = there ? shear_rate(d, cell) : 0;
 		if (rate) rate[c] = shear;
 		if (!inertial) continue;
@@ -311,7 +288,7 @@ static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 	int32_t cell[3], other[3];
 	quern_real length = 0;
 	n[0] = n[1] = n[2] = 0;
-	if (!quern_hybrid_cell(d, c, cell)) return;
+	if (!quern_grid_cell_of(d->g, c, cell)) return;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		const int32_t up = quern_hybrid_beside(d, cell, k, 1, other),
 					  down = quern_hybrid_beside(d, cell, k, -1, other);
@@ -323,8 +300,9 @@ static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 
 static void put_normals(
 	const update *d, uint32_t n, const quern_column *x, const quern_column *out, quern_real (*normal)[3]) {
+	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < n && out->real[0]; i++) {
-		const int32_t c = cell_of(d, x->real, i);
+		const int32_t c = cell_of(d, x->real, i, &last);
 		for (uint32_t k = 0; k < d->s->dim; k++) out->real[k][i] = c < 0 ? 0 : normal[c][k];
 	}
 }
@@ -342,11 +320,12 @@ quern_status quern_hybrid_normals(update *d) {
 
 static void put_homes(
 	const update *d, uint32_t n, const quern_column *x, const int32_t *fixed, int32_t *home) {
+	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < n; i++) {
-		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i);
+		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i, &last);
 		int32_t cell[3];
 		home[i] = -1;
-		if (c >= 0 && quern_hybrid_cell(d, (uint32_t)c, cell)) home[i] = quern_hybrid_number(d, cell);
+		if (c >= 0 && quern_grid_cell_of(d->g, (uint32_t)c, cell)) home[i] = quern_grid_number(d->g, cell);
 	}
 }
 

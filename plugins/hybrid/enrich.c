@@ -79,9 +79,7 @@ static void look_at(const update *d, const quern_column *x, const quern_column *
 	const quern_real inverse = 1 / d->h->diameter;
 	quern_real r[3] = { 0 }, r2 = 0;
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real length = d->s->upper[k] - d->s->lower[k];
-		r[k] = x->real[k][i] - at[k];
-		if (d->s->periodic[k]) r[k] -= length * floor(r[k] / length + 0.5);
+		r[k] = quern_image(x->real[k][i] - at[k], d->images.half[k], d->images.length[k]);
 		r2 += r[k] * r[k] * inverse * inverse;
 	}
 	if (r2 > 36) return;
@@ -120,7 +118,7 @@ static void look_around(const update *d, const quern_real at[3], surroundings *s
 	for (int32_t z = low[2]; z <= high[2]; z++)
 		for (int32_t y = low[1]; y <= high[1]; y++)
 			for (int32_t x = low[0]; x <= high[0]; x++) {
-				const int32_t c = quern_hybrid_entry(d, (int32_t[3]) { x, y, z });
+				const int32_t c = quern_grid_entry_back(d->g, (int32_t[3]) { x, y, z });
 				if (c >= 0) look_into(d, (uint32_t)c, at, sum);
 			}
 }
@@ -189,7 +187,7 @@ static void enrich_cell(enriching *e, uint32_t c) {
 	e->c = c;
 	e->rest = d->u[U_GRAIN_OWED].real[0][c];
 	e->first = d->n_new_grains;
-	if (!owes(e) || !quern_hybrid_cell(d, c, cell)) return;
+	if (!owes(e) || !quern_grid_cell_of(d->g, c, cell)) return;
 	for (uint32_t k = 0; k < 3; k++) {
 		e->lower[k] = k < d->s->dim ? d->g->lower[k] + cell[k] * d->g->cell : 0;
 		e->upper[k] = k < d->s->dim ? e->lower[k] + d->g->cell : 0;
@@ -197,7 +195,7 @@ static void enrich_cell(enriching *e, uint32_t c) {
 	quern_pack_job job = { .dim = d->s->dim,
 		.stream = d->h->radii.stream + 1,
 		.host = d->s->host,
-		.key = (uint64_t)quern_hybrid_number(d, cell),
+		.key = (uint64_t)quern_grid_number(d->g, cell),
 		.counter = (uint64_t)d->u[U_UPDATES].index[0] << 32,
 		.seed = e->seed,
 		.radius = job_radius,

@@ -41,9 +41,10 @@ typedef struct {
 } movers;
 
 static int32_t home_entry(const update *d, int32_t home) {
+	int32_t cell[3];
 	if (home < 0) return -1;
-	const int32_t nx = d->g->cells[0], ny = d->g->cells[1];
-	return quern_grid_entry(d->g, (const int32_t[3]) { home % nx, home / nx % ny, home / nx / ny });
+	quern_grid_numbered(d->g, home, cell);
+	return quern_grid_entry(d->g, cell);
 }
 
 static void give_share(update *d, entry e, const entry old, uint32_t from, uint32_t to, quern_real share) {

@@ -20,6 +20,7 @@ typedef struct update {
 	const quern_step *s;
 	const quern_grid_view *g;
 	const quern_column *u;
+	quern_images images;
 	uint32_t n_cells, n_grains, n_points;
 	/* by cell: the moving grains and the points in it */
 	uint32_t *grain_begin, *point_begin;
@@ -38,14 +39,8 @@ typedef struct update {
 	bool failed;      /* memory ran out */
 } update;
 
-/* Global coordinates of a cell of the set "cell"; false for cells beyond the domain's end. */
-bool quern_hybrid_cell(const update *, uint32_t entry, int32_t cell[3]);
 void quern_hybrid_centre(const update *, const int32_t cell[3], quern_real x[3]);
-/* Brings a cell back through periodic faces and returns its entry: -1 where there is none in the grid, -2 beyond a face. */
-int32_t quern_hybrid_entry(const update *, int32_t cell[3]);
-/* The number of a cell among all of the domain. */
-int32_t quern_hybrid_number(const update *, const int32_t cell[3]);
-/* The entry, as above, of the neighbour one step along an axis. */
+/* The entry of the neighbour one step along an axis, -1 where there is none. */
 int32_t quern_hybrid_beside(const update *, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]);
 
 /* ---- cells.c ---- */
