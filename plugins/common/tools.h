@@ -32,6 +32,13 @@ static inline bool quern_too_fast(const quern_real v[3], quern_real times) {
 	return !(sum < 1);
 }
 
+/* m/s^2 */
+static inline quern_real quern_gravity_size(uint32_t dim, const quern_real gravity[3]) {
+	quern_real sum = 0;
+	for (uint32_t k = 0; k < dim; k++) sum += gravity[k] * gravity[k];
+	return __builtin_sqrt(sum);
+}
+
 /* Brought back through a periodic face, and inside: what is less than half an ulp below `lower` would round to `upper`. */
 static inline quern_real quern_brought_back(quern_real x, quern_real lower, quern_real upper) {
 	x = x >= upper ? x - (upper - lower) : x;

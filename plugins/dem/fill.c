@@ -322,7 +322,6 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
 bool quern_dem_settled(const void *self, const quern_step *s) {
 	const dem *d = self;
 	const quern_set_view grains = s->host->set(s->run, "grain");
-	quern_real g2 = 0;
 	if (!d->settles || !grains.n) return true;
 	if (s->substep % 200) return false;
 	if (s->substep >= d->settle_most) {
@@ -330,8 +329,8 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 			s->run, 2, "settling was cut off after %d steps: the grains are not at rest", d->settle_most);
 		return true;
 	}
-	for (uint32_t k = 0; k < d->dim; k++) g2 += s->gravity[k] * s->gravity[k];
-	const quern_real diameter = 2 * d->radii.mean, g = sqrt(g2), fall = 2 * sqrt(2 * diameter / g);
+	const quern_real diameter = 2 * d->radii.mean, g = quern_gravity_size(d->dim, s->gravity);
+	const quern_real fall = 2 * sqrt(2 * diameter / g);
 	if ((quern_real)s->substep * s->dt < fall) return false;
 	const quern_real *mass = s->use[FILL_MASS].real[0];
 	const int32_t *fixed = s->use[FILL_FIXED].index;
@@ -353,9 +352,8 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */
 quern_real quern_dem_settling(const void *self, const quern_step *s) {
 	const dem *d = self;
-	quern_real g2 = 0;
-	for (uint32_t k = 0; k < d->dim; k++) g2 += s->gravity[k] * s->gravity[k];
-	if (!d->settles || !(g2 > 0) || !(s->dt > 0)) return 0;
-	const quern_real steps = 4 * sqrt((d->height + 2 * d->radii.mean) / sqrt(g2)) / s->dt;
+	const quern_real g = quern_gravity_size(d->dim, s->gravity);
+	if (!d->settles || !(g > 0) || !(s->dt > 0)) return 0;
+	const quern_real steps = 4 * sqrt((d->height + 2 * d->radii.mean) / g) / s->dt;
 	return steps < d->settle_most ? steps : d->settle_most;
 }

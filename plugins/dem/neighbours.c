@@ -130,9 +130,7 @@ static quern_status index_old(listing *l, const char *set, const int32_t *first,
 	uint32_t *bucket = s->host->memory(s->run, ((size_t)n_grains + 2) * sizeof(uint32_t));
 	int32_t *entry = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
 	if (!bucket || !entry) return QUERN_E_MEMORY;
-	for (uint32_t k = 0; k < n; k++) bucket[first[k] + 2]++;
-	for (uint32_t i = 0; i < n_grains; i++) bucket[i + 2] += bucket[i + 1];
-	for (uint32_t k = 0; k < n; k++) entry[bucket[first[k] + 1]++] = (int32_t)k;
+	quern_bucket(n, first, n_grains, bucket, entry);
 	l->bucket = bucket;
 	l->entry = entry;
 	l->old_first = first;

@@ -233,7 +233,6 @@ static quern_status refuse_settling(const dem *d, const quern_setup *setup, quer
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	dem *d = self;
-	quern_real g2 = 0;
 	fill_height loose = fill_height_of(setup);
 	d->dim = setup->dim;
 	d->radii.stream = setup->stream;
@@ -262,10 +261,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (!d->fill.n && !d->place.n && !d->file)
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
 	if (d->file) d->fixed = true; /* its header may say so */
-	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
-	if (d->settles && !(g2 > 0))
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = 2 * d->radii.mean;
+	if (d->settles && !(gravity > 0))
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
-	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
 	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
@@ -310,15 +308,15 @@ static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	dem *d = self;
-	quern_real kn = 0, most = 0, g2 = 0;
+	quern_real kn = 0, most = 0;
 	if (d->settles && !n_slot[SLOT_CONTACT])
 		return refuse_settling(d, setup, err, "without a contact law grains fall for ever: give contact one");
 	d->features = false;
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
-	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
-	const quern_real pressure = packing * d->density * sqrt(g2) * d->height;
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
+	const quern_real pressure = packing * d->density * gravity * d->height;
 	const quern_real force = pressure * diameter * (d->dim == 3 ? diameter : 1);
 	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
 		const quern_bound *law = &slot[SLOT_CONTACT][l];

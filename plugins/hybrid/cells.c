@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* cells - who is in which cell, and what cells hold on average */
 #include "../common/cover.h"
+#include "../common/sort.h"
 #include "update.h"
 #include <math.h>
 #include <string.h>
@@ -26,14 +27,6 @@ static int32_t cell_of(const update *d, quern_real *const x[3], uint32_t i, quer
 	quern_grid_position(d->g, x, i, at);
 	quern_grid_cell_inside(d->g, at, cell);
 	return quern_grid_entry_near(d->g, last, cell);
-}
-
-static void bucket(uint32_t n, const int32_t *cell, uint32_t n_cells, uint32_t *begin, int32_t *list) {
-	for (uint32_t i = 0; i < n; i++)
-		if (cell[i] >= 0) begin[cell[i] + 2]++;
-	for (uint32_t c = 0; c < n_cells; c++) begin[c + 1] += begin[c];
-	for (uint32_t i = 0; i < n; i++)
-		if (cell[i] >= 0) list[begin[cell[i] + 1]++] = (int32_t)i;
 }
 
 static void *take(update *d, size_t count, size_t size) {
@@ -94,8 +87,8 @@ quern_status quern_hybrid_sort(update *d) {
 		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i, &last);
 	for (uint32_t i = 0; i < d->n_points; i++)
 		d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i, &last);
-	bucket(d->n_grains, d->grain_cell, d->n_cells, d->grain_begin, d->grain);
-	bucket(d->n_points, d->point_cell, d->n_cells, d->point_begin, d->point);
+	quern_bucket(d->n_grains, d->grain_cell, d->n_cells, d->grain_begin, d->grain);
+	quern_bucket(d->n_points, d->point_cell, d->n_cells, d->point_begin, d->point);
 	return QUERN_OK;
 }
 

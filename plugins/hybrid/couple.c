@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* couple - grains and continuum meet at the nodes: grains to nodes, an exchange of momentum, and back to the grains */
+#include "../common/sort.h"
 #include "../common/stencil.h"
 #include "hybrid.h"
 #include <math.h>
@@ -15,12 +16,14 @@ typedef struct {
 } residents;
 
 /* A grain that has left the grid, or never was on it, meets no continuum. */
-static int32_t block_of(const quern_grid_view *g, quern_real *const x[3], uint32_t i) {
-	const quern_real at[3] = { x[0][i], x[1][i], g->dim == 3 ? x[2][i] : 0 };
+static int32_t block_of(
+	const quern_grid_view *g, quern_real *const x[3], uint32_t i, quern_grid_cursor *last) {
+	quern_real at[3];
 	int32_t cell[3];
+	quern_grid_position(g, x, i, at);
 	if (!quern_grid_cell_at(g, at, cell)) return -1;
-	for (uint32_t k = 0; k < g->dim; k++) cell[k] /= (int32_t)g->edge;
-	return quern_grid_block(g, cell);
+	const int32_t entry = quern_grid_entry_near(g, last, cell);
+	return entry < 0 ? -1 : entry / N;
 }
 
 static bool find_residents(const quern_step *s, const quern_column *x, const int32_t *fixed, residents *r) {
@@ -30,13 +33,9 @@ static bool find_residents(const quern_step *s, const quern_column *x, const int
 	r->begin = s->host->memory(s->run, ((size_t)g->n_blocks + 2) * sizeof(uint32_t));
 	r->grain = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
 	if (!block || !r->begin || !r->grain) return false;
-	for (uint32_t i = 0; i < n; i++) {
-		block[i] = fixed && fixed[i] ? -1 : block_of(g, x->real, i);
-		if (block[i] >= 0) r->begin[block[i] + 2]++;
-	}
-	for (uint32_t b = 0; b < g->n_blocks; b++) r->begin[b + 1] += r->begin[b];
-	for (uint32_t i = 0; i < n; i++)
-		if (block[i] >= 0) r->grain[r->begin[block[i] + 1]++] = (int32_t)i;
+	quern_grid_cursor last = { .block = -1 };
+	for (uint32_t i = 0; i < n; i++) block[i] = fixed && fixed[i] ? -1 : block_of(g, x->real, i, &last);
+	quern_bucket(n, block, g->n_blocks, r->begin, r->grain);
 	return true;
 }
 

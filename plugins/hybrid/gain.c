@@ -69,9 +69,8 @@ quern_status quern_hybrid_judge_gain(
 	const hybrid *h, const quern_step *s, quern_real kinetic, quern_real carried) {
 	const quern_real had = s->use[A_ENERGY].real[0][0], work = s->use[A_WORK].real[0][0];
 	const quern_real still = 1e-6 * h->diameter / s->dt;
-	quern_real g2 = 0;
-	for (uint32_t k = 0; k < s->dim; k++) g2 += s->gravity[k] * s->gravity[k];
-	const quern_real slack = carried * (h->gain * sqrt(g2) * h->diameter + 0.5 * still * still);
+	const quern_real lift = h->gain * quern_gravity_size(s->dim, s->gravity) * h->diameter;
+	const quern_real slack = carried * (lift + 0.5 * still * still);
 	if (!(h->gain > 0) || kinetic <= 2 * (had + fmax(work, 0)) + slack) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 		"grains and points move with %.3g J, though they had %.3g J at first and gravity has given %.3g J "

@@ -150,13 +150,11 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mpm *p = self;
-	quern_real g2 = 0;
 	fill_height loose = fill_height_of(setup);
 	p->dim = setup->dim;
 	p->affine = p->rasterise == RASTERISE_AFFINE;
 	for (uint32_t k = 0; k < p->dim; k++) {
 		const quern_real cells = (setup->upper[k] - setup->lower[k]) / p->cell, whole = floor(cells + 0.5);
-		g2 += setup->gravity[k] * setup->gravity[k];
 		if (whole < 1 || fabs(cells - whole) > 1e-6 * whole)
 			return setup->host->fail(err, QUERN_E_PARAM, "cell",
 				"the domain is %.6g cells wide along axis %u; it must be a whole number: make it %.6g m, or "
@@ -184,7 +182,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	setup->host->publish(setup, "fill.height", "m", height);
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
 	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
-	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(sqrt(g2) / height) : 0);
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
+	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
 	return QUERN_OK;
 }
 
