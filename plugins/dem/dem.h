@@ -2,6 +2,7 @@
 /* dem - the grain solver's own parameters and the rows of its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"
+#include "../common/cloud.h"
 #include "../common/radius.h"
 #include "../common/tools.h"
 
@@ -112,6 +113,12 @@ QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
 
 /* moment of inertia over mass times radius squared */
 QUERN_INLINE quern_real dem_inertia(uint32_t dim) { return dim == 2 ? 0.5 : 0.4; }
+
+/* The grains with rows of dem.fill; `weight` NULL: all of what each is. */
+QUERN_INLINE cloud dem_cloud(const quern_step *s, const quern_real *weight) {
+	return (cloud) { s->use[FILL_MASS].real[0], weight, s->use[FILL_FIXED].index,
+		s->host->set(s->run, "grain").n };
+}
 
 quern_status quern_dem_fill(const void *self, const quern_step *);
 quern_status quern_dem_open(const void *self, const quern_step *);

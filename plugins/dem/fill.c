@@ -321,7 +321,7 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
  * the time to fall by a diameter. */
 bool quern_dem_settled(const void *self, const quern_step *s) {
 	const dem *d = self;
-	const quern_set_view grains = s->host->set(s->run, "grain");
+	const cloud grains = dem_cloud(s, NULL);
 	if (!d->settles || !grains.n) return true;
 	if (s->substep % 200) return false;
 	if (s->substep >= d->settle_most) {
@@ -332,21 +332,12 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 	const quern_real diameter = 2 * d->radii.mean, g = quern_gravity_size(d->dim, s->gravity);
 	const quern_real fall = 2 * sqrt(2 * diameter / g);
 	if ((quern_real)s->substep * s->dt < fall) return false;
-	const quern_real *mass = s->use[FILL_MASS].real[0];
-	const int32_t *fixed = s->use[FILL_FIXED].index;
-	quern_real *energy = s->host->memory(s->run, ((size_t)grains.n + 1) * sizeof(quern_real));
-	quern_real moving = 0;
-	if (!energy) return false;
-	for (uint32_t i = 0; i < grains.n; i++) {
-		quern_real v2 = 0;
-		if (fixed && fixed[i]) continue;
-		moving += mass[i];
-		for (uint32_t k = 0; k < d->dim; k++)
-			v2 += s->use[FILL_VELOCITY].real[k][i] * s->use[FILL_VELOCITY].real[k][i];
-		energy[i] = 0.5 * mass[i] * v2;
-	}
-	const quern_real mean = s->host->sum(s->run, grains.n, energy);
-	return mean <= d->rest * moving * g * diameter;
+	cloud_sums c;
+	quern_real moving = 0, energy = 0;
+	if (!cloud_open(&c, s->host, s->run, &grains)) return false;
+	for (uint32_t i = 0; i < grains.n; i++) moving += c.mass[i];
+	CLOUD_ADD(&c, i, 0.5 * cloud_square(&s->use[FILL_VELOCITY], i, s->dim), energy);
+	return energy <= d->rest * moving * g * diameter;
 }
 
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */

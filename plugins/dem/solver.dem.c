@@ -433,37 +433,19 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 }
 
 static void account(const void *self, const quern_step *s, quern_account *out) {
-	const dem *d = self;
-	const quern_set_view grains = s->host->set(s->run, "grain");
 	const quern_column *use = s->use;
-	const quern_real *mass = use[FILL_MASS].real[0], *weight = use[FILL_WEIGHT].real[0],
-					 *radius = use[FILL_RADIUS].real[0];
-	const int32_t *fixed = use[FILL_FIXED].index;
-	const uint32_t n_spin = d->dim == 3 ? 3 : 1;
-	quern_real *sum = s->host->memory(s->run, ((size_t)grains.n + 1) * 6 * sizeof(quern_real));
-	if (!sum || !grains.n) return;
-	const size_t n = grains.n;
-	for (size_t i = 0; i < n; i++) {
-		const quern_real m = (fixed && fixed[i] ? 0 : 1) * (weight ? weight[i] : 1) * mass[i];
-		quern_real v2 = 0, w2 = 0, height = 0;
-		for (uint32_t k = 0; k < d->dim; k++) {
-			const quern_real v = use[FILL_VELOCITY].real[k][i];
-			v2 += v * v;
-			height -= s->gravity[k] * use[FILL_POSITION].real[k][i];
-			sum[(1 + k) * n + i] = m * v;
-		}
-		for (uint32_t k = 0; use[FILL_SPIN].real[0] && k < n_spin; k++)
-			w2 += use[FILL_SPIN].real[k][i] * use[FILL_SPIN].real[k][i];
-		sum[i] = m;
-		sum[4 * n + i] = 0.5 * m * (v2 + dem_inertia(d->dim) * radius[i] * radius[i] * w2);
-		sum[5 * n + i] = m * height;
-	}
-	const quern_real total = s->host->sum(s->run, n, sum);
-	out->mass += total;
-	out->discrete += total;
-	for (uint32_t k = 0; k < d->dim; k++) out->momentum[k] += s->host->sum(s->run, n, sum + (1 + k) * n);
-	out->kinetic += s->host->sum(s->run, n, sum + 4 * n);
-	out->potential += s->host->sum(s->run, n, sum + 5 * n);
+	const cloud grains = dem_cloud(s, use[FILL_WEIGHT].real[0]);
+	const quern_real *radius = use[FILL_RADIUS].real[0], turning = dem_inertia(s->dim);
+	const uint32_t n_spin = !use[FILL_SPIN].real[0] ? 0 : s->dim == 3 ? 3 : 1;
+	cloud_sums c;
+	(void)self;
+	if (!grains.n || !cloud_open(&c, s->host, s->run, &grains)) return;
+	cloud_account(&c, &use[FILL_POSITION], &use[FILL_VELOCITY], s, out);
+	out->discrete += cloud_total(&c);
+	CLOUD_ADD(&c, i,
+		0.5 * (cloud_square(&use[FILL_VELOCITY], i, s->dim) +
+				  turning * radius[i] * radius[i] * cloud_square(&use[FILL_SPIN], i, n_spin)),
+		out->kinetic);
 }
 
 static const quern_solver_ops ops = { .size = sizeof ops,

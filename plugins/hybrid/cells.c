@@ -95,7 +95,7 @@ quern_status quern_hybrid_sort(update *d) {
 /* ---- averages ---- */
 
 static void add_particle(
-	const update *d, uint32_t c, quern_real m, quern_real *const v[3], int32_t i, quern_real *second) {
+	const update *d, uint32_t c, quern_real m, quern_real *const v[3], uint32_t i, quern_real *second) {
 	quern_real v2 = 0;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		d->velocity[k][c] += m * v[k][i];
@@ -108,19 +108,18 @@ static void add_particle(
 /* Mass, mean velocity and its spread of both clouds together, with the weights as they are. */
 void quern_hybrid_averages(update *d) {
 	const quern_column *u = d->u;
+	const cloud grains = moving_grains(d->s), points = all_points(d->s);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		quern_real second = 0, square = 0;
 		d->mass[c] = d->spread[c] = 0;
 		for (uint32_t k = 0; k < d->s->dim; k++) d->velocity[k][c] = 0;
 		for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
-			const int32_t i = d->grain[q];
-			add_particle(d, c, u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i],
-				u[U_GRAIN_VELOCITY].real, i, &second);
+			const uint32_t i = (uint32_t)d->grain[q];
+			add_particle(d, c, cloud_mass(&grains, i), u[U_GRAIN_VELOCITY].real, i, &second);
 		}
 		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-			const int32_t i = d->point[q];
-			add_particle(d, c, u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i],
-				u[U_POINT_VELOCITY].real, i, &second);
+			const uint32_t i = (uint32_t)d->point[q];
+			add_particle(d, c, cloud_mass(&points, i), u[U_POINT_VELOCITY].real, i, &second);
 		}
 		if (!(d->mass[c] > 0)) continue;
 		for (uint32_t k = 0; k < d->s->dim; k++) {

@@ -73,8 +73,8 @@ typedef struct {
 	quern_real way[3];
 } surroundings;
 
-static void look_at(const update *d, const quern_column *x, const quern_column *v, quern_real mass, int32_t i,
-	const quern_real at[3], surroundings *sum) {
+static void look_at(const update *d, const quern_column *x, const quern_column *v, quern_real mass,
+	uint32_t i, const quern_real at[3], surroundings *sum) {
 	const uint32_t dim = d->s->dim;
 	const quern_real inverse = 1 / d->h->diameter;
 	quern_real r[3] = { 0 }, r2 = 0;
@@ -94,15 +94,14 @@ static void look_at(const update *d, const quern_column *x, const quern_column *
 
 static void look_into(const update *d, uint32_t c, const quern_real at[3], surroundings *sum) {
 	const quern_column *u = d->u;
+	const cloud grains = moving_grains(d->s), points = all_points(d->s);
 	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
-		const int32_t i = d->grain[q];
-		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY],
-			u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i], i, at, sum);
+		const uint32_t i = (uint32_t)d->grain[q];
+		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY], cloud_mass(&grains, i), i, at, sum);
 	}
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const int32_t i = d->point[q];
-		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY],
-			u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i], i, at, sum);
+		const uint32_t i = (uint32_t)d->point[q];
+		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY], cloud_mass(&points, i), i, at, sum);
 	}
 }
 

@@ -2,6 +2,7 @@
 /* hybrid - the parameters of the hybrid solver and the rows of its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"
+#include "../common/cloud.h"
 #include "../common/radius.h"
 #include "../common/tools.h"
 #include <quern/grid.h>
@@ -126,6 +127,16 @@ quern_real quern_hybrid_held(const quern_step *);
  * gravity has given and `gain` allows. */
 quern_status quern_hybrid_judge_gain(
 	const hybrid *, const quern_step *, quern_real kinetic, quern_real carried);
+
+/* The clouds with rows of the update, until a set changes. */
+QUERN_INLINE cloud moving_grains(const quern_step *s) {
+	return (cloud) { s->use[U_GRAIN_MASS].real[0], s->use[U_GRAIN_WEIGHT].real[0],
+		s->use[U_GRAIN_FIXED].index, s->host->set(s->run, "grain").n };
+}
+QUERN_INLINE cloud all_points(const quern_step *s) {
+	return (cloud) { s->use[U_POINT_MASS].real[0], s->use[U_POINT_WEIGHT].real[0], NULL,
+		s->host->set(s->run, "point").n };
+}
 
 /* Weight of a grain or a point in a cell of that zone. */
 QUERN_INLINE quern_real grain_share(int32_t zone) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
+#include "../common/cloud.h"
 #include "../common/height.h"
 #include "mpm.h"
 #include <math.h>
@@ -224,30 +225,14 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 
 static void account(const void *self, const quern_step *s, quern_account *out) {
 	const quern_column *u = s->use;
-	const size_t n = s->host->set(s->run, "point").n;
-	quern_real *sum = s->host->memory(s->run, (n + 1) * 7 * sizeof(quern_real));
+	const cloud points = { u[FILL_MASS].real[0], u[FILL_WEIGHT].real[0], NULL,
+		s->host->set(s->run, "point").n };
+	cloud_sums c;
 	(void)self;
-	if (!sum || !n) return;
-	for (size_t i = 0; i < n; i++) {
-		const quern_real m =
-			(u[FILL_WEIGHT].real[0] ? u[FILL_WEIGHT].real[0][i] : 1) * u[FILL_MASS].real[0][i];
-		quern_real v2 = 0, height = 0;
-		for (uint32_t k = 0; k < s->dim; k++) {
-			const quern_real v = u[FILL_VELOCITY].real[k][i];
-			v2 += v * v;
-			height -= s->gravity[k] * u[FILL_POSITION].real[k][i];
-			sum[(1 + k) * n + i] = m * v;
-		}
-		sum[i] = m;
-		sum[4 * n + i] = 0.5 * m * v2;
-		sum[5 * n + i] = m * height;
-		sum[6 * n + i] = u[FILL_ENERGY].real[0] ? m * u[FILL_ENERGY].real[0][i] : 0;
-	}
-	out->mass += s->host->sum(s->run, n, sum);
-	for (uint32_t k = 0; k < s->dim; k++) out->momentum[k] += s->host->sum(s->run, n, sum + (1 + k) * n);
-	out->kinetic += s->host->sum(s->run, n, sum + 4 * n);
-	out->potential += s->host->sum(s->run, n, sum + 5 * n);
-	out->elastic += s->host->sum(s->run, n, sum + 6 * n);
+	if (!points.n || !cloud_open(&c, s->host, s->run, &points)) return;
+	cloud_account(&c, &u[FILL_POSITION], &u[FILL_VELOCITY], s, out);
+	CLOUD_ADD(&c, i, 0.5 * cloud_square(&u[FILL_VELOCITY], i, s->dim), out->kinetic);
+	if (u[FILL_ENERGY].real[0]) CLOUD_ADD(&c, i, u[FILL_ENERGY].real[0][i], out->elastic);
 }
 
 static const quern_solver_ops ops = { .size = sizeof ops,

@@ -43,32 +43,22 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
 	{ .name = "budget", .unit = "J", .doc = "All of it: constant for grains alone." }, { .name = NULL } };
 
-static quern_real square(const quern_column *c, uint32_t i, uint32_t n) {
-	quern_real sum = 0;
-	for (uint32_t k = 0; k < n; k++) sum += c->real[k][i] * c->real[k][i];
-	return sum;
-}
-static quern_real height(const quern_observer_batch *b, const quern_column *x, uint32_t i) {
-	quern_real sum = 0;
-	for (uint32_t k = 0; k < b->dim; k++) sum -= b->gravity[k] * x->real[k][i];
-	return sum;
-}
-
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t turns = b->dim == 3 ? 3 : 1;
+	const quern_real *radius = u[GRAIN_RADIUS].real[0], turning = b->dim == 2 ? 0.5 : 0.4;
+	cloud_sums grains, points;
 	(void)self;
-	CLOUD_SUM(b, host, run, false, i, 0.5 * square(&u[GRAIN_VELOCITY], i, b->dim), out[KINETIC]);
+	if (!observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
+	CLOUD_ADD(&grains, i, 0.5 * cloud_square(&u[GRAIN_VELOCITY], i, b->dim), out[KINETIC]);
 	if (u[GRAIN_SPIN].real[0])
-		CLOUD_SUM(b, host, run, false, i,
-			(b->dim == 2 ? 0.25 : 0.2) * u[GRAIN_RADIUS].real[0][i] * u[GRAIN_RADIUS].real[0][i] *
-				square(&u[GRAIN_SPIN], i, turns),
+		CLOUD_ADD(&grains, i, 0.5 * turning * radius[i] * radius[i] * cloud_square(&u[GRAIN_SPIN], i, turns),
 			out[SPINNING]);
-	CLOUD_SUM(b, host, run, true, i, 0.5 * square(&u[POINT_VELOCITY], i, b->dim), out[POINTS]);
-	CLOUD_SUM(b, host, run, false, i, height(b, &u[GRAIN_POSITION], i), out[POTENTIAL]);
-	CLOUD_SUM(b, host, run, true, i, height(b, &u[POINT_POSITION], i), out[POTENTIAL]);
-	if (u[POINT_ENERGY].real[0]) CLOUD_SUM(b, host, run, true, i, u[POINT_ENERGY].real[0][i], out[ELASTIC]);
+	CLOUD_ADD(&points, i, 0.5 * cloud_square(&u[POINT_VELOCITY], i, b->dim), out[POINTS]);
+	CLOUD_ADD(&grains, i, cloud_height(&u[GRAIN_POSITION], i, b->dim, b->gravity), out[POTENTIAL]);
+	CLOUD_ADD(&points, i, cloud_height(&u[POINT_POSITION], i, b->dim, b->gravity), out[POTENTIAL]);
+	if (u[POINT_ENERGY].real[0]) CLOUD_ADD(&points, i, u[POINT_ENERGY].real[0][i], out[ELASTIC]);
 	const int rows[] = { STORED, SHEARED, DAMPED, RUBBED, EXCHANGED },
 			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
 	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;

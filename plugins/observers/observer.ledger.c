@@ -33,16 +33,15 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t n = u[GRAIN_OWED].real[0] ? b->count[GRAIN_OWED] : 0;
-	quern_real mass = 0, *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
+	quern_real *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
+	cloud_sums grains, points;
 	(void)self;
 	if (!u[GRAIN_OWED].real[0] || !(u[MASS].real[0][0] > 0)) return QUERN_OK;
-	if (!size) return QUERN_E_MEMORY;
+	if (!size || !observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < n; i++)
 		size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
-	CLOUD_SUM(b, host, run, false, i, 1, mass);
-	CLOUD_SUM(b, host, run, true, i, 1, mass);
 	out[0] = host->sum(run, n, size) / u[MASS].real[0][0];
-	out[1] = mass / u[MASS].real[0][0] - 1;
+	out[1] = (cloud_total(&grains) + cloud_total(&points)) / u[MASS].real[0][0] - 1;
 	out[2] = host->sum(run, n, u[GRAIN_OWED].real[0]);
 	out[3] = host->sum(run, n, u[POINT_OWED].real[0]);
 	for (int k = 0; k < 3; k++) out[4 + k] = u[MASS_DEFECT + k].real[0][0];

@@ -13,9 +13,11 @@ static const quern_output outputs[] = { { .name = "carried", .unit = "kg", .doc 
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
+	cloud_sums grains, points;
 	(void)self;
-	CLOUD_SUM(b, host, run, false, i, 1, out[1]);
-	CLOUD_SUM(b, host, run, true, i, 1, out[2]);
+	if (!observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
+	out[1] = cloud_total(&grains);
+	out[2] = cloud_total(&points);
 	out[0] = out[1] + out[2];
 	return QUERN_OK;
 }

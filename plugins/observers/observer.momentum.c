@@ -16,10 +16,12 @@ static const quern_output outputs[] = { { .name = "x", .unit = "kg m/s", .doc = 
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
+	cloud_sums grains, points;
 	(void)self;
+	if (!observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
 	for (uint32_t k = 0; k < b->dim; k++) {
-		CLOUD_SUM(b, host, run, false, i, b->use[GRAIN_VELOCITY].real[k][i], out[k]);
-		CLOUD_SUM(b, host, run, true, i, b->use[POINT_VELOCITY].real[k][i], out[k]);
+		CLOUD_ADD(&grains, i, b->use[GRAIN_VELOCITY].real[k][i], out[k]);
+		CLOUD_ADD(&points, i, b->use[POINT_VELOCITY].real[k][i], out[k]);
 	}
 	return QUERN_OK;
 }
