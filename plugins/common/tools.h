@@ -3,10 +3,6 @@
 #pragma once
 #include <quern/abi.h>
 
-/* A row of a use table: field, unit, access, shape, and then designated members as wanted. */
-#define F(field_, unit_, access_, ...)                                                                       \
-	{ .field = field_, .unit = unit_, .access = access_, .shape = __VA_ARGS__ }
-
 /* Columns of a batch that begins at entry `first` of the whole set. */
 QUERN_INLINE quern_column quern_column_from(quern_column c, uint8_t shape, uint32_t first) {
 	if (shape == QUERN_INDEX) {

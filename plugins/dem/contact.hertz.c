@@ -18,21 +18,15 @@ static const quern_param params[] = { QUERN_PARAM(hertz, young, "Pa", "Young's m
 		.from = "scene.speed", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_END_PARAMS };
 
-enum { SHEAR, SPIN };
-static const quern_use uses[] = { { .field = "contact.shear",
-									  .unit = "N",
-									  .doc = "Elastic tangential force; 2-D: along the normal turned left.",
-									  .access = QUERN_UPDATE,
-									  .shape = QUERN_AXIAL,
-									  .when = "friction" },
-	{ .field = "grain.spin",
-		.unit = "rad/s",
-		.doc = "Angular velocity; a frictional contact turns its grains.",
-		.access = QUERN_READ,
-		.shape = QUERN_AXIAL,
-		.flags = QUERN_OTHERS,
-		.when = "friction" },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(SHEAR, "contact.shear", "N", QUERN_UPDATE, QUERN_AXIAL, .when = "friction", \
+		.doc = "Elastic tangential force; 2-D: along the normal turned left.") \
+	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS, .when = "friction", \
+		.doc = "Angular velocity; a frictional contact turns its grains.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	hertz *law = self;

@@ -5,19 +5,19 @@
 #include <quern/space.h>
 
 enum { GRAINS = 128 }; /* integrated at once */
-enum { N_GRAIN_COLUMNS = 34 };
+/* what is kept of each: up to three columns from here on */
 enum {
 	G_FORCE,
 	G_TORQUE = 3,
 	G_MASS = 6,
 	G_INERTIA,
-	G_POSITION,
-	G_MEAN = 17,
-	G_MEAN_SPIN = 20,
-	G_WAY = 23,
-	G_NEW_POSITION = 25,
-	G_NEW_VELOCITY = 28,
-	G_NEW_SPIN = 31
+	G_MEAN,
+	G_MEAN_SPIN = 11,
+	G_WAY = 14,
+	G_NEW_POSITION = 16,
+	G_NEW_VELOCITY = 19,
+	G_NEW_SPIN = 22,
+	N_GRAIN_COLUMNS = 25
 };
 /* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in 3-D
  * have a row of their own. */

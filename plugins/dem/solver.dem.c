@@ -100,93 +100,11 @@ static const quern_slot slots[] = {
 	{ .name = NULL }
 };
 
-#define DISPLACEMENT                                                                                         \
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY,                            \
-		.doc = "Farthest way of a grain since the last list; infinite: the list is stale.")
-#define FIXED(access)                                                                                        \
-	F("grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed",                        \
-		.doc = "1: it does not move.")
-
-static const quern_use fill_uses[] = { F("grain.position", "m", QUERN_WRITE, QUERN_VECTOR,
-										   .flags = QUERN_SHOWN, .doc = "Centre."),
-	F("grain.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."),
-	F("grain.radius", "m", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, .doc = "Radius."),
-	F("grain.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted."),
-	F("grain.spin", "rad/s", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL, .doc = "Angular velocity."),
-	F("grain.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1,
-		.doc = "Share of its mass that the grain carries."),
-	FIXED(QUERN_WRITE),
-	F("grain.id", "1", QUERN_WRITE, QUERN_ID, .flags = QUERN_SHOWN, .doc = "Number of the grain, for ever."),
-	DISPLACEMENT, QUERN_END_USES };
-static const quern_use open_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
-	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), FIXED(QUERN_READ), DISPLACEMENT, QUERN_END_USES };
-/* positions are brought back through periodic faces in place, all of them before anybody looks at others */
-static const quern_use near_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
-	F("grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS), FIXED(QUERN_READ), DISPLACEMENT,
-	F("grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made."),
-	F("contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of lower id."),
-	F("contact.second", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of higher id."),
-	F("touch.grain", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain."),
-	F("touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body."),
-	F("touch.feature", "1", QUERN_WRITE, QUERN_INDEX, .when = "features",
-		.doc = "The body's face, edge or vertex."),
-	QUERN_END_USES };
-#define ENERGY(name, access, text)                                                                           \
-	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, .doc = text)
-/* What a look at the forces takes too, without moving anything. */
-#define FORCE_USES(moves, gives)                                                                             \
-	F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                               \
-		F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                         \
-		F("grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL),           \
-		F("grain.position", "m", moves, QUERN_VECTOR), F("grain.velocity", "m/s", moves, QUERN_VECTOR),      \
-		F("grain.spin", "rad/s", moves, QUERN_AXIAL, .flags = QUERN_OPTIONAL),                               \
-		F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                             \
-		F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                              \
-		F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL),            \
-		FIXED(QUERN_READ), F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),              \
-		F("contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                \
-		F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                   \
-		F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body"),                                     \
-		F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"),                                \
-		F("contact.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                \
-			.doc = "On the first, unweighted."),                                                             \
-		F("touch.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
-			.doc = "On the grain, unweighted."),                                                             \
-		F("contact.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                              \
-			.doc = "On the first, unweighted."),                                                             \
-		F("touch.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                                \
-			.doc = "On the grain, unweighted."),                                                             \
-		F("grain.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
-			.doc = "Of all contacts, weighted; without gravity."),                                           \
-		F("contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED,                       \
-			.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step."),         \
-		F("touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, .with = "total.rubbed", \
-			.doc = "In the tangential spring, weighted, at the last step."),                                 \
-		F("grain.id", "1", QUERN_READ, QUERN_ID)
-static const quern_use force_uses[] = { FORCE_USES(QUERN_UPDATE, QUERN_WRITE),
-	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), DISPLACEMENT,
-	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED),
-	F("total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED,
-		.doc = "Impulse that fixed grains have given to moving ones."),
-	ENERGY("damped", QUERN_UPDATE, "Lost in dashpots so far."),
-	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."),
-	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
-		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
-	F("total.deep_first", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", .initial = -1,
-		.doc = "Id of the grain whose deep contact is watched; -1: none is."),
-	F("total.deep_second", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
-		.doc = "Id of its partner; -1 - k for body k."),
-	F("total.deep_time", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
-		.doc = "For how long the contact has been deep."),
-	QUERN_END_USES };
-static const quern_use observe_uses[] = { FORCE_USES(QUERN_READ, QUERN_UPDATE),
-	ENERGY("kinetic", QUERN_WRITE, "Of the grains, with the velocity in the middle of a kick."),
-	ENERGY("potential", QUERN_WRITE, "Of the grains, -m g x."),
-	ENERGY("stored", QUERN_WRITE, "In normal springs."),
-	ENERGY("sheared", QUERN_WRITE, "In tangential springs."), QUERN_END_USES };
+static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
+static const quern_use open_uses[] = QUERN_USE_ROWS(OPEN_USES);
+static const quern_use near_uses[] = QUERN_USE_ROWS(NEAR_USES);
+static const quern_use force_uses[] = QUERN_USE_ROWS(FORCE_USES);
+static const quern_use observe_uses[] = QUERN_USE_ROWS(OBSERVE_USES);
 
 static const quern_stage stages[] = { { .name = "dem.fill",
 										  .doc = "Places the first grains.",

@@ -57,64 +57,12 @@ static const quern_slot slots[] = { { .name = "material",
 	{ .name = "bodies", .kind = QUERN_BODY, .list = 1, .stage = { "mpm.nodes" }, .same_as = "bodies" },
 	{ .name = NULL } };
 
-#define UNSORTED                                                                                             \
-	F("total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX,                                                      \
-		.doc = "1: points must be sorted before the next scatter.")
-#define IMPULSES                                                                                             \
-	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL),                           \
-		F("total.faces", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                         \
-			.doc =                                                                                           \
-				"Impulse on the continuum by closed faces of the domain and by the limit on light nodes.")
-static const quern_use fill_uses[] = { F("point.position", "m", QUERN_WRITE, QUERN_VECTOR,
-										   .flags = QUERN_SHOWN, .doc = "Position."),
-	F("point.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."),
-	F("point.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted."),
-	F("point.volume", "m^3", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, .doc = "Volume, unweighted."),
-	F("point.stress", "Pa", QUERN_WRITE, QUERN_SYMMETRIC, .doc = "Cauchy stress, tension positive."),
-	F("point.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1,
-		.doc = "Share of its mass that the point carries."),
-	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Stored elastic energy."),
-	UNSORTED, F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
-static const quern_use sort_uses[] = { F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR), UNSORTED,
-	QUERN_END_USES };
-static const quern_use scatter_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR),
-	F("point.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("point.volume", "m^3", QUERN_READ, QUERN_SCALAR), F("point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC),
-	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL),
-	F("node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass."),
-	F("node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum."),
-	F("node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force."),
-	F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .when = "affine"), QUERN_END_USES };
-static const quern_use nodes_uses[] = { F("node.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("motion.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."), IMPULSES,
-	F("motion.change", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity gained in this step."),
-	F("motion.density", "kg/m^3", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass of a node over its volume."),
-	F("node.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR), F("node.force", "N", QUERN_READ, QUERN_VECTOR),
-	QUERN_END_USES };
-static const quern_use walls_uses[] = { F("motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
-	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), IMPULSES,
-	F("motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR), QUERN_END_USES };
-static const quern_use gather_uses[] = { F("motion.velocity", "m/s", QUERN_READ, QUERN_VECTOR),
-	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR),
-	F("point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC),
-	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL,
-		.doc = "Velocity gradient of the last step."),
-	/* it is there if somebody wants it sent; that it shall be written out does not make it */
-	F("point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, .with = "point.affine",
-		.doc = "The same, sent to the nodes with the velocity."),
-	F("point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Minus the mean normal stress."),
-	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Stored elastic energy."),
-	F("point.wave_speed", "m/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Of pressure waves."),
-	UNSORTED, F("motion.change", "m/s", QUERN_READ, QUERN_VECTOR),
-	F("motion.density", "kg/m^3", QUERN_READ, QUERN_SCALAR), QUERN_END_USES };
+static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
+static const quern_use sort_uses[] = QUERN_USE_ROWS(SORT_USES);
+static const quern_use scatter_uses[] = QUERN_USE_ROWS(SCATTER_USES);
+static const quern_use nodes_uses[] = QUERN_USE_ROWS(NODES_USES);
+static const quern_use walls_uses[] = QUERN_USE_ROWS(WALLS_USES);
+static const quern_use gather_uses[] = QUERN_USE_ROWS(GATHER_USES);
 
 static const quern_stage stages[] = { { .name = "mpm.fill",
 										  .doc = "Places the first points.",

@@ -23,30 +23,19 @@ static const quern_param params[] = { QUERN_PARAM(drucker_prager, bulk_modulus, 
 		.from = "grain.critical_density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_END_PARAMS };
 
-enum { VOLUME, DEVIATOR, ASSIGNED_VOLUME, ASSIGNED_DEVIATOR };
-static const quern_use uses[] = { { .field = "point.volume_strain",
-									  .unit = "1",
-									  .doc = "J - 1, elastic; positive while the point is open.",
-									  .access = QUERN_UPDATE,
-									  .shape = QUERN_SCALAR },
-	{ .field = "point.deviator",
-		.unit = "1",
-		.doc = "Deviator of the isochoric elastic left Cauchy-Green strain.",
-		.access = QUERN_UPDATE,
-		.shape = QUERN_SYMMETRIC },
-	{ .field = "point.volume_strain",
-		.unit = "1",
-		.doc = "From stress.",
-		.access = QUERN_WRITE,
-		.shape = QUERN_SCALAR,
-		.hook = QUERN_MATERIAL_ASSIGN },
-	{ .field = "point.deviator",
-		.unit = "1",
-		.doc = "From stress.",
-		.access = QUERN_WRITE,
-		.shape = QUERN_SYMMETRIC,
-		.hook = QUERN_MATERIAL_ASSIGN },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(VOLUME, "point.volume_strain", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "J - 1, elastic; positive while the point is open.") \
+	X(DEVIATOR, "point.deviator", "1", QUERN_UPDATE, QUERN_SYMMETRIC, \
+		.doc = "Deviator of the isochoric elastic left Cauchy-Green strain.") \
+	X(ASSIGNED_VOLUME, "point.volume_strain", "1", QUERN_WRITE, QUERN_SCALAR, .hook = QUERN_MATERIAL_ASSIGN, \
+		.doc = "From stress.") \
+	X(ASSIGNED_DEVIATOR, "point.deviator", "1", QUERN_WRITE, QUERN_SYMMETRIC, .hook = QUERN_MATERIAL_ASSIGN, \
+		.doc = "From stress.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	drucker_prager *law = self;

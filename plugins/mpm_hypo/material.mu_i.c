@@ -31,14 +31,13 @@ static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
 		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 
-enum { SHEAR_RATE };
-static const quern_use uses[] = { { .field = "point.shear_rate",
-									  .unit = "1/s",
-									  .doc = "Equivalent plastic shear rate; of an open point the whole one.",
-									  .access = QUERN_WRITE,
-									  .shape = QUERN_SCALAR,
-									  .flags = QUERN_OPTIONAL },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(SHEAR_RATE, "point.shear_rate", "1/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Equivalent plastic shear rate; of an open point the whole one.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mu_i *law = self;

@@ -6,7 +6,7 @@ typedef struct {
 	int32_t unused;
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
-static const quern_use uses[] = { CLOUD_USES, QUERN_END_USES };
+static const quern_use uses[] = QUERN_USE_ROWS(CLOUD_USES);
 static const quern_output outputs[] = {
 	{ .name = "share", .unit = "1", .doc = "Of the carried mass, by grains." }, { .name = NULL }
 };

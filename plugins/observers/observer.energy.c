@@ -6,29 +6,23 @@ typedef struct {
 	int32_t unused;
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
-enum {
-	GRAIN_POSITION = CLOUD_ROWS,
-	GRAIN_VELOCITY,
-	GRAIN_SPIN,
-	GRAIN_RADIUS,
-	POINT_POSITION,
-	POINT_VELOCITY,
-	POINT_ENERGY,
-	STORED,
-	SHEARED,
-	DAMPED,
-	RUBBED,
-	EXCHANGED
-};
-#define LOOK(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_OPTIONAL)
-#define WANT(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_WANTED)
-static const quern_use uses[] = { CLOUD_USES, LOOK("grain.position", "m", QUERN_VECTOR),
-	LOOK("grain.velocity", "m/s", QUERN_VECTOR), LOOK("grain.spin", "rad/s", QUERN_AXIAL),
-	LOOK("grain.radius", "m", QUERN_SCALAR), LOOK("point.position", "m", QUERN_VECTOR),
-	LOOK("point.velocity", "m/s", QUERN_VECTOR), WANT("point.energy", "J/kg", QUERN_SCALAR),
-	WANT("total.stored", "J", QUERN_SCALAR), WANT("total.sheared", "J", QUERN_SCALAR),
-	WANT("total.damped", "J", QUERN_SCALAR), WANT("total.rubbed", "J", QUERN_SCALAR),
-	WANT("total.exchanged", "J", QUERN_SCALAR), QUERN_END_USES };
+/* clang-format off */
+#define OWN_USES(X) \
+	X(GRAIN_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(POINT_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(POINT_VELOCITY, "point.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(POINT_ENERGY, "point.energy", "J/kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(STORED, "total.stored", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(SHEARED, "total.sheared", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(DAMPED, "total.damped", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(RUBBED, "total.rubbed", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED)
+/* clang-format on */
+QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
+static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 
 enum { KINETIC, SPINNING, POINTS, POTENTIAL, SPRINGS, TANGENTIAL, ELASTIC, DASHPOTS, SLIDING, COUPLING, SUM };
 static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = "Kinetic, of grains." },

@@ -7,14 +7,17 @@ typedef struct {
 	int32_t unused;
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
-enum { GRAIN_OWED = CLOUD_ROWS, POINT_OWED, MASS, MASS_DEFECT, MOMENTUM_DEFECT, EXCHANGE_DEFECT };
-static const quern_use uses[] = { CLOUD_USES,
-	F("cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.mass_initial", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
+/* clang-format off */
+#define OWN_USES(X) \
+	X(GRAIN_OWED, "cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(POINT_OWED, "cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(MASS, "total.mass_initial", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(EXCHANGE_DEFECT, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
+/* clang-format on */
+QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
+static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 static const quern_output outputs[] = {
 	{ .name = "entries", .unit = "1", .doc = "Sum of |entries| over the mass." },
 	{ .name = "carried", .unit = "1", .doc = "Carried mass over that at the release, minus 1." },

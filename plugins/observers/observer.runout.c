@@ -20,10 +20,13 @@ static const quern_param params[] = { QUERN_PARAM(observer, axis, "1", "Axis of 
 	QUERN_PARAM(observer, diameter, "m", "Mean diameter of the grains.", .from = "grain.diameter",
 		.flags = QUERN_MAYBE | QUERN_ADVANCED),
 	QUERN_END_PARAMS };
-enum { GRAIN_POSITION = CLOUD_ROWS, POINT_POSITION };
-static const quern_use uses[] = { CLOUD_USES,
-	F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
-	F("point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
+/* clang-format off */
+#define OWN_USES(X) \
+	X(GRAIN_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(POINT_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL)
+/* clang-format on */
+QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
+static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 static const quern_output outputs[] = {
 	{ .name = "front", .unit = "m", .doc = "Quantile of the connected mass, from the origin." },
 	{ .name = "height",

@@ -4,14 +4,16 @@
 #include "../common/cloud.h"
 #include "../common/tools.h"
 
-/* The first rows of every observer of both clouds, in this order. */
-#define CLOUD_USES                                                                                           \
-	F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),                                \
-		F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),                           \
-		F("grain.fixed", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL),                             \
-		F("point.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),                            \
-		F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
-enum { GRAIN_MASS, GRAIN_WEIGHT, GRAIN_FIXED, POINT_MASS, POINT_WEIGHT, CLOUD_ROWS };
+/* The first rows of every observer of both clouds. */
+/* clang-format off */
+#define CLOUD_USES(X) \
+	X(GRAIN_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_FIXED, "grain.fixed", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL) \
+	X(POINT_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(POINT_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
+/* clang-format on */
+QUERN_USE_ENUM(CLOUD_USES);
 
 /* A cloud, empty if this scene has none. */
 QUERN_INLINE cloud observed(const quern_observer_batch *b, bool point) {

@@ -15,13 +15,13 @@ static const quern_param params[] = {
 	QUERN_PARAM(surface, walls, NULL, "Walls and floors count as surface too, so that grains meet them."),
 	QUERN_END_PARAMS
 };
-enum { FRACTION };
-static const quern_use uses[] = { { .field = "cell.packing_fraction",
-									  .unit = "1",
-									  .doc = "Of grains; 1 where the continuum fills the cell.",
-									  .access = QUERN_READ,
-									  .shape = QUERN_SCALAR },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(FRACTION, "cell.packing_fraction", "1", QUERN_READ, QUERN_SCALAR, \
+		.doc = "Of grains; 1 where the continuum fills the cell.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return band_check(&((const surface *)self)->band, setup, err, "at the surface");

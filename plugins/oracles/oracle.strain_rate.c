@@ -20,20 +20,15 @@ static const quern_param params[] = { QUERN_PARAM(shear, shear_rate, "1/s",
 	QUERN_PARAM(shear, by_rate, NULL, "Keep the shear rate; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_PARAM(shear, by_number, NULL, "Keep the inertial number; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
-enum { RATE, NUMBER };
-static const quern_use uses[] = { { .field = "cell.shear_rate",
-									  .unit = "1/s",
-									  .doc = "Of the mean velocity of both.",
-									  .when = "by_rate",
-									  .access = QUERN_READ,
-									  .shape = QUERN_SCALAR },
-	{ .field = "cell.inertial_number",
-		.unit = "1",
-		.doc = "Shear rate times d sqrt(rho/p).",
-		.when = "by_number",
-		.access = QUERN_READ,
-		.shape = QUERN_SCALAR },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(RATE, "cell.shear_rate", "1/s", QUERN_READ, QUERN_SCALAR, .when = "by_rate", \
+		.doc = "Of the mean velocity of both.") \
+	X(NUMBER, "cell.inertial_number", "1", QUERN_READ, QUERN_SCALAR, .when = "by_number", \
+		.doc = "Shear rate times d sqrt(rho/p).")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	shear *p = self;
