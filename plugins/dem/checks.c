@@ -44,11 +44,11 @@ static bool is_worse(const deep_contact *a, const deep_contact *b) {
 	return a->first != b->first ? a->first < b->first : a->second < b->second;
 }
 
-void quern_dem_check_contacts(
-	const forces_shared *sh, const forces_work *w, uint32_t b, int32_t body, uint32_t n) {
+void quern_dem_check_contacts(const forces_shared *sh, const forces_work *w, const contact_chunk *chunk) {
+	const uint32_t b = chunk->block;
 	const quern_real *radius = sh->use[FORCE_RADIUS].real[0];
 	const int64_t *id = sh->use[FORCE_ID].id;
-	for (uint32_t q = 0; q < n; q++) {
+	for (uint32_t q = 0; q < chunk->n; q++) {
 		const quern_real r = radius[w->first[q]], other = radius[w->second[q]], small = r < other ? r : other;
 		if (!(w->overlap[q] > sh->d->overlap_most * small)) continue;
 		quern_real f2 = 0;
@@ -57,7 +57,7 @@ void quern_dem_check_contacts(
 			.force = sqrt(f2),
 			.period = INFINITY,
 			.first = id[w->first[q]],
-			.second = body < 0 ? id[w->second[q]] : -1 - body };
+			.second = chunk->body < 0 ? id[w->second[q]] : -1 - chunk->body };
 		ask_laws(sh, &c, w->mass[q], w->radius[q]);
 		if (is_worse(&c, &sh->worst[b])) sh->worst[b] = c;
 		if (!sh->looks && is_watched(sh, &c)) sh->watched[b] = c;

@@ -8,12 +8,12 @@
 
 /* ---- contacts ---- */
 
-void quern_dem_look(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t n,
-	uint32_t begin, uint32_t end, quern_real *sums) {
-	for (uint32_t q = 0; q < n; q++) {
+void quern_dem_look(const forces_shared *sh, const forces_work *w, const contact_chunk *c, quern_real *sums) {
+	const uint32_t begin = sh->grain[c->block], end = sh->grain[c->block + 1];
+	for (uint32_t q = 0; q < c->n; q++) {
 		const uint32_t i = (uint32_t)w->first[q];
 		const quern_real share = sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1;
-		if (held) held[w->slot[q]] = w->overlap[q] > 0 ? share * w->sheared[q] : 0;
+		if (c->held) c->held[w->slot[q]] = w->overlap[q] > 0 ? share * w->sheared[q] : 0;
 		if (i < begin || i >= end) continue;
 		sums[E_STORED] += share * w->stored[q];
 		sums[E_SHEARED] += share * w->sheared[q];
