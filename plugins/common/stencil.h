@@ -119,3 +119,26 @@ QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *
 	out[0] = sum;
 	if (slopes) out[1] = sx, out[2] = sy, out[3] = sz;
 }
+
+/* ---- all blocks, where they add to nodes ---- */
+
+typedef struct stencil_blocks {
+	void (*body)(void *arg, uint32_t block, uint32_t worker);
+	void *arg;
+	const uint32_t *list; /* of one colour */
+} stencil_blocks;
+
+static inline void stencil_one_block(void *arg, uint32_t i, uint32_t worker) {
+	const stencil_blocks *all = arg;
+	all->body(all->arg, all->list[i], worker);
+}
+
+/* Colour by colour, so that no two blocks whose tiles share a node run at once, and each node sums in a fixed order. */
+static inline void stencil_by_colour(const quern_step *s, const quern_grid_view *g,
+	void (*body)(void *arg, uint32_t block, uint32_t worker), void *arg) {
+	stencil_blocks all = { body, arg, NULL };
+	for (uint32_t c = 0; c < g->n_colours; c++) {
+		all.list = g->by_colour + g->colour[c];
+		s->host->parallel(s->run, g->colour[c + 1] - g->colour[c], stencil_one_block, &all);
+	}
+}

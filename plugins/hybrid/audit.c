@@ -11,12 +11,17 @@ typedef struct {
 } sums;
 
 static bool add_cloud(const quern_step *s, const cloud *of, const quern_column *velocity, sums *out) {
+	quern_real *square = s->host->memory(s->run, ((size_t)of->n + 1) * sizeof(quern_real));
 	cloud_sums c;
-	if (!cloud_open(&c, s->host, s->run, of)) return false;
+	if (!square || !cloud_open(&c, s->host, s->run, of)) return false;
 	out->carried += cloud_total(&c);
-	for (uint32_t k = 0; k < s->dim; k++) CLOUD_ADD(&c, i, velocity->real[k][i], out->momentum[k]);
-	CLOUD_ADD(&c, i, sqrt(cloud_square(velocity, i, s->dim)), out->speed);
-	CLOUD_ADD(&c, i, 0.5 * cloud_square(velocity, i, s->dim), out->kinetic);
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real *v = velocity->real[k];
+		CLOUD_ADD(&c, i, v[i], out->momentum[k]);
+	}
+	for (uint32_t i = 0; i < of->n; i++) square[i] = cloud_square(velocity, i, s->dim);
+	CLOUD_ADD(&c, i, sqrt(square[i]), out->speed);
+	CLOUD_ADD(&c, i, 0.5 * square[i], out->kinetic);
 	return true;
 }
 
