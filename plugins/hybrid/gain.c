@@ -1,30 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /* gain - motion that nobody has given: docs/theory/hybrid.md, section 5 */
 #include "../common/symmetric.h"
-#include "hybrid.h"
+#include "contacts.h"
 #include <math.h>
 
-/* A spring that stiffens holds less than half of force times overlap, and the tangential one about as much again. Pairs across
- * blocks stand in both. */
+/* A spring that stiffens holds less than half of force times overlap, and the tangential one about as much again. */
 static quern_real in_contacts(const quern_step *s) {
-	const quern_column *u = s->use;
-	const quern_set_view contacts = s->host->set(s->run, "contact"), grains = s->host->set(s->run, "grain");
+	const contact_list list = contacts_of(s, A_FORCE, A_FIRST, A_SECOND, A_GRAIN_POSITION);
+	const quern_real *radius = s->use[A_GRAIN_RADIUS].real[0];
 	quern_real sum = 0;
-	for (uint32_t b = 0; b < contacts.n_blocks; b++)
-		for (uint32_t q = contacts.block[b]; q < contacts.block[b + 1]; q++) {
-			const int32_t i = u[A_FIRST].index[q], j = u[A_SECOND].index[q];
-			quern_real distance2 = 0, force2 = 0;
-			if (i < (int32_t)grains.block[b] || i >= (int32_t)grains.block[b + 1]) continue;
-			for (uint32_t k = 0; k < s->dim; k++) {
-				const quern_real length = s->upper[k] - s->lower[k], f = u[A_FORCE].real[k][q];
-				quern_real x = u[A_GRAIN_POSITION].real[k][i] - u[A_GRAIN_POSITION].real[k][j];
-				if (s->periodic[k]) x -= length * floor(x / length + 0.5);
-				distance2 += x * x;
-				force2 += f * f;
-			}
-			const quern_real overlap =
-				u[A_GRAIN_RADIUS].real[0][i] + u[A_GRAIN_RADIUS].real[0][j] - sqrt(distance2);
-			if (overlap > 0) sum += sqrt(force2) * overlap;
+	contact_seen c;
+	for (uint32_t b = 0; b < list.contacts.n_blocks; b++)
+		for (uint32_t q = list.contacts.block[b]; q < list.contacts.block[b + 1]; q++) {
+			if (!contact_at(&list, b, q, &c)) continue;
+			const quern_real overlap = radius[c.first] + radius[c.second] - sqrt(c.distance2);
+			if (overlap > 0) sum += sqrt(c.force2) * overlap;
 		}
 	return sum;
 }
