@@ -92,8 +92,8 @@ typedef struct quern_grid_cursor {
 	int32_t block, at[3];
 } quern_grid_cursor;
 
-/* Entry of a cell in the set "cell", or of the node at its lower corner in a row set; -1 where it does not exist. The last
- * block is tried first. */
+/* Entry of a cell in the set "cell", or of the node at its lower corner in a row set; -1 where it does not exist. The
+ * last block is tried first. */
 static inline int32_t quern_grid_entry_near(
 	const quern_grid_view *g, quern_grid_cursor *last, const int32_t cell[3]) {
 	const int32_t edge = (int32_t)g->edge;
@@ -117,7 +117,8 @@ static inline int32_t quern_grid_entry(const quern_grid_view *g, const int32_t c
 	return quern_grid_entry_near(g, &none, cell);
 }
 
-/* The entry of a cell that may lie beyond a periodic face, through which it is brought back; -1 where it does not exist. */
+/* The entry of a cell that may lie beyond a periodic face, through which it is brought back; -1 where it does not
+ * exist. */
 QUERN_INLINE int32_t quern_grid_entry_back(const quern_grid_view *g, int32_t cell[3]) {
 	return quern_grid_bring_back(g, cell) ? quern_grid_entry(g, cell) : -1;
 }

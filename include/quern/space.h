@@ -23,7 +23,8 @@ QUERN_INLINE int32_t quern_cell_held(int32_t c, int32_t n) { return c < 0 ? 0 : 
 
 /* ==== nearest images ==== */
 
-/* Half of the domain's length and the length, by axis; infinite and 0 where it is not periodic: no kernel has to ask. */
+/* Half of the domain's length and the length, by axis; infinite and 0 where it is not periodic: no kernel has to
+ * ask. */
 typedef struct quern_images {
 	quern_real half[3], length[3];
 } quern_images;

@@ -27,8 +27,8 @@ void quern_placer_finish(placer *);
 void quern_placer_add(placer *, const quern_spot *);
 /* No overlap with grains or bodies above 1e-9 of the spot's radius. */
 bool quern_placer_free(const placer *, const quern_spot *);
-/* The grain that a spot overlaps most, of those that `counts` is true of (NULL: all), by more than `share` of the smaller radius,
- * and by what share; -1: none. Grains are numbered as they were added. */
+/* The grain that a spot overlaps most, of those that `counts` is true of (NULL: all), by more than `share` of the
+ * smaller radius, and by what share; -1: none. Grains are numbered as they were added. */
 int32_t quern_placer_worst(const placer *, const quern_spot *, quern_real share,
 	bool (*counts)(const void *arg, int32_t), const void *arg, quern_real *by);
 /* Appends to `out` (capacity `cap`) the grains whose centre is within `reach` of the box; along periodic axes as the

@@ -4,8 +4,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Lists 0 .. n - 1 by bucket, in their own order within each: those of bucket b are list[begin[b]] .. list[begin[b + 1]],
- * and whoever has a negative bucket is in none. `begin` holds n_buckets + 2 zeros at first. */
+/* Lists 0 .. n - 1 by bucket, in their own order within each. Those of bucket b stand in `list` from begin[b] to
+ * begin[b + 1]; whoever has a negative bucket is in none. `begin` holds n_buckets + 2 zeros at first. */
 static inline void quern_bucket(
 	uint32_t n, const int32_t *bucket, uint32_t n_buckets, uint32_t *begin, int32_t *list) {
 	for (uint32_t i = 0; i < n; i++)

@@ -13,8 +13,8 @@ typedef struct stencil {
 	int32_t node[STENCIL]; /* of the lowest node, in the tile */
 } stencil;
 
-/* Grains come back through a periodic face when their list is made, not before: here each is taken as the image that lies
- * in its block, wherever round-off puts the block's faces. */
+/* Grains come back through a periodic face when their list is made, not before: here each is taken as the image that
+ * lies in its block, wherever round-off puts the block's faces. */
 QUERN_INLINE void stencil_place(const quern_grid_view *g, uint32_t block, uint32_t axis, const quern_real *x,
 	const int32_t *index, uint32_t n, quern_real *restrict position) {
 	const int32_t edge = (int32_t)g->edge, begin = g->at[block][axis] * edge, rest = g->cells[axis] - begin;

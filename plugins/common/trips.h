@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* trips - from nodes to particles through a transfer, and round trips before that: what a transfer sends goes to the nodes
- * with the particles' mass, and its echo comes back. For points and grains alike. */
+/* trips - from nodes to particles through a transfer, and round trips before that: what a transfer sends goes to the
+ * nodes with the particles' mass, and its echo comes back. For points and grains alike. */
 #pragma once
 #include "stencil.h"
 #include "tools.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* checks - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains out of the
- * domain. docs/decisions/0015-too-deep.md */
+/* checks - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains
+ * out of the domain. docs/decisions/0015-too-deep.md */
 #include "forces.h"
 #include <math.h>
 #include <stdio.h>
@@ -103,9 +103,10 @@ static quern_status stop_deep(const forces_shared *sh, const deep_contact *c, co
 		partner, c->by, how, c->force, remedy, sh->d->overlap_most);
 }
 
-/* An impact may go deep for a while, and one contact after another may: so one is watched, the deepest at first, until it is
- * no longer deep. One that is watched for several of its own durations lasts; a centre behind a surface is enough at once.
- * What falls into place while settling bears the shock of all that falls behind it, which is over by the release. */
+/* An impact may go deep for a while, and one contact after another may: so one is watched, the deepest at first,
+ * until it is no longer deep. One that is watched for several of its own durations lasts; a centre behind a surface
+ * is enough at once. What falls into place while settling bears the shock of all that falls behind it, which is over
+ * by the release. */
 quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_column *u = sh->use;
 	deep_contact worst = { .by = 0 }, watched = { .by = 0 };

@@ -125,8 +125,8 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 	return contact / __builtin_sqrt(turning > 1 ? turning : 1);
 }
 
-/* sqrt 5 zeta sqrt(m k) d^(1/4) over 2 sqrt(m k_n), k_n = (3/2) k sqrt d; and 2 sqrt(5/6) zeta sqrt(k_t m) over 2 sqrt(m k_t),
- * on m/3 or m/3.5. */
+/* sqrt 5 zeta sqrt(m k) d^(1/4) over 2 sqrt(m k_n), k_n = (3/2) k sqrt d; and 2 sqrt(5/6) zeta sqrt(k_t m) over 2
+ * sqrt(m k_t), on m/3 or m/3.5. */
 static quern_real damping(const void *self, uint32_t dim) {
 	const hertz *law = self;
 	const quern_real share = 0.91287092917527686 * law->damping_ratio; /* sqrt(5/6) */

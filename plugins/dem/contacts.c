@@ -3,8 +3,8 @@
 #include "forces.h"
 #include <string.h>
 
-/* What sliding takes of n contacts, with their weights, and what springs give up that have opened since the last step: no
- * law sees that. The springs' energy is kept in `held`, by slot, which may be NULL. */
+/* What sliding takes of n contacts, with their weights, and what springs give up that have opened since the last
+ * step: no law sees that. The springs' energy is kept in `held`, by slot, which may be NULL. */
 static void book_sliding(const forces_work *w, const quern_real *weight, quern_real *held, uint32_t n) {
 	const quern_real *restrict overlap = w->overlap, *restrict sheared = w->sheared;
 	const int32_t *restrict slot = w->slot;

@@ -291,7 +291,8 @@ static quern_status refuse_two_steps(const quern_step *s) {
 		"%s acts in two steps, and the books of a hybrid take one: use symplectic_euler", integrator->id);
 }
 
-/* Grains stand for stiff ones: where their weight alone presses them into each other, the bed is too dense and too low. */
+/* Grains stand for stiff ones: where their weight alone presses them into each other, the bed is too dense and too
+ * low. */
 static void warn_of_softness(const dem *d, const quern_step *s) {
 	bool loose = false;
 	for (uint32_t i = 0; i < d->fill.n; i++) loose = loose || !((const dem_fill *)d->fill.items)[i].fixed;

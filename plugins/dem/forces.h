@@ -19,8 +19,8 @@ enum {
 	G_NEW_SPIN = 22,
 	N_GRAIN_COLUMNS = 25
 };
-/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in 3-D
- * have a row of their own. */
+/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in
+ * 3-D have a row of their own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 

@@ -81,8 +81,8 @@ static quern_status sort_grains(listing *l) {
 
 /* ---- pairs ---- */
 
-/* One of the two passes of a sort by two numbers: by the id of the second grains, then, keeping that order among equals,
- * of the first. */
+/* One of the two passes of a sort by two numbers: by the id of the second grains, then, keeping that order among
+ * equals, of the first. */
 static void sort_by_id(const listing *l, quern_pair *pair, uint32_t n, bool second, uint64_t *memory) {
 	uint64_t *key = memory, *work = key + n;
 	int32_t *from = (int32_t *)(void *)(work + quern_sort_bytes(n) / sizeof *work + 1);
@@ -93,8 +93,8 @@ static void sort_by_id(const listing *l, quern_pair *pair, uint32_t n, bool seco
 	for (uint32_t i = 0; i < n; i++) pair[i] = copy[from[i]];
 }
 
-/* The first of a pair is the one of lower id, for ever. In the order of ids, every grain adds up its forces in the order
- * of its partners' ids: sums have the same bits for any search, in whatever order it keeps the grains. */
+/* The first of a pair is the one of lower id, for ever. In the order of ids, every grain adds up its forces in the
+ * order of its partners' ids: sums have the same bits for any search, in whatever order it keeps the grains. */
 static bool sort_pairs(const listing *l, quern_pair *pair, uint32_t n, uint32_t worker) {
 	const size_t bytes = quern_sort_bytes(n) + (n + 2) * (sizeof(uint64_t) + sizeof(int32_t) + sizeof *pair);
 	uint64_t *memory = l->s->host->scratch(l->s->run, worker, bytes);
@@ -231,7 +231,8 @@ static uint32_t find_features(const listing *l, const quern_bound *body, uint32_
 	return ops->features(body->self, &still, x, l->job.radius[i] + l->job.reach, MOST_FEATURES, w->feature);
 }
 
-/* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too many. */
+/* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too
+ * many. */
 static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, const uint32_t *to) {
 	const quern_step *s = l->s;
 	uint32_t n = 0;

@@ -2,8 +2,8 @@
 /* pairs - contacts between grains of one block: the distance test, geometry and motion */
 #include "forces.h"
 
-/* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what it
- * held is booked. */
+/* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what
+ * it held is booked. */
 QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n,
 	const quern_real *held, const int dim) {
 	const quern_column at = sh->use[FORCE_OLD_POSITION];

@@ -266,8 +266,8 @@ typedef struct {
 	uint32_t others; /* laws beside that one */
 } contact_limit;
 
-/* The fastest mode of a packing: a grain has several contacts. omega_max^2 = 6 k/m of a triangular lattice and 8 k/m of a
- * face-centred one are 3 and 4 times that of a pair. */
+/* The fastest mode of a packing: a grain has several contacts. omega_max^2 = 6 k/m of a triangular lattice and 8 k/m
+ * of a face-centred one are 3 and 4 times that of a pair. */
 static quern_real crowding(uint32_t dim) { return dim == 2 ? 1.7320508075688772 : 2; }
 
 /* All laws together: stiffnesses add up, and so do the squares of frequencies; damping coefficients too. */
@@ -316,29 +316,44 @@ static void say_limit(
 		by_period ? " / 50" : "", damped);
 }
 
+typedef struct {
+	quern_real mass[2],
+		radius; /* of the two lightest, the second infinite if there is one alone; of the lightest */
+} lightest;
+
+/* Before there are grains, what the distribution may bring. */
+static lightest lightest_grains(const dem *d, const quern_step *s) {
+	const uint32_t n = s->host->set(s->run, "grain").n;
+	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
+	const int32_t *fixed = s->use[FILL_FIXED].index;
+	lightest l = { { INFINITY, INFINITY }, INFINITY };
+	for (uint32_t i = 0; i < n; i++) {
+		if (fixed && fixed[i]) continue;
+		if (mass[i] < l.mass[0]) l.mass[1] = l.mass[0], l.mass[0] = mass[i], l.radius = radius[i];
+		else if (mass[i] < l.mass[1]) l.mass[1] = mass[i];
+	}
+	if (isfinite(l.mass[0])) return l;
+	l.radius = quern_radius_least(&d->radii);
+	l.mass[0] = l.mass[1] = quern_radius_mass(l.radius, d->density, d->dim);
+	return l;
+}
+
+static contact_limit limit_of_pair(const quern_step *s, const lightest *l) {
+	const bool two = isfinite(l->mass[1]);
+	const quern_real pair = two ? l->mass[0] * l->mass[1] / (l->mass[0] + l->mass[1]) : l->mass[0];
+	contact_limit c = limit_of(s, pair, 0.5 * l->radius, -1);
+	c.where = two ? "between the two lightest grains" : "on the lightest grain";
+	return c;
+}
+
 /* The stiffest contact is that of the two lightest grains, or of the lightest against a body. */
 static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	const dem *d = self;
-	const quern_set_view grains = s->host->set(s->run, "grain");
-	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
-	const int32_t *fixed = s->use[FILL_FIXED].index;
-	quern_real least[2] = { INFINITY, INFINITY }, small = INFINITY;
-	for (uint32_t i = 0; i < grains.n; i++) {
-		if (fixed && fixed[i]) continue;
-		if (mass[i] < least[0]) least[1] = least[0], least[0] = mass[i], small = radius[i];
-		else if (mass[i] < least[1]) least[1] = mass[i];
-	}
-	if (!isfinite(least[0])) { /* none yet: what the distribution may bring */
-		small = quern_radius_least(&d->radii);
-		least[0] = least[1] = quern_radius_mass(small, d->density, d->dim);
-	}
-	const bool two = isfinite(least[1]);
-	const quern_real pair = two ? least[0] * least[1] / (least[0] + least[1]) : least[0];
-	contact_limit fast = limit_of(s, pair, 0.5 * small, -1);
-	fast.where = two ? "between the two lightest grains" : "on the lightest grain";
-	contact_limit first = fast; /* to fail when the step grows */
+	const lightest l = lightest_grains(d, s);
+	contact_limit fast = limit_of_pair(s, &l),
+				  first = fast; /* the shortest; the first to fail when the step grows */
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
-		const contact_limit c = limit_of(s, least[0], small, (int32_t)b);
+		const contact_limit c = limit_of(s, l.mass[0], l.radius, (int32_t)b);
 		if (c.period < fast.period) fast = c;
 		if (c.hard < first.hard) first = c;
 	}

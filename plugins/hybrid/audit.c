@@ -52,8 +52,8 @@ static bool take_sums(const quern_step *s, sums *out) {
 	return true;
 }
 
-/* A leak shows in the step that makes it. What adds up over a run is also the round-off of every v += g dt, which has the
- * same sign for long: half a unit in the last place for each grain step is allowed on top. */
+/* A leak shows in the step that makes it. What adds up over a run is also the round-off of every v += g dt, which has
+ * the same sign for long: half a unit in the last place for each grain step is allowed on top. */
 static quern_status judge_momentum(const quern_step *s, const sums *now) {
 	const quern_column *u = s->use;
 	quern_real off = 0, leak = 0, pull = 0;

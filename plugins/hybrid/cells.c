@@ -35,18 +35,13 @@ static void *take(update *d, size_t count, size_t size) {
 	return memory;
 }
 
-static bool owes(const quern_column *u, int mass, int momentum, uint32_t dim, uint32_t k) {
-	bool any = u[mass].real[0][k] != 0;
-	for (uint32_t a = 0; a < dim; a++) any = any || u[momentum].real[a][k] != 0;
-	return any;
-}
-
-/* Blocks whose cells owe or are owed something stay, wherever the material has gone. */
+/* Blocks of whose cells something is owed to a cloud stay, wherever the material has gone. */
 static bool holds(const void *arg, uint32_t block) {
 	const quern_step *s = arg;
+	const quern_column *u = s->use;
 	for (uint32_t k = block * N; k < (block + 1) * N; k++)
-		if (owes(s->use, U_GRAIN_OWED, U_GRAIN_OWED_MOMENTUM, s->dim, k) ||
-			owes(s->use, U_POINT_OWED, U_POINT_OWED_MOMENTUM, s->dim, k))
+		if (quern_hybrid_is_owed(u[U_GRAIN_OWED].real[0], u[U_GRAIN_OWED_MOMENTUM].real, k, s->dim) ||
+			quern_hybrid_is_owed(u[U_POINT_OWED].real[0], u[U_POINT_OWED_MOMENTUM].real, k, s->dim))
 			return true;
 	return false;
 }
@@ -160,7 +155,8 @@ static void spread_grain(const update *d, uint32_t i, quern_real times, quern_re
 			}
 }
 
-/* Fixed grains are walls: as densely as they may lie, they leave no room. Where nothing moves between them nothing will. */
+/* Fixed grains are walls: as densely as they may lie, they leave no room. Where nothing moves between them nothing
+ * will. */
 void quern_hybrid_fixed(update *d) {
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
 	quern_real *taken = fixed ? take(d, d->n_cells, sizeof(quern_real)) : NULL;
@@ -174,8 +170,8 @@ void quern_hybrid_fixed(update *d) {
 	}
 }
 
-/* Of the room that bodies and fixed grains leave. A cell with a tenth of the mass that fills it in points is full: so is what
- * points stand for. */
+/* Of the room that bodies and fixed grains leave. A cell with a tenth of the mass that fills it in points is full: so
+ * is what points stand for. */
 void quern_hybrid_fractions(update *d) {
 	const quern_column *u = d->u;
 	quern_real *fraction = u[U_FRACTION].real[0];
@@ -192,8 +188,8 @@ void quern_hybrid_fractions(update *d) {
 	}
 }
 
-/* The share of a cell's hat in which there can be contacts: bodies and fixed grains hold none. What lies behind a face of the domain is
- * sampled before it. */
+/* The share of a cell's hat in which there can be contacts: bodies and fixed grains hold none. What lies behind a
+ * face of the domain is sampled before it. */
 static quern_real room_of(const update *d, uint32_t c) {
 	const int depth = d->s->dim == 3 ? 1 : 0;
 	int32_t cell[3];

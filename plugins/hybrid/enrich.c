@@ -27,7 +27,7 @@ static quern_real waiting(const enriching *e) {
 }
 
 /* Half a grain over would never be paid back: a grain is placed while more than all of it is owed. */
-static bool owes(const enriching *e) {
+static bool is_owed(const enriching *e) {
 	return e->rest > grain_share(e->d->zone[e->c]) * mass_of(e->d->h, waiting(e));
 }
 
@@ -63,7 +63,7 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	e->rest -= g->weight * mass_of(d->h, g->radius);
 	e->draws++;
 	d->failed = d->failed || e->placer.failed;
-	return !d->failed && owes(e);
+	return !d->failed && is_owed(e);
 }
 
 /* ---- the motion of the flow around ---- */
@@ -186,7 +186,7 @@ static void enrich_cell(enriching *e, uint32_t c) {
 	e->c = c;
 	e->rest = d->u[U_GRAIN_OWED].real[0][c];
 	e->first = d->n_new_grains;
-	if (!owes(e) || !quern_grid_cell_of(d->g, c, cell)) return;
+	if (!is_owed(e) || !quern_grid_cell_of(d->g, c, cell)) return;
 	for (uint32_t k = 0; k < 3; k++) {
 		e->lower[k] = k < d->s->dim ? d->g->lower[k] + cell[k] * d->g->cell : 0;
 		e->upper[k] = k < d->s->dim ? e->lower[k] + d->g->cell : 0;
@@ -244,7 +244,7 @@ quern_status quern_hybrid_grains(update *d) {
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		e.c = c;
 		e.rest = d->u[U_GRAIN_OWED].real[0][c];
-		any = any || (d->zone[c] == QUERN_HYBRID && owes(&e));
+		any = any || (d->zone[c] == QUERN_HYBRID && is_owed(&e));
 	}
 	if (!any) return QUERN_OK;
 	d->failed = d->failed || !place_obstacles(&e);

@@ -52,9 +52,9 @@ static quern_real in_points(const quern_step *s) {
 
 quern_real quern_hybrid_held(const quern_step *s) { return in_contacts(s) + in_spins(s) + in_points(s); }
 
-/* Bodies that stand still do no work, contacts and the coupling take energy. Twice what there can be, since a conversion may
- * make some; what lifts all by a diameter, since steps within their limits keep energy about as well as that; and, where
- * nothing pulls, what round-off moves: a millionth of a diameter in a step. */
+/* Bodies that stand still do no work, contacts and the coupling take energy. Twice what there can be, since a
+ * conversion may make some; what lifts all by a diameter, since steps within their limits keep energy about as well
+ * as that; and, where nothing pulls, what round-off moves: a millionth of a diameter in a step. */
 quern_status quern_hybrid_judge_gain(
 	const hybrid *h, const quern_step *s, quern_real kinetic, quern_real carried) {
 	const quern_real had = s->use[A_ENERGY].real[0][0], work = s->use[A_WORK].real[0][0];

@@ -25,10 +25,14 @@ static void shift(entry e, uint32_t to, entry from, uint32_t c, uint32_t dim) {
 	}
 }
 
+bool quern_hybrid_is_owed(const quern_real *mass, quern_real *const *momentum, uint32_t cell, uint32_t dim) {
+	bool any = mass[cell] != 0;
+	for (uint32_t k = 0; k < dim; k++) any = any || momentum[k][cell] != 0;
+	return any;
+}
+
 static bool is_empty(entry e, uint32_t c, uint32_t dim) {
-	bool any = e.mass[c] != 0;
-	for (uint32_t k = 0; k < dim; k++) any = any || e.momentum[k][c] != 0;
-	return !any;
+	return !quern_hybrid_is_owed(e.mass, e.momentum, c, dim);
 }
 
 /* ---- entries move with the material ---- */

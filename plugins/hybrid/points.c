@@ -50,8 +50,8 @@ static void part_centre(const update *d, const int32_t cell[3], uint32_t part, q
 		x[k] = k < d->s->dim ? d->g->lower[k] + (cell[k] + (part >> k & 1 ? 0.75 : 0.25)) * d->g->cell : 0;
 }
 
-/* Marks the parts whose middle cannot be seen from particle i of the cell, since a body is in the way, unless that is true
- * of all; returns how many are left. */
+/* Marks the parts whose middle cannot be seen from particle i of the cell, since a body is in the way, unless that is
+ * true of all; returns how many are left. */
 static uint32_t close_parts(
 	const update *d, uint32_t c, const int32_t cell[3], quern_real *const x[3], int32_t i, bool closed[8]) {
 	const quern_images images = quern_grid_images(d->g);
@@ -161,9 +161,9 @@ static void settle(update *d, uint32_t c) {
 	} else if (owed < 0 && held > 0) shrink(d, c, mass, held);
 }
 
-/* ---- few and many: what parts and joins keeps mass, momentum and volume, and with them the density: an open point stays
- *      open. Stress is the mean by volume, so that the sum of V sigma stays; history that goes with the stress is the mean by
- *      mass. Whatever else a point remembers is that of the heavier one. ---- */
+/* ---- few and many: what parts and joins keeps mass, momentum and volume, and with them the density: an open point
+ * stays open. Stress is the mean by volume, so that the sum of V sigma stays; history that goes with the stress is
+ * the mean by mass. Whatever else a point remembers is that of the heavier one. ---- */
 
 /* What the material's state-from-stress writes. Entry `to` gets the share of what entry i has. */
 static void mix_history(const update *d, uint32_t to, uint32_t i, quern_real share) {

@@ -38,8 +38,8 @@ static void add(sampling *p, quern_vec at, quern_vec f, quern_vec b) {
 	}
 }
 
-/* The branch goes from centre to centre, or between a centre and the contact where the other grain is fixed: that one is a
- * wall. */
+/* The branch goes from centre to centre, or between a centre and the contact where the other grain is fixed: that one
+ * is a wall. */
 static void sample_contact(sampling *p, const contact_seen *c) {
 	const quern_column *u = p->s->use;
 	const int32_t *fixed = u[S_FIXED].index;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* walls - bodies as cells see them: how far the nearest surface is, how much of a cell is open, and what stands between two
- * cells. docs/theory/hybrid.md, section 3 */
+/* walls - bodies as cells see them: how far the nearest surface is, how much of a cell is open, and what stands
+ * between two cells. docs/theory/hybrid.md, section 3 */
 #include "update.h"
 #include <math.h>
 

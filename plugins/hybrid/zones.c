@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* zones - oracles mark a surface, the distance inwards from it is made once for each, they wish, and the least continuous
- * wish becomes a zone, with hysteresis and one step at a time */
+/* zones - oracles mark a surface, the distance inwards from it is made once for each, they wish, and the least
+ * continuous wish becomes a zone, with hysteresis and one step at a time */
 #include "update.h"
 #include <math.h>
 #include <stdlib.h>
@@ -171,6 +171,42 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 	}
 }
 
+static void find_sides(const update *d, surface *f, const quern_real *level, uint32_t flags) {
+	int32_t cell[3];
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		if (!quern_grid_cell_of(d->g, c, cell)) continue;
+		f->solid[c] = d->open[c] == 0;
+		if (!(flags & QUERN_SURFACE_FLOOD)) f->outside[c] = !f->solid[c] && level[c] <= 0;
+	}
+	if (flags & QUERN_SURFACE_FLOOD) flood(d, f, level);
+	for (uint32_t c = 0; c < d->n_cells; c++) f->inside[c] = !f->outside[c] && !f->solid[c];
+}
+
+/* Whether there is surface between a cell inside and what lies one step from it. */
+static bool is_surface(const update *d, const surface *f, uint32_t c, const int32_t cell[3], uint32_t axis,
+	int step, uint32_t flags) {
+	int32_t other;
+	switch (beside(d, c, cell, axis, step, &other)) {
+	case BESIDE_OPEN: return flags & QUERN_SURFACE_FLOOD;
+	case BESIDE_WALL: return flags & QUERN_SURFACE_WALLS;
+	default: return f->outside[other] || (f->solid[other] && flags & QUERN_SURFACE_WALLS);
+	}
+}
+
+static void begin_at_surface(spreading *p, const surface *f, uint32_t flags) {
+	const update *d = p->d;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3];
+		if (!f->inside[c] || !quern_grid_cell_of(d->g, c, cell)) continue;
+		for (uint32_t k = 0; k < d->g->dim; k++)
+			for (int step = -1; step <= 1; step += 2) {
+				int32_t way[3] = { 0 };
+				way[k] = step;
+				if (is_surface(d, f, c, cell, k, step, flags)) offer(p, c, way);
+			}
+	}
+}
+
 /* Distance of a cell's centre to the nearest cell outside. */
 static quern_status surface_distance(
 	update *d, const quern_real *level, uint32_t flags, quern_real *distance) {
@@ -181,28 +217,8 @@ static quern_status surface_distance(
 	spreading p;
 	if (!f.outside || !f.solid || !f.inside || !f.queue || !spreading_init(&p, d, true, distance))
 		return QUERN_E_MEMORY;
-	for (uint32_t c = 0; c < d->n_cells; c++) {
-		int32_t cell[3];
-		if (!quern_grid_cell_of(d->g, c, cell)) continue;
-		f.solid[c] = d->open[c] == 0;
-		if (!(flags & QUERN_SURFACE_FLOOD)) f.outside[c] = !f.solid[c] && level[c] <= 0;
-	}
-	if (flags & QUERN_SURFACE_FLOOD) flood(d, &f, level);
-	for (uint32_t c = 0; c < d->n_cells; c++) f.inside[c] = !f.outside[c] && !f.solid[c];
-	for (uint32_t c = 0; c < d->n_cells; c++) {
-		int32_t cell[3], other;
-		if (!f.inside[c] || !quern_grid_cell_of(d->g, c, cell)) continue;
-		for (uint32_t k = 0; k < d->g->dim; k++)
-			for (int step = -1; step <= 1; step += 2) {
-				const int what = beside(d, c, cell, k, step, &other);
-				const bool wall = what == BESIDE_WALL || (what == BESIDE_CELL && f.solid[other]);
-				const bool nothing = what == BESIDE_OPEN && flags & QUERN_SURFACE_FLOOD;
-				const bool open = nothing || (what == BESIDE_CELL && f.outside[other]);
-				int32_t way[3] = { 0 };
-				way[k] = step;
-				if (open || (wall && flags & QUERN_SURFACE_WALLS)) offer(&p, c, way);
-			}
-	}
+	find_sides(d, &f, level, flags);
+	begin_at_surface(&p, &f, flags);
 	spread(&p, f.inside);
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (!f.inside[c]) distance[c] = 0;

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no tension.
- * docs/theory/materials.md, section 4
- *
- * What is kept is small where strains are, J - 1 and dev b of the isochoric strain b, so that the yield stress is met to
- * round-off at any pressure; b = dev b + t I follows from det b = 1. */
+/* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no
+ * tension. docs/theory/materials.md, section 4 What is kept is small where strains are, J - 1 and dev b of the
+ * isochoric strain b, so that the yield stress is met to round-off at any pressure; b = dev b + t I follows from det
+ * b = 1. */
 #include "../common/rotation.h"
 #include <quern/math.h>
 
@@ -55,8 +54,8 @@ QUERN_INLINE quern_real excess_step(quern_real y, quern_real q, quern_real det) 
 	return y - (y * (3 + y * (3 + y)) - (q * t - det)) / (3 * t * t - q);
 }
 
-/* t - 1 of det(s + t I) = 1 for a deviator s, q = s:s/2. In 3-D it is the largest root that makes s + t I positive: with
- * r^2 = q/3 it lies between r, beyond which the cubic rises, and sqrt(1 + 4 r^2). Newton's steps from above are
+/* t - 1 of det(s + t I) = 1 for a deviator s, q = s:s/2. In 3-D it is the largest root that makes s + t I positive:
+ * with r^2 = q/3 it lies between r, beyond which the cubic rises, and sqrt(1 + 4 r^2). Newton's steps from above are
  * monotone; four are enough for any r below 1/4, six up to 1. */
 QUERN_INLINE quern_real isochoric_excess(const int dim, symmetric s) {
 	const quern_real q = symmetric_half_square(dim, s);

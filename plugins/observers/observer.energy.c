@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section 5 */
+/* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section
+ * 5 */
 #include "observers.h"
 
 typedef struct {

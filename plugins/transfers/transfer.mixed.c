@@ -15,7 +15,8 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 QUERN_USE_ENUM(USES);
 static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
-/* r = n (n . (v_flip - v_pic)); first pass sends r, the last one sets v = v_flip - r + sum S R_i, R_i = sum S m r/m_i */
+/* r = n (n . (v_flip - v_pic)); first pass sends r, the last one sets v = v_flip - r + sum S R_i, R_i = sum S m
+ * r/m_i */
 QUERN_INLINE void gather(const int dim, const bool last, const quern_transfer_batch *b) {
 	quern_real *const *normal = b->use[NORMAL].real;
 	QUERN_SIMD
