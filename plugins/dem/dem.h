@@ -43,9 +43,6 @@ QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
 	return &s->slot[s->settling ? SLOT_SETTLING : SLOT_INTEGRATOR][0];
 }
 
-/* moment of inertia over mass times radius squared */
-QUERN_INLINE quern_real dem_inertia(uint32_t dim) { return dim == 2 ? 0.5 : 0.4; }
-
 /* The grains with rows of dem.fill; `weight` NULL: all of what each is. */
 QUERN_INLINE cloud dem_cloud(const quern_step *s, const quern_real *weight) {
 	return (cloud) { s->use[FILL_MASS].real[0], weight, s->use[FILL_FIXED].index,

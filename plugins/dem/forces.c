@@ -175,8 +175,7 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 static quern_status lost(const forces_shared *sh, int32_t i) {
 	const quern_column *u = sh->use;
 	const quern_step *s = sh->s;
-	quern_real v2 = 0;
-	for (uint32_t k = 0; k < s->dim; k++) v2 += u[FORCE_VELOCITY].real[k][i] * u[FORCE_VELOCITY].real[k][i];
+	const quern_real v2 = cloud_square(&u[FORCE_VELOCITY], (uint32_t)i, s->dim);
 	const char *law = sh->n_laws ? s->slot[SLOT_CONTACT][0].id : "gravity";
 	quern_real turn2 = 0;
 	for (uint32_t k = 0; k < (s->dim == 3 ? 3u : 1u) && sh->spin; k++)

@@ -54,7 +54,7 @@ static void load_grains(
 	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t row, uint32_t n) {
 	const quern_column *u = sh->use;
 	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
-	const quern_real *weight = u[FORCE_WEIGHT].real[0], turning = dem_inertia(dim);
+	const quern_real *weight = u[FORCE_WEIGHT].real[0], turning = quern_radius_inertia(dim);
 	for (uint32_t i = 0; i < n; i++) {
 		const quern_real m = (weight ? weight[begin + i] : 1) * u[FORCE_MASS].real[0][begin + i];
 		const quern_real r = u[FORCE_RADIUS].real[0][begin + i];

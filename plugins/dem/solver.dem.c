@@ -368,7 +368,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 static void account(const void *self, const quern_step *s, quern_account *out) {
 	const quern_column *use = s->use;
 	const cloud grains = dem_cloud(s, use[FILL_WEIGHT].real[0]);
-	const quern_real *radius = use[FILL_RADIUS].real[0], turning = dem_inertia(s->dim);
+	const quern_real *radius = use[FILL_RADIUS].real[0], turning = quern_radius_inertia(s->dim);
 	const uint32_t n_spin = !use[FILL_SPIN].real[0] ? 0 : s->dim == 3 ? 3 : 1;
 	cloud_sums c;
 	(void)self;

@@ -21,7 +21,7 @@ static quern_real in_contacts(const quern_step *s) {
 
 static quern_real in_spins(const quern_step *s) {
 	const quern_column *u = s->use;
-	const quern_real share = s->dim == 2 ? 0.25 : 0.2;
+	const quern_real share = 0.5 * quern_radius_inertia(s->dim);
 	quern_real sum = 0;
 	for (uint32_t i = 0; u[A_GRAIN_SPIN].real[0] && i < s->host->set(s->run, "grain").n; i++) {
 		const quern_real r = u[A_GRAIN_RADIUS].real[0][i],

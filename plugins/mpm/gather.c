@@ -172,8 +172,8 @@ static quern_status lost(const gather_work *w, int32_t i) {
 	const quern_real volume = u[GATHER_VOLUME].real[0][i], x = u[GATHER_POSITION].real[0][i],
 					 y = u[GATHER_POSITION].real[1][i];
 	const char *material = s->slot[SLOT_MATERIAL][0].id;
-	quern_real v2 = 0, stress = 0;
-	for (uint32_t k = 0; k < s->dim; k++) v2 += u[GATHER_VELOCITY].real[k][i] * u[GATHER_VELOCITY].real[k][i];
+	const quern_real v2 = cloud_square(&u[GATHER_VELOCITY], (uint32_t)i, s->dim);
+	quern_real stress = 0;
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, s->dim); k++)
 		stress += fabs(u[GATHER_STRESS].real[k][i]);
 	if (!isfinite(v2))

@@ -156,9 +156,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	const uint32_t n = s->host->set(s->run, "point").n;
 	quern_real fastest = 0;
 	for (uint32_t i = 0; i < n; i++) {
-		quern_real v2 = 0;
-		for (uint32_t k = 0; k < s->dim; k++)
-			v2 += s->use[FILL_VELOCITY].real[k][i] * s->use[FILL_VELOCITY].real[k][i];
+		const quern_real v2 = cloud_square(&s->use[FILL_VELOCITY], i, s->dim);
 		fastest = v2 > fastest ? v2 : fastest;
 	}
 	fastest = sqrt(fastest);

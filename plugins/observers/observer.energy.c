@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section
  * 5 */
+#include "../common/radius.h"
 #include "observers.h"
 
 typedef struct {
@@ -42,7 +43,7 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t turns = b->dim == 3 ? 3 : 1;
-	const quern_real *radius = u[GRAIN_RADIUS].real[0], turning = b->dim == 2 ? 0.5 : 0.4;
+	const quern_real *radius = u[GRAIN_RADIUS].real[0], turning = quern_radius_inertia(b->dim);
 	cloud_sums grains, points;
 	(void)self;
 	if (!observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
