@@ -20,15 +20,21 @@ static const quern_param params[] = { QUERN_PARAM(linear, stiffness, "N/m", "Nor
 		.flags = QUERN_PLANAR, .max = 10),
 	QUERN_END_PARAMS };
 
-/* clang-format off */
-#define USES(X) \
-	X(SLIP, "contact.slip", "m", QUERN_UPDATE, QUERN_AXIAL, .when = "friction", \
-		.doc = "Tangential spring; 2-D: along the normal turned left.") \
-	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS, .when = "friction", \
-		.doc = "Angular velocity; a frictional contact turns its grains.")
-/* clang-format on */
-QUERN_USE_ENUM(USES);
-static const quern_use uses[] = QUERN_USE_ROWS(USES);
+enum { SLIP, SPIN };
+static const quern_use uses[] = { { .field = "contact.slip",
+									  .unit = "m",
+									  .doc = "Tangential spring; 2-D: along the normal turned left.",
+									  .access = QUERN_UPDATE,
+									  .shape = QUERN_AXIAL,
+									  .when = "friction" },
+	{ .field = "grain.spin",
+		.unit = "rad/s",
+		.doc = "Angular velocity; a frictional contact turns its grains.",
+		.access = QUERN_READ,
+		.shape = QUERN_AXIAL,
+		.flags = QUERN_OTHERS,
+		.when = "friction" },
+	QUERN_END_USES };
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	linear *law = self;
