@@ -89,7 +89,7 @@ void quern_check_kernel_init(
 	*k = (check_kernel) { .check = c,
 		.instance = instance,
 		.name = name,
-		.ops = c->file->plugin.ops,
+		.ops = c->ops,
 		.dim = instance->dim,
 		.n = n,
 		.dt = 1e-5 };

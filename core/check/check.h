@@ -17,6 +17,7 @@ typedef struct check_shared {
 
 typedef struct check {
 	const quern_plugin_file *file;
+	const void *ops;         /* as the kind's header has them */
 	const quern_node *given; /* parameters of --set */
 	uint32_t dimension;      /* 0: all that the plugin has */
 	unsigned seconds;        /* for a group of tests */
@@ -148,6 +149,7 @@ uint32_t quern_check_components(uint8_t shape, uint32_t dim);
 
 /* ---- kinds ---- */
 typedef struct check_kind {
+	const quern_kind *kind;
 	/* A kernel on ordinary input; false if there is no such variant. NULL: the kind has none. */
 	bool (*make)(const check *, const check_instance *, uint32_t variant, uint32_t n, check_kernel *);
 	/* Whether an instance, whatever its parameters, gives sensible results; for kinds without `make`. */

@@ -2,6 +2,7 @@
 /* quern_check_body - geometry: unit normals, gaps that grow along them, surfaces that go with the pose */
 #include "check.h"
 #include <math.h>
+#include <quern/body.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -197,7 +198,7 @@ static void try_dimension(const check *c, const check_instance *it, tallies *t) 
 	check_bounds(&k[0], t);
 	check_pose(&k[0], &k[1], &shifted, false, &t->shifts);
 	check_pose(&k[0], &k[1], &turned, true, &t->turns);
-	if (((const quern_body_ops *)c->file->plugin.ops)->features) check_features(&k[0], t);
+	if (((const quern_body_ops *)c->ops)->features) check_features(&k[0], t);
 	quern_check_kernel_finish(&k[0]);
 	quern_check_kernel_finish(&k[1]);
 	free(k);
@@ -222,4 +223,4 @@ static void law(const check *c) {
 	if (t.features.tried) quern_check_tell(c, &t.features, NULL);
 }
 
-const check_kind quern_check_body = { .make = make, .law = law };
+const check_kind quern_check_body = { .kind = &quern_body_kind, .make = make, .law = law };

@@ -2,6 +2,7 @@
 /* quern_check_contact - laws between two grains: action and reaction, silence when apart, no energy out of nothing */
 #include "check.h"
 #include <math.h>
+#include <quern/contact.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -514,4 +515,4 @@ static void law(const check *c) {
 	free(k);
 }
 
-const check_kind quern_check_contact = { .make = make, .law = law };
+const check_kind quern_check_contact = { .kind = &quern_contact_kind, .make = make, .law = law };

@@ -2,6 +2,7 @@
 /* quern_check_coupling - exchanges at nodes: momentum is kept, equal velocities stay, no energy is gained */
 #include "check.h"
 #include <math.h>
+#include <quern/coupling.h>
 #include <stdlib.h>
 
 enum { MASS, OTHER_MASS, VELOCITY, OTHER };
@@ -74,4 +75,4 @@ static void law(const check *c) {
 	for (int i = 0; i < 3; i++) quern_check_tell(c, &t[i], NULL);
 }
 
-const check_kind quern_check_coupling = { .make = make, .law = law };
+const check_kind quern_check_coupling = { .kind = &quern_coupling_kind, .make = make, .law = law };

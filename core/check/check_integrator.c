@@ -2,6 +2,7 @@
 /* quern_check_integrator - steps in time: free flight is exact, a constant force gives its momentum, a spring keeps its energy */
 #include "check.h"
 #include <math.h>
+#include <quern/integrator.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -73,7 +74,7 @@ static void create(const check *c, const check_instance *it, uint32_t variant, u
 }
 
 static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
-	const quern_integrator_ops *ops = c->file->plugin.ops;
+	const quern_integrator_ops *ops = c->ops;
 	if (variant >= VARIANTS || (variant & OPENS && !ops->open[it->dim - 2])) return false;
 	create(c, it, variant, n, k);
 	k->more = gravity;
@@ -99,7 +100,7 @@ static void copy_state(const check_kernel *from, check_kernel *to) {
 }
 
 static void begin_flight(const check *c, const check_instance *it, uint32_t n, flight *f) {
-	f->opens = ((const quern_integrator_ops *)c->file->plugin.ops)->open[it->dim - 2] != NULL;
+	f->opens = ((const quern_integrator_ops *)c->ops)->open[it->dim - 2] != NULL;
 	create(c, it, WITH_SPIN, n, &f->close);
 	if (f->opens) create(c, it, WITH_SPIN | OPENS, n, &f->open);
 }
@@ -133,7 +134,7 @@ static void first_history(flight *f) {
 
 enum { BODIES = 64, STEPS = 200 };
 
-static bool damps(const check *c) { return ((const quern_integrator_ops *)c->file->plugin.ops)->damps != 0; }
+static bool damps(const check *c) { return ((const quern_integrator_ops *)c->ops)->damps != 0; }
 
 /* What damps may be slower than Newton's law, never faster, and goes where the force points: from rest. */
 static void damped(const check *c, const check_instance *it, double force, check_tally *t) {
@@ -252,4 +253,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &ring, NULL);
 }
 
-const check_kind quern_check_integrator = { .make = make, .law = law };
+const check_kind quern_check_integrator = { .kind = &quern_integrator_kind, .make = make, .law = law };

@@ -2,6 +2,7 @@
 /* quern_check_material - constitutive models: stress and history belong together, yield is obeyed, rotation does not matter */
 #include "check.h"
 #include <math.h>
+#include <quern/material.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -304,4 +305,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &t.violent, "strains of 3e-6 to 0.3 in one step");
 }
 
-const check_kind quern_check_material = { .make = make, .law = law };
+const check_kind quern_check_material = { .kind = &quern_material_kind, .make = make, .law = law };

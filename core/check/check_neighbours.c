@@ -3,6 +3,7 @@
 #include "check.h"
 #include "text.h"
 #include <math.h>
+#include <quern/neighbours.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -66,7 +67,7 @@ static int by_key(const void *pa, const void *pb) {
 
 /* As the grains' solver does it: keys, a stable sort, blocks, an index. */
 static void sort_grains(const check *c, const check_instance *it, grains *g) {
-	const quern_neighbour_ops *ops = c->file->plugin.ops;
+	const quern_neighbour_ops *ops = c->ops;
 	const uint32_t n = g->job.n;
 	uint64_t *key = quern_take((size_t)n + 1, sizeof *key);
 	place *order = quern_take((size_t)n + 1, sizeof *order);
@@ -113,7 +114,7 @@ typedef struct {
 static void find(void *arg, uint32_t b, uint32_t worker) {
 	enum { GUARD = -7 };
 	search *s = arg;
-	const quern_neighbour_ops *ops = s->c->file->plugin.ops;
+	const quern_neighbour_ops *ops = s->c->ops;
 	(void)worker;
 	for (uint32_t i = s->cap; i < s->cap + 4; i++) s->pair[b][i] = (quern_pair) { GUARD, GUARD };
 	s->found[b] = ops->pairs(s->it->self, &s->g->job, b, s->cap, s->pair[b]);
@@ -213,4 +214,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &t.threads, NULL);
 }
 
-const check_kind quern_check_neighbours = { .law = law };
+const check_kind quern_check_neighbours = { .kind = &quern_neighbours_kind, .law = law };

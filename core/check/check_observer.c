@@ -5,13 +5,14 @@
 #include "check_table.h"
 #include "text.h"
 #include <math.h>
+#include <quern/observer.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { LEAF = 256, ENTRIES = 2000 };
 
 static uint32_t outputs(const check *c) {
-	const quern_observer_ops *ops = c->file->plugin.ops;
+	const quern_observer_ops *ops = c->ops;
 	uint32_t n = 0;
 	while (ops->outputs && ops->outputs[n].name) n++;
 	return n;
@@ -100,7 +101,7 @@ static void try_threads(const check_kernel *k, tallies *t) {
 
 static void try_map(const check *c, const check_instance *it, bool optional, tallies *t) {
 	static const uint32_t cuts[] = { 1, 7, 64 };
-	const quern_observer_ops *ops = c->file->plugin.ops;
+	const quern_observer_ops *ops = c->ops;
 	const uint32_t count = outputs(c);
 	quern_real *sums = quern_take(4 * count, sizeof *sums);
 	check_kernel *k = malloc(sizeof *k);
@@ -121,7 +122,7 @@ static void try_map(const check *c, const check_instance *it, bool optional, tal
 
 static void check_outputs(const check *c) {
 	check_tally t = { .name = "outputs" };
-	const quern_observer_ops *ops = c->file->plugin.ops;
+	const quern_observer_ops *ops = c->ops;
 	for (const quern_output *o = ops->outputs; o && o->name; o++) {
 		quern_check_expect(&t, o->doc && *o->doc, "%s: no doc", o->name);
 		quern_check_expect(
@@ -136,7 +137,7 @@ static void check_outputs(const check *c) {
 static void law(const check *c) {
 	tallies t = { { .name = "partition" }, { .name = "threads" }, { .name = "guards" },
 		{ .name = "finite" } };
-	const quern_observer_ops *ops = c->file->plugin.ops;
+	const quern_observer_ops *ops = c->ops;
 	check_outputs(c);
 	for (uint32_t dim = 2; dim <= 3 && ops->map; dim++) {
 		check_instance it;
@@ -152,4 +153,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &t.finite, NULL);
 }
 
-const check_kind quern_check_observer = { .law = law };
+const check_kind quern_check_observer = { .kind = &quern_observer_kind, .law = law };

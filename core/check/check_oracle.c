@@ -2,6 +2,7 @@
 /* quern_check_oracle - marks and wishes of cells: local, finite, and one of the three zones */
 #include "check.h"
 #include <math.h>
+#include <quern/oracle.h>
 #include <stdlib.h>
 
 enum { CENTRE, DISTANCE, ZONE, LEVEL, WISH };
@@ -71,4 +72,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &wish, NULL);
 }
 
-const check_kind quern_check_oracle = { .make = make, .law = law };
+const check_kind quern_check_oracle = { .kind = &quern_oracle_kind, .make = make, .law = law };

@@ -4,6 +4,7 @@
 #include "random.h"
 #include "text.h"
 #include <math.h>
+#include <quern/packer.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -85,7 +86,7 @@ static void begin(uint32_t dim, uint32_t shape, uint64_t key, uint32_t limit, pa
 
 /* The seeds stay where they were at the start while others are placed. */
 static void pack(const check *c, const check_instance *it, packing *p) {
-	const quern_packer_ops *ops = c->file->plugin.ops;
+	const quern_packer_ops *ops = c->ops;
 	quern_spot seed[3];
 	memcpy(seed, p->spot, sizeof seed);
 	p->job.seed = seed;
@@ -167,4 +168,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &t.self, "self is left alone");
 }
 
-const check_kind quern_check_packer = { .sane = sane, .law = law };
+const check_kind quern_check_packer = { .kind = &quern_packer_kind, .sane = sane, .law = law };

@@ -2,6 +2,7 @@
 /* quern_check_shape - shape functions: they sum to one, reproduce a line, know their slopes and stay inside walls */
 #include "check.h"
 #include <math.h>
+#include <quern/shape.h>
 #include <stdlib.h>
 
 enum { POSITION, FIRST_X, FIRST_Y, FIRST_Z, VALUE, SLOPE };
@@ -98,7 +99,7 @@ static void check_walk(const check *c, const check_instance *it, tallies *t) {
 	enum { STEPS = 6000 };
 	check_kernel *k = malloc(sizeof *k);
 	if (!k) abort();
-	const quern_shape_ops *ops = c->file->plugin.ops;
+	const quern_shape_ops *ops = c->ops;
 	double sum[2] = { 0 }, before[CELLS + 1], share[2], slope;
 	make(c, it, 1, STEPS, k);
 	for (uint32_t i = 0; i < STEPS; i++)
@@ -153,4 +154,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &t.shares, NULL);
 }
 
-const check_kind quern_check_shape = { .make = make, .law = law };
+const check_kind quern_check_shape = { .kind = &quern_shape_kind, .make = make, .law = law };

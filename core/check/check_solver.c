@@ -5,7 +5,7 @@
 #include "text.h"
 #include <string.h>
 
-static const quern_solver_ops *ops_of(const check *c) { return c->file->plugin.ops; }
+static const quern_solver_ops *ops_of(const check *c) { return c->ops; }
 
 static void check_sets(const check *c, check_tally *t) {
 	const quern_set *sets = ops_of(c)->sets;

@@ -72,7 +72,7 @@ void quern_check_parameter_rows(const check *c, check_tally *t, const quern_para
 /* ---- uses ---- */
 
 void quern_check_use_rows(const check *c, check_tally *t, const quern_use *rows) {
-	const bool solver = c->file->plugin.kind == QUERN_SOLVER;
+	const bool solver = quern_id_is_of(c->file->plugin.id, quern_solver_kind.name);
 	for (const quern_use *row = rows; row && row->field; row++) {
 		const char *name = row->field;
 		bool told = false;
@@ -113,7 +113,7 @@ static void compare_particle(
 	const quern_solver_ops *ops = solver->plugin.ops;
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		char field[64];
-		if (s->kind != c->file->plugin.kind || !s->particle) continue;
+		if (!s->particle || !quern_id_is_of(c->file->plugin.id, s->kind->name)) continue;
 		snprintf(field, sizeof field, "%.24s.%.32s", s->particle, row->field + 9);
 		compare_rows(c, t, field, row, solver);
 	}
@@ -126,7 +126,7 @@ static void compare_with_solvers(const check *c, check_tally *t) {
 	for (size_t i = 0; ids[i]; i++) {
 		if (strncmp(ids[i], "solver.", 7) != 0 || !strcmp(ids[i], c->file->plugin.id)) continue;
 		const quern_plugin_file *solver =
-			quern_loader_find(loader, QUERN_SOLVER, ids[i] + 7, report, (quern_mark) { 0 });
+			quern_loader_find(loader, quern_solver_kind.name, ids[i] + 7, report, (quern_mark) { 0 });
 		for (const quern_use *row = c->file->uses; solver && row->field; row++) {
 			compare_rows(c, t, row->field, row, solver);
 			if (!strncmp(row->field, "particle.", 9)) compare_particle(c, t, row, solver);

@@ -2,6 +2,7 @@
 /* quern_check_transfer - from grid to particles and back, on a line of nodes: uniform motion stays, momentum is kept */
 #include "check.h"
 #include <math.h>
+#include <quern/transfer.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,7 +23,7 @@ static void call(const check_kernel *k, const check_batch *b) {
 
 /* Before the last pass a transfer sends and leaves velocities alone. */
 static void create(const check *c, const check_instance *it, uint32_t pass, uint32_t n, check_kernel *k) {
-	const quern_transfer_ops *ops = c->file->plugin.ops;
+	const quern_transfer_ops *ops = c->ops;
 	const bool last = pass == ops->passes;
 	quern_check_kernel_init(k, c, it, last ? "gather, last pass" : "gather", n);
 	k->call = call;
@@ -37,7 +38,7 @@ static void create(const check *c, const check_instance *it, uint32_t pass, uint
 }
 
 static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
-	const quern_transfer_ops *ops = c->file->plugin.ops;
+	const quern_transfer_ops *ops = c->ops;
 	static const int names[] = { PIC, CHANGE, ECHO, VELOCITY };
 	if (variant > ops->passes) return false;
 	create(c, it, variant, n, k);
@@ -95,7 +96,7 @@ static void begin_line(line *l, bool uniform) {
 
 /* All passes; new velocities in l->v. */
 static void gather(const check *c, const check_instance *it, line *l) {
-	const quern_transfer_ops *ops = c->file->plugin.ops;
+	const quern_transfer_ops *ops = c->ops;
 	double(*nodes)[3] = malloc(NODES * sizeof *nodes);
 	check_kernel *k = malloc(sizeof *k);
 	if (!k || !nodes) abort();
@@ -139,7 +140,7 @@ static void check_momentum(const check *c, const check_instance *it, line *l, ch
 
 static void law(const check *c) {
 	check_tally uniform = { .name = "uniform motion" }, momentum = { .name = "momentum" };
-	const quern_transfer_ops *ops = c->file->plugin.ops;
+	const quern_transfer_ops *ops = c->ops;
 	line *l = malloc(sizeof *l);
 	if (!l) abort();
 	for (uint32_t dim = 2; dim <= 3; dim++) {
@@ -163,4 +164,4 @@ static void law(const check *c) {
 	quern_check_tell(c, &momentum, "after %u extra round trips", ops->passes);
 }
 
-const check_kind quern_check_transfer = { .make = make, .law = law };
+const check_kind quern_check_transfer = { .kind = &quern_transfer_kind, .make = make, .law = law };

@@ -12,7 +12,6 @@ typedef struct quern_command {
 
 extern const quern_command quern_command_run, quern_command_plan, quern_command_list, quern_command_describe,
 	quern_command_schema, quern_command_new, quern_command_check; /* of quern */
-extern const quern_command quern_command_render;                  /* of quern-render */
 
 /* "usage: quern COMMAND ...", without the end of the line. */
 void quern_print_usage(const quern_command *, FILE *);

@@ -7,22 +7,21 @@
 #include "options.h"
 #include <stdlib.h>
 
-static const check_kind *const kinds[QUERN_KINDS] = { [QUERN_CONTACT] = &quern_check_contact,
-	[QUERN_NEIGHBOURS] = &quern_check_neighbours,
-	[QUERN_INTEGRATOR] = &quern_check_integrator,
-	[QUERN_BODY] = &quern_check_body,
-	[QUERN_MATERIAL] = &quern_check_material,
-	[QUERN_SHAPE] = &quern_check_shape,
-	[QUERN_TRANSFER] = &quern_check_transfer,
-	[QUERN_COUPLING] = &quern_check_coupling,
-	[QUERN_ORACLE] = &quern_check_oracle,
-	[QUERN_PACKER] = &quern_check_packer,
-	[QUERN_OBSERVER] = &quern_check_observer };
+static const check_kind *const kinds[] = { &quern_check_contact, &quern_check_neighbours,
+	&quern_check_integrator, &quern_check_body, &quern_check_material, &quern_check_shape,
+	&quern_check_transfer, &quern_check_coupling, &quern_check_oracle, &quern_check_packer,
+	&quern_check_observer };
+
+static const check_kind *kind_of(const check *c) {
+	for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
+		if (quern_id_is_of(c->file->plugin.id, kinds[k]->kind->name)) return kinds[k];
+	return NULL;
+}
 
 static void group_table(const check *c) { quern_check_table(c); }
-static void group_parameters(const check *c) { quern_check_parameters(c, kinds[c->file->plugin.kind]); }
-static void group_batches(const check *c) { quern_check_batches(c, kinds[c->file->plugin.kind]); }
-static void group_law(const check *c) { kinds[c->file->plugin.kind]->law(c); }
+static void group_parameters(const check *c) { quern_check_parameters(c, kind_of(c)); }
+static void group_batches(const check *c) { quern_check_batches(c, kind_of(c)); }
+static void group_law(const check *c) { kind_of(c)->law(c); }
 
 /* ---- groups of tests, each in a child ---- */
 
@@ -59,10 +58,10 @@ static int run_checks(check *c) {
 	c->home = &home;
 	printf("%s, %s\n", p->id, c->file->path);
 	run_group(c, "tables", group_table);
-	if (p->kind == QUERN_SOLVER) run_group(c, "solver", quern_check_solver);
+	if (quern_id_is_of(p->id, quern_solver_kind.name)) run_group(c, "solver", quern_check_solver);
 	else {
 		run_group(c, "parameters", group_parameters);
-		if (kinds[p->kind]->make) run_group(c, "batches", group_batches);
+		if (kind_of(c)->make) run_group(c, "batches", group_batches);
 		run_group(c, "law", group_law);
 	}
 	check_tally left = { .name = "environment" };
@@ -113,8 +112,12 @@ static int check_plugin(int argc, char **argv) {
 		.units = quern_units_create() };
 	quern_loader_beware(loader);
 	if (!quern_report_errors(report)) c.file = open_plugin(loader, words.at[0], dimension, report);
+	const check_kind *kind = c.file ? kind_of(&c) : NULL;
+	if (c.file)
+		c.ops = quern_loader_ops(
+			loader, c.file, kind ? kind->kind : &quern_solver_kind, report, (quern_mark) { 0 });
 	quern_report_print(report, stderr);
-	status = c.file ? run_checks(&c) : QUERN_EXIT_SCENE;
+	status = c.ops ? run_checks(&c) : QUERN_EXIT_SCENE;
 	quern_units_destroy(c.units);
 	quern_loader_destroy(loader);
 	quern_tree_destroy(tree);

@@ -15,16 +15,22 @@
 static const char *const type_names[] = { "", "number", "whole number", "true or false", "text", "vector",
 	"list" };
 
+/* What can be known of its functions without the scene: a kind that a solver describes. */
+static const quern_plugin_file *looked_at(
+	quern_loader *loader, const quern_plugin_file *f, quern_report *report) {
+	const quern_kind *kind = f ? quern_loader_kind(loader, f->table.kind) : NULL;
+	return kind && !quern_loader_ops(loader, f, kind, report, (quern_mark) { 0 }) ? NULL : f;
+}
+
 static const quern_plugin_file *load(quern_loader *loader, const char *id, quern_report *report) {
 	const char *name = quern_id_name(id);
 	char *kind = quern_copy(id);
 	kind[strcspn(kind, ".")] = 0;
 	const quern_plugin_file *f = NULL;
-	if (name)
-		f = quern_loader_find(loader, (quern_kind)quern_kind_of(kind), name, report, (quern_mark) { 0 });
-	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id such as contact.linear", id);
+	if (name) f = quern_loader_find(loader, kind, name, report, (quern_mark) { 0 });
+	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id: KIND.NAME", id);
 	free(kind);
-	return f;
+	return looked_at(loader, f, report);
 }
 
 /* ---- list ---- */
@@ -145,11 +151,25 @@ static void print_uses(const quern_use *row) {
 	}
 }
 
+static void print_sections(const char *what, const char *const *names) {
+	if (!names) return;
+	printf("%-10s", what);
+	for (; *names; names++) printf(" %s", *names);
+	puts("");
+}
+
 static void print_solver(const quern_solver_ops *ops) {
+	printf("\nsection    %s\n", ops->section ? ops->section : "whichever names it by `solver:`");
+	print_sections("needs", ops->needs);
+	print_sections("with", ops->with);
+	print_sections("after", ops->after);
+	puts("\nsets");
+	for (const quern_set *s = ops->sets; s->name; s++)
+		printf("  %-16s %s%s\n", s->name, s->doc ? s->doc : "", s->counted ? " Counted." : "");
 	puts("\nslots");
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		if (s->same_as) continue;
-		printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", quern_kind_name(s->kind),
+		printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", s->kind->name,
 			s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "");
 		for (const quern_param *row = s->rows; row && row->name; row++) print_param(row, 6);
 	}
@@ -184,19 +204,20 @@ static void print_plugin(const quern_plugin_file *f) {
 		}
 	if (p->uses->field) puts("\nfields");
 	print_uses(p->uses);
-	if (p->kind == QUERN_SOLVER) print_solver(p->ops);
-	if (p->kind == QUERN_OBSERVER) print_outputs(p->ops);
+	if (quern_id_is_of(p->id, quern_solver_kind.name)) print_solver(p->ops);
+	if (quern_id_is_of(p->id, quern_observer_kind.name)) print_outputs(p->ops);
 }
 
 /* The keys of a scene that belong to no section. */
-static void print_scene(void) {
+static void print_scene(quern_loader *loader) {
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(loader, &n);
 	puts("scene - the keys of a scene that belong to no section\n\nkeys");
 	for (const quern_param *row = quern_general_rows; row->name; row++) print_param(row, 2);
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		printf("  %-24s  list of %s\n      %s\n", l->name, l->item, l->doc);
 	puts("\nsections");
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		printf("  %-24s  quern describe %s\n", n->section, n->section);
+	for (size_t i = 0; i < n; i++) printf("  %-24s  quern describe %s\n", known[i].section, known[i].section);
 	printf("  %-24s  observers, one or a list; each takes `label`\n", quern_observe_slot.name);
 }
 
@@ -205,59 +226,95 @@ static json_t *slots_json(const quern_solver_ops *ops) {
 	for (const quern_slot *s = ops->slots; s && s->name; s++)
 		if (!s->same_as)
 			json_array_append_new(slots,
-				json_pack("{s:s, s:s, s:s, s:b, s:b, s:s*, s:o}", "name", s->name, "kind",
-					quern_kind_name(s->kind), "doc", s->doc ? s->doc : "", "list", (int)s->list, "required",
+				json_pack("{s:s, s:s, s:s, s:b, s:b, s:s*, s:o}", "name", s->name, "kind", s->kind->name,
+					"doc", s->doc ? s->doc : "", "list", (int)s->list, "required",
 					!s->def && (!s->list || s->required), "default", s->def, "rows", params_json(s->rows)));
 	return slots;
 }
 
-static json_t *outputs_json(const quern_observer_ops *ops) {
+static json_t *outputs_json(const quern_output *o) {
 	json_t *outputs = json_array();
-	for (const quern_output *o = ops->outputs; o && o->name; o++)
+	for (; o && o->name; o++)
 		json_array_append_new(outputs, json_pack("{s:s, s:s, s:s}", "name", o->name, "unit",
 										   o->unit ? o->unit : "1", "doc", o->doc ? o->doc : ""));
 	return outputs;
 }
 
-static json_t *scene_json(void) {
+static json_t *uses_json(const quern_use *row) {
+	json_t *uses = json_array();
+	for (; row->field; row++)
+		json_array_append_new(uses, json_pack("{s:s, s:s, s:s}", "field", row->field, "access",
+										access_names[row->access], "unit", row->unit ? row->unit : "1"));
+	return uses;
+}
+
+static json_t *sets_json(const quern_solver_ops *ops) {
+	json_t *sets = json_array();
+	for (const quern_set *s = ops->sets; s->name; s++)
+		json_array_append_new(sets,
+			json_pack("{s:s, s:s, s:s, s:b}", "name", s->name, "plural", s->plural ? s->plural : s->name,
+				"doc", s->doc ? s->doc : "", "counted", (int)s->counted));
+	return sets;
+}
+
+static json_t *stages_json(const quern_solver_ops *ops) {
+	json_t *stages = json_array();
+	for (const quern_stage *s = ops->stages; s->name; s++)
+		json_array_append_new(stages, json_pack("{s:s, s:s, s:o}", "name", s->name, "doc",
+										  s->doc ? s->doc : "", "uses", uses_json(s->uses)));
+	return stages;
+}
+
+static void put_solver(json_t *all, const quern_solver_ops *ops) {
+	json_object_set_new(all, "section", ops->section ? json_string(ops->section) : json_null());
+	json_object_set_new(all, "slots", slots_json(ops));
+	json_object_set_new(all, "sets", sets_json(ops));
+	json_object_set_new(all, "stages", stages_json(ops));
+	json_object_set_new(all, "sums", outputs_json(ops->sums));
+}
+
+static json_t *scene_json(quern_loader *loader) {
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(loader, &n);
 	json_t *keys = params_json(quern_general_rows), *sections = json_object();
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		json_array_append_new(keys, json_pack("{s:s, s:s+, s:s, s:b, s:b}", "name", l->name, "type",
 										"list of ", l->item, "doc", l->doc, "required", 0, "advanced", 0));
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		json_object_set_new(sections, n->section, json_sprintf("solver.%s", n->solver));
+	for (size_t i = 0; i < n; i++)
+		json_object_set_new(sections, known[i].section, json_sprintf("solver.%s", known[i].solver));
 	return json_pack("{s:s, s:o, s:o, s:o}", "id", "scene", "params", keys, "sections", sections, "observe",
 		params_json(quern_observe_slot.rows));
 }
 
 static json_t *plugin_json(const quern_plugin_file *f) {
 	const quern_plugin *p = &f->plugin;
-	json_t *params = params_json(p->params), *uses = json_array();
-	for (const quern_use *row = p->uses; row->field; row++)
-		json_array_append_new(uses, json_pack("{s:s, s:s, s:s}", "field", row->field, "access",
-										access_names[row->access], "unit", row->unit ? row->unit : "1"));
+	json_t *params = params_json(p->params), *uses = uses_json(p->uses);
 	json_t *all = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:i, s:o, s:o}", "id", p->id, "brief",
 		p->brief ? p->brief : "", "doc", p->doc ? p->doc : "", "cite", p->cite ? p->cite : "", "version",
 		f->library->version, "license", f->library->license, "file", f->path, "dims", (int)p->dims, "params",
 		params, "uses", uses);
-	if (p->kind == QUERN_SOLVER) json_object_set_new(all, "slots", slots_json(p->ops));
-	if (p->kind == QUERN_OBSERVER) json_object_set_new(all, "outputs", outputs_json(p->ops));
+	if (quern_id_is_of(p->id, quern_solver_kind.name)) put_solver(all, p->ops);
+	if (quern_id_is_of(p->id, quern_observer_kind.name))
+		json_object_set_new(all, "outputs", outputs_json(((const quern_observer_ops *)p->ops)->outputs));
 	return all;
 }
 
 /* The section's solver, or NULL. */
-static const char *solver_of(const char *section) {
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		if (!strcmp(n->section, section)) return n->solver;
+static const char *solver_of(quern_loader *loader, const char *section) {
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(loader, &n);
+	for (size_t i = 0; i < n; i++)
+		if (!strcmp(known[i].section, section)) return known[i].solver;
 	return NULL;
 }
 
 /* A bare name is enough where only one kind has it. */
 static const quern_plugin_file *find(quern_loader *loader, const char *name, quern_report *report) {
-	if (strchr(name, '/')) return quern_loader_open(loader, name, report, (quern_mark) { 0 });
+	if (strchr(name, '/'))
+		return looked_at(loader, quern_loader_open(loader, name, report, (quern_mark) { 0 }), report);
 	if (strchr(name, '.')) return load(loader, name, report);
-	const char *solver = solver_of(name);
-	if (solver) return quern_loader_find(loader, QUERN_SOLVER, solver, report, (quern_mark) { 0 });
+	const char *solver = solver_of(loader, name);
+	if (solver) return quern_loader_find(loader, quern_solver_kind.name, solver, report, (quern_mark) { 0 });
 	char **ids = quern_loader_ids(loader);
 	const quern_plugin_file *found = NULL;
 	size_t n = 0;
@@ -290,10 +347,10 @@ static int describe_one(int argc, char **argv) {
 	const bool scene = !strcmp(words.at[0], "scene");
 	const quern_plugin_file *f = scene ? NULL : find(loader, words.at[0], report);
 	if (json && (f || scene)) {
-		json_t *root = scene ? scene_json() : plugin_json(f);
+		json_t *root = scene ? scene_json(loader) : plugin_json(f);
 		json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 		json_decref(root);
-	} else if (scene) print_scene();
+	} else if (scene) print_scene(loader);
 	else if (f) print_plugin(f);
 	quern_report_print(report, stderr);
 	quern_report_destroy(report);
@@ -304,4 +361,4 @@ static int describe_one(int argc, char **argv) {
 const quern_command quern_command_list = { "list", "[--json]", "installed plugins", list_plugins };
 
 const quern_command quern_command_describe = { "describe", "NAME [--json]",
-	"keys, units, ranges, sources of a plugin, a section (grains), or `scene`", describe_one };
+	"keys, units, ranges, sources of a plugin, a section, or `scene`", describe_one };

@@ -23,15 +23,25 @@ static bool is_plain(const char *name) {
 }
 
 static int check_kind(const char *kind) {
-	if (quern_kind_of(kind)) return QUERN_EXIT_DONE;
-	const char *near = quern_nearest(kind, quern_kind_names);
+	const char *names[32] = { NULL };
+	size_t n = 0;
 	quern_text all = { 0 };
-	for (size_t k = 0; quern_kind_names[k]; k++)
-		quern_text_add(&all, "%s%s", k ? ", " : "", quern_kind_names[k]);
-	const int status =
-		near ? quern_usage(&quern_command_new, "unknown kind '%s'; did you mean '%s'?", kind, near)
-			 : quern_usage(
-				   &quern_command_new, "unknown kind '%s'; there are %s", kind, quern_text_string(&all));
+	for (const quern_template *t = quern_templates; t->name && n < 31; t++) {
+		if (strcmp(t->name + strlen(t->name) - 2, ".c") != 0) continue;
+		char *name = quern_copy(t->name);
+		name[strlen(name) - 2] = 0;
+		names[n++] = name;
+		quern_text_add(&all, "%s%s", all.length ? ", " : "", name);
+	}
+	int status = QUERN_EXIT_DONE;
+	const char *near = quern_nearest(kind, names);
+	if (near && !strcmp(near, kind)) near = NULL;
+	else if (near)
+		status = quern_usage(&quern_command_new, "unknown kind '%s'; did you mean '%s'?", kind, near);
+	else
+		status =
+			quern_usage(&quern_command_new, "unknown kind '%s'; there are %s", kind, quern_text_string(&all));
+	for (size_t i = 0; i < n; i++) free((void *)(uintptr_t)names[i]);
 	quern_text_finish(&all);
 	return status;
 }

@@ -70,11 +70,23 @@ static json_t *sets_of(const quern_run *run) {
 /* Parts of the vocabulary that this scene does without. */
 static json_t *skipped(const quern_run *run) {
 	json_t *list = json_array();
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		if (!quern_scene_section(run->scene, n->section))
-			json_array_append_new(list, json_string(n->section));
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(run->scene->loader, &n);
+	for (size_t i = 0; i < n; i++)
+		if (!quern_scene_section(run->scene, known[i].section))
+			json_array_append_new(list, json_string(known[i].section));
 	if (!run->has_grid) json_array_append_new(list, json_string("grid"));
 	return list;
+}
+
+/* How many there are of what is counted, by what people call it. */
+static json_t *entries_of(const quern_run *run) {
+	json_t *all = json_object();
+	for (size_t k = 0; k < run->plan->store.n_sets; k++) {
+		const quern_set_store *set = &run->plan->store.sets[k];
+		if (quern_set_is_counted(set)) json_object_set_new(all, quern_set_plural(set), json_integer(set->n));
+	}
+	return all;
 }
 
 static json_t *whole(quern_run *run) {
@@ -86,8 +98,7 @@ static json_t *whole(quern_run *run) {
 	json_object_set_new(root, "stages", stages_of(run));
 	json_object_set_new(root, "sets", sets_of(run));
 	json_object_set_new(root, "skipped", skipped(run));
-	json_object_set_new(root, "grains", json_integer(quern_host_table.set(run, "grain").n));
-	json_object_set_new(root, "points", json_integer(quern_host_table.set(run, "point").n));
+	json_object_set_new(root, "entries", entries_of(run));
 	const quern_estimate e = quern_estimate_of(run);
 	json_object_set_new(root, "step", number(e.step));
 	json_object_set_new(root, "step_set_by", json_string(e.reason));
@@ -118,10 +129,10 @@ static void print_stages(const json_t *root) {
 	puts("\na step, in order (? not every time)");
 	json_array_foreach(json_object_get(root, "stages"), i, s) {
 		const char *phase = text_of(s, "phase");
-		const bool grains = !strcmp(phase, "grains");
+		const bool several = !strcmp(phase, quern_phase_names[QUERN_SUBSTEP]);
 		if (strcmp(phase, last) != 0) {
 			printf("%s  %s", *last ? "\n" : "", phase);
-			if (grains) printf(" x %.0f", number_of(root, "substeps"));
+			if (several) printf(" x %.0f", number_of(root, "substeps"));
 			printf(":");
 		}
 		printf(" %s%s", text_of(s, "name"), json_is_true(json_object_get(s, "sometimes")) ? "?" : "");
@@ -146,7 +157,8 @@ static void print_sets(const json_t *root) {
 	}
 }
 
-static void print(const json_t *root) {
+static void print(json_t *root) {
+	const char *name;
 	size_t i;
 	json_t *one;
 	printf("%s, %.0f-D\n\nplugins\n", text_of(root, "name"), number_of(root, "dimension"));
@@ -156,8 +168,10 @@ static void print(const json_t *root) {
 	print_sets(root);
 	printf("\nleft out:");
 	json_array_foreach(json_object_get(root, "skipped"), i, one) printf(" %s", json_string_value(one));
-	printf("\ngrains %.0f, points %.0f, %.3g MB\n", number_of(root, "grains"), number_of(root, "points"),
-		number_of(root, "bytes") * 1e-6);
+	puts("");
+	json_object_foreach(json_object_get(root, "entries"), name, one)
+		printf("%s %.0f, ", name, json_number_value(one));
+	printf("%.3g MB\n", number_of(root, "bytes") * 1e-6);
 	printf("step %.4g s, set by %s\n", number_of(root, "step"), text_of(root, "step_set_by"));
 	printf("unstable beyond %.4g s: %s\n", number_of(root, "step_limit"), text_of(root, "step_limit_set_by"));
 	char settling[32], running[32];

@@ -163,14 +163,13 @@ static json_t *plugin_schema(const quern_plugin_file *f, const quern_slot *slot)
 }
 
 /* A plugin in a slot: its bare name, if nothing of it must be given, or one name with parameters. */
-static json_t *kind_schema(const context *c, uint32_t kind, bool list, const quern_slot *slot) {
+static json_t *kind_schema(const context *c, const char *kind, bool list, const quern_slot *slot) {
 	json_t *names = json_array(), *map = object_schema();
-	const char *prefix = quern_kind_name(kind);
-	const size_t skip = strlen(prefix) + 1;
+	const size_t skip = strlen(kind) + 1;
 	for (size_t i = 0; c->ids[i]; i++) {
-		if (strncmp(c->ids[i], prefix, skip - 1) != 0 || c->ids[i][skip - 1] != '.') continue;
+		if (!quern_id_is_of(c->ids[i], kind)) continue;
 		const quern_plugin_file *f =
-			quern_loader_find(c->loader, (quern_kind)kind, c->ids[i] + skip, c->report, (quern_mark) { 0 });
+			quern_loader_find(c->loader, kind, c->ids[i] + skip, c->report, (quern_mark) { 0 });
 		if (!f) continue;
 		json_t *own = plugin_schema(f, slot);
 		if (!json_object_get(own, "required")) {
@@ -184,7 +183,7 @@ static json_t *kind_schema(const context *c, uint32_t kind, bool list, const que
 	return json_pack("{s:[{s:o}, o]}", "anyOf", "enum", names, map);
 }
 
-static json_t *slot_schema(const context *c, uint32_t kind, bool list, const quern_slot *slot) {
+static json_t *slot_schema(const context *c, const char *kind, bool list, const quern_slot *slot) {
 	if (!list) return kind_schema(c, kind, false, slot);
 	return json_pack("{s:[o, {s:s, s:o}]}", "anyOf", kind_schema(c, kind, true, slot), "type", "array",
 		"items", kind_schema(c, kind, false, slot));
@@ -204,7 +203,7 @@ static json_t *home_of(json_t *section, const char *name, const char **key) {
 
 static json_t *section_schema(const context *c, const char *solver) {
 	const quern_plugin_file *f =
-		quern_loader_find(c->loader, QUERN_SOLVER, solver, c->report, (quern_mark) { 0 });
+		quern_loader_find(c->loader, quern_solver_kind.name, solver, c->report, (quern_mark) { 0 });
 	if (!f) return json_object();
 	const quern_solver_ops *ops = f->plugin.ops;
 	json_t *section = map_schema(f->params);
@@ -215,11 +214,12 @@ static json_t *section_schema(const context *c, const char *solver) {
 		if (s->same_as) continue;
 		if (!*s->name) {
 			json_decref(section);
-			return slot_schema(c, s->kind, true, s);
+			return slot_schema(c, s->kind->name, true, s);
 		}
 		json_t *home = home_of(section, s->name, &key);
 		if (home)
-			put(home, key, slot_schema(c, s->kind, s->list != 0, s), !s->def && (!s->list || s->required));
+			put(home, key, slot_schema(c, s->kind->name, s->list != 0, s),
+				!s->def && (!s->list || s->required));
 	}
 	/* of another solver's keys nothing is known here */
 	json_t *other = json_pack("{s:s, s:[s], s:{s:{s:{s:s}}}}", "type", "object", "required", "solver",
@@ -237,12 +237,13 @@ static json_t *scene_schema(const context *c) {
 			"minItems", 2, "maxItems", 3),
 		false);
 	put(scene, "output.fields",
-		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out, such as grain.velocity.",
-			"type", "array", "items", "type", "string"),
+		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out: SET.NAME.", "type", "array",
+			"items", "type", "string"),
 		false);
-	for (const quern_section_name *n = quern_section_names; n->section; n++)
-		put(scene, n->section, section_schema(c, n->solver), false);
-	put(scene, "observe", slot_schema(c, QUERN_OBSERVER, true, &quern_observe_slot), false);
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(c->loader, &n);
+	for (size_t i = 0; i < n; i++) put(scene, known[i].section, section_schema(c, known[i].solver), false);
+	put(scene, "observe", slot_schema(c, quern_observer_kind.name, true, &quern_observe_slot), false);
 	json_object_set_new(scene, "$schema", json_string("http://json-schema.org/draft-07/schema#"));
 	json_object_set_new(scene, "title", json_string("Quern scene"));
 	json_object_set_new(scene, "definitions",

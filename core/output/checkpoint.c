@@ -7,7 +7,9 @@
 #include <string.h>
 
 enum { MOST_ENTRIES = 1 << 30, MOST_TEXT = 1 << 26 };
-static const char format[] = "quern-checkpoint 2";
+static const char format[] = "quern-checkpoint 3";
+static const int64_t most_count = (int64_t)1
+								  << 53; /* beyond, whole numbers are no longer exact in a step's time */
 
 #define COUNTER(member)                                                                                      \
 	{ #member, offsetof(quern_clock, member) }
@@ -15,7 +17,7 @@ static const struct {
 	const char *name;
 	size_t offset;
 } counters[] = { COUNTER(step), COUNTER(substep), COUNTER(settle_step), COUNTER(frame), COUNTER(at),
-	COUNTER(steps_in), COUNTER(settled), COUNTER(grain_steps), COUNTER(point_steps) };
+	COUNTER(steps_in), COUNTER(settled) };
 enum { N_COUNTERS = sizeof counters / sizeof *counters };
 
 #define NUMBER(name_, member)                                                                                \
@@ -66,6 +68,12 @@ static void write_run(quern_h5 *h, quern_run *run, int64_t rows) {
 	write_text(h, "replaced", run->replaced ? run->replaced : "");
 	write_text(h, "limited_by", run->limit_reason);
 	write_plugins(h, run);
+	const hid_t stepped = quern_h5_group(h, h->file, "stepped");
+	for (size_t s = 0; s < run->plan->store.n_sets; s++) {
+		const quern_set_store *set = &run->plan->store.sets[s];
+		if (quern_set_is_counted(set)) quern_h5_integer(h, stepped, set->name, set->stepped);
+	}
+	if (stepped >= 0) H5Gclose(stepped);
 	if (!run->has_grid) return;
 	const uint32_t n = run->grid.view.n_blocks;
 	quern_h5_put(h, h->file, "blocks", H5T_NATIVE_INT32, n, 3, run->grid.at);
@@ -82,6 +90,13 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 			return quern_run_stop(run, QUERN_E_NUMERIC, "%s holds %s at t = %.6g s (step %lld)",
 				run->plan->store.fields[k].name, fault, quern_run_time(run), (long long)run->clock.step);
 	}
+	quern_text wrong = { 0 };
+	const bool accepted = quern_run_accept(run, &wrong);
+	if (!accepted)
+		quern_run_stop(run, QUERN_E_NUMERIC, "%s, at t = %.6g s (step %lld)", quern_text_string(&wrong),
+			quern_run_time(run), (long long)run->clock.step);
+	quern_text_finish(&wrong);
+	if (!accepted) return QUERN_E_NUMERIC;
 	char *path = quern_format("%s/checkpoint.h5", run->folder);
 	bool good = quern_h5_create(&h, run->scene->general.compress, 512);
 	if (good) {
@@ -166,11 +181,10 @@ static bool read_grid(quern_run *run, quern_h5 *h, quern_text *why) {
 /* Counters fit each other: a run that is not settled has no frame, an interval is as long as its steps. */
 static bool clock_holds(const quern_run *run, int64_t rows) {
 	const quern_clock *c = &run->clock;
-	const int64_t most = (int64_t)1 << 53; /* whole numbers beyond are no longer exact in a step's time */
 	const double length = c->end - c->begin, steps = (double)c->steps_in * c->dt;
 	for (size_t i = 0; i < N_COUNTERS; i++) {
 		const int64_t value = *(const int64_t *)(const void *)((const char *)c + counters[i].offset);
-		if (value < -(counters[i].offset == offsetof(quern_clock, frame)) || value > most) return false;
+		if (value < -(counters[i].offset == offsetof(quern_clock, frame)) || value > most_count) return false;
 	}
 	for (size_t i = 0; i < N_NUMBERS; i++) {
 		const double value = *(const double *)(const void *)((const char *)run + numbers[i].offset);
@@ -189,6 +203,14 @@ static bool read_clock(quern_run *run, quern_h5 *h, int64_t *rows, quern_text *w
 		good = good && quern_h5_read_integer(h->file, counters[i].name, counter(run, i));
 	for (size_t i = 0; i < N_NUMBERS; i++)
 		good = good && quern_h5_read_number(h->file, numbers[i].name, number(run, i));
+	const hid_t stepped = quern_h5_find(h->file, "stepped");
+	for (size_t s = 0; s < run->plan->store.n_sets; s++) {
+		quern_set_store *set = &run->plan->store.sets[s];
+		if (quern_set_is_counted(set))
+			good = good && stepped >= 0 && quern_h5_read_integer(stepped, set->name, &set->stepped) &&
+				   set->stepped >= 0 && set->stepped <= most_count;
+	}
+	if (stepped >= 0) H5Gclose(stepped);
 	return (good && clock_holds(run, *rows)) || fault(why, "the counters", "the run");
 }
 
@@ -230,7 +252,7 @@ static bool read_scene(quern_run *run, quern_h5 *h, quern_text *said, quern_text
 	return !why->length;
 }
 
-/* "contact.linear was 0.1.0, revision 1, and is 0.2.0, revision 2": nothing if it is the one that wrote the file. */
+/* "PLUGIN was 0.1.0, revision 1, and is 0.2.0, revision 2": nothing if it is the one that wrote the file. */
 static void compare_plugin(hid_t group, const quern_plugin_file *f, uint64_t is, quern_text *out) {
 	char version[64] = "not there";
 	int64_t revision = 0, was = 0;
@@ -301,7 +323,8 @@ static bool read_all(
 /* What is carried and owed is what the run began with, but for round-off. */
 static bool mass_holds(quern_run *run, quern_text *why) {
 	const quern_account a = quern_run_account(run);
-	const double defect = fabs(a.mass + a.owed - run->mass_initial);
+	const double defect =
+		fabs(quern_account_of(&a, "mass") + quern_account_of(&a, "owed") - run->mass_initial);
 	return !(run->mass_initial > 0) || defect <= 1e-6 * run->mass_initial ||
 		   fault(why, "the masses", "the run");
 }
@@ -314,6 +337,10 @@ quern_status quern_checkpoint_read(
 	const bool good = read_all(run, &h, force, rows, said, why);
 	quern_h5_close(&h);
 	if (!good) return QUERN_E_IO;
-	quern_plan_refresh(run->plan);
+	quern_text wrong = { 0 };
+	const bool accepted = quern_run_accept(run, &wrong);
+	if (!accepted) quern_text_add(why, "it does not fit this scene: %s", quern_text_string(&wrong));
+	quern_text_finish(&wrong);
+	if (!accepted) return QUERN_E_IO;
 	return mass_holds(run, why) ? QUERN_OK : QUERN_E_IO;
 }

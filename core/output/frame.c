@@ -7,15 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Sets as people call them; others are written under their own name. */
-static const char *group_name(const char *set) {
-	static const char *const names[][2] = { { "grain", "grains" }, { "point", "points" }, { "cell", "cells" },
-		{ "contact", "contacts" }, { "touch", "touches" }, { "body", "bodies" } };
-	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-		if (!strcmp(names[i][0], set)) return names[i][1];
-	return set;
-}
-
 /* Vectors have three columns and tensors six or nine in both dimensions, so that every tool reads them. Returns how
  * many columns, and in `from` which component fills each; -1 is zero. */
 static int columns_of(uint8_t shape, uint32_t dim, int from[9]) {
@@ -85,7 +76,7 @@ static void write_centres(quern_h5 *h, hid_t group, const quern_run *run, size_t
 	free(table);
 }
 
-/* A contact's grains go with its force. */
+/* What something points at goes with it. */
 static bool is_shown(const quern_store *store, const quern_field *field) {
 	bool any = field->shown;
 	for (size_t i = 0; i < store->n_fields && !any && field->target >= 0; i++)
@@ -100,7 +91,7 @@ static void write_set(quern_h5 *h, const quern_run *run, int s) {
 	for (size_t k = 0; k < store->n_fields; k++)
 		any = any || (store->fields[k].set == s && is_shown(store, &store->fields[k]));
 	if (!any) return;
-	const hid_t group = quern_h5_group(h, h->file, group_name(set->name));
+	const hid_t group = quern_h5_group(h, h->file, quern_set_plural(set));
 	char position[40];
 	snprintf(position, sizeof position, "%s.position", set->name);
 	const int first = quern_store_field(store, position);

@@ -12,7 +12,7 @@
 enum { LEAF = 256 };
 
 static const quern_observer_ops *ops_of(const quern_run *run, size_t e) {
-	return run->plan->observers[e]->bound->ops;
+	return run->plan->observers[e]->bound.ops;
 }
 
 static uint32_t outputs_of(const quern_observer_ops *ops) {
@@ -109,8 +109,9 @@ static quern_status write_header(const quern_series *s, quern_run *run) {
 static void add_columns(quern_series *s, const quern_run *run) {
 	add_column(s, quern_copy("time"), "s");
 	add_column(s, quern_copy("step"), "1");
-	add_column(s, quern_copy("grains"), "1");
-	add_column(s, quern_copy("points"), "1");
+	for (size_t k = 0; k < run->plan->store.n_sets; k++)
+		if (quern_set_is_counted(&run->plan->store.sets[k]))
+			add_column(s, quern_copy(quern_set_plural(&run->plan->store.sets[k])), "1");
 	for (size_t e = 0; e < run->scene->observe.n; e++)
 		for (const quern_output *out = ops_of(run, e)->outputs; out->name; out++) {
 			quern_observed *c =
@@ -226,7 +227,7 @@ static quern_status ask_all(asking *a, quern_run *run, double *out) {
 }
 
 static quern_status ask(quern_run *run, size_t e, double *out) {
-	const quern_bound *bound = run->plan->observers[e]->bound;
+	const quern_bound *bound = &run->plan->observers[e]->bound;
 	const quern_general *g = &run->scene->general;
 	const size_t n_uses = (size_t)bound->n_uses + 1;
 	asking a = { .bound = bound, .ops = bound->ops, .n_outputs = outputs_of(bound->ops) };
@@ -281,12 +282,13 @@ quern_status quern_series_add(quern_series *s, quern_run *run) {
 	quern_plan_refresh(run->plan);
 	note(&s->column[c++], quern_run_time(run));
 	note(&s->column[c++], (double)run->clock.step);
-	note(&s->column[c++], quern_host_table.set(run, "grain").n);
-	note(&s->column[c++], quern_host_table.set(run, "point").n);
+	for (size_t k = 0; k < run->plan->store.n_sets; k++)
+		if (quern_set_is_counted(&run->plan->store.sets[k]))
+			note(&s->column[c++], run->plan->store.sets[k].n);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
 		const uint32_t n = outputs_of(ops_of(run, e));
 		double *out = calloc(n + 1u, sizeof *out);
-		quern_watch_enter(run->plan->observers[e]->bound->id, ops_of(run, e)->map ? "map" : "whole");
+		quern_watch_enter(run->plan->observers[e]->bound.id, ops_of(run, e)->map ? "map" : "whole");
 		quern_status status = out ? ask(run, e, out) : QUERN_E_MEMORY;
 		quern_watch_leave();
 		if (status == QUERN_OK) status = take_answers(s, run, e, c, out);

@@ -25,7 +25,7 @@ static bool acts(const quern_plan *plan, const quern_section *section) {
 	for (size_t i = 0; i < plan->n_uses; i++) {
 		const quern_plan_use *u = &plan->uses[i];
 		if (u->target < 0 || u->stage < 0 || plan->stages[u->stage].section != section) continue;
-		if (plan->stages[u->stage].phase == QUERN_GRAINS && quern_plan_settles(u->row)) return true;
+		if (plan->stages[u->stage].settles && quern_plan_settles(u->row)) return true;
 	}
 	return section->ops->settled != NULL;
 }
@@ -233,7 +233,7 @@ static bool take_from(quern_run *run, const char *path, const char *depends) {
 	if (access(path, F_OK) || !quern_h5_open(&h, path, unreadable)) return false;
 	taking *t = quern_take(run->plan->store.n_sets, sizeof *t);
 	bool good = look(run, &h, depends, t, &n) && read_clock(run, &h);
-	if (good && !read_sets(run, t, n, &why)) {
+	if (good && !(read_sets(run, t, n, &why) && quern_run_accept(run, &why))) {
 		quern_run_stop(
 			run, QUERN_E_IO, "%s: %s; remove it, or go without by --no-cache", path, quern_text_string(&why));
 		good = false;

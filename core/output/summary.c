@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "summary.h"
+#include "commit.h"
 #include "config.h"
 #include "identity.h"
 #include <jansson.h>
@@ -39,6 +40,7 @@ static json_t *plugins(const quern_run *run) {
 		json_t *one = json_object();
 		json_object_set_new(one, "id", json_string(f->plugin.id));
 		json_object_set_new(one, "version", json_string(f->library->version));
+		json_object_set_new(one, "revision", json_integer(f->plugin.revision));
 		json_object_set_new(one, "file", json_string(f->path));
 		json_object_set_new(one, "hash", hash(f->hash));
 		json_array_append_new(list, one);
@@ -70,15 +72,43 @@ static json_t *observers(const quern_run *run, const quern_series *s) {
 	return all;
 }
 
-/* The grains' share of the mass: the mean of what an observer of it saw, or as it is now. */
+/* The share of the mass that is carried by single ones: the mean of what an observer of it saw, or as it is now. */
 static double discrete_share(const quern_run *run, const quern_series *s, const quern_account *a) {
+	const double mass = quern_account_of(a, "mass");
 	for (size_t c = 0; c < s->n; c++) {
 		const quern_observed *o = &s->column[c];
 		if (o->output && o->n && !strcmp(o->output, "share") &&
-			!strcmp(run->plan->observers[o->observer]->bound->id, "observer.discrete_share"))
+			!strcmp(run->plan->observers[o->observer]->bound.id, "observer.discrete_share"))
 			return o->sum / (double)o->n;
 	}
-	return a->mass > 0 ? a->discrete / a->mass : 0;
+	return mass > 0 ? quern_account_of(a, "discrete") / mass : 0;
+}
+
+/* How many there are of each set that is counted, and how many steps they took. A reader of any run finds those of
+ * `documented`, be it as zeros. */
+static void put_counts(json_t *root, const quern_run *run) {
+	static const char *const documented[][2] = { { "grains", "grain_steps" }, { "points", "point_steps" } };
+	for (size_t k = 0; k < sizeof documented / sizeof *documented; k++) {
+		json_object_set_new(root, documented[k][0], json_integer(0));
+		json_object_set_new(root, documented[k][1], json_integer(0));
+	}
+	for (size_t k = 0; k < run->plan->store.n_sets; k++) {
+		const quern_set_store *set = &run->plan->store.sets[k];
+		if (!quern_set_is_counted(set)) continue;
+		char *steps = quern_format("%s_steps", set->name);
+		json_object_set_new(root, quern_set_plural(set), json_integer(set->n));
+		json_object_set_new(root, steps, json_integer(set->stepped));
+		free(steps);
+	}
+}
+
+/* All that solvers sum up, by the names that they give. */
+static json_t *sums(const quern_account *a) {
+	json_t *all = json_object();
+	for (size_t k = 0; k < a->n; k++)
+		json_object_set_new(all, a->sum[k].name,
+			json_pack("{s:s, s:o}", "unit", a->sum[k].unit, "value", number(a->sum[k].value)));
+	return all;
 }
 
 /* Plugins that took the place of others on the way, a line each. */
@@ -95,6 +125,7 @@ static json_t *replaced(const quern_run *run) {
 static json_t *provenance(quern_run *run) {
 	json_t *p = json_object();
 	json_object_set_new(p, "program", json_string("quern " QUERN_VERSION));
+	json_object_set_new(p, "commit", json_string(QUERN_COMMIT));
 	json_object_set_new(p, "compiler", json_string(QUERN_COMPILER));
 	json_object_set_new(p, "flags", json_string(QUERN_FLAGS));
 	json_object_set_new(p, "scene_hash", hash(quern_run_scene_hash(run)));
@@ -108,6 +139,9 @@ bool quern_summary_write(
 	quern_run *run, const quern_series *series, const char *status, double wall, char why[256]) {
 	const quern_account a = quern_run_account(run);
 	const uint32_t dim = (uint32_t)run->scene->general.dimension;
+	const double mass = quern_account_of(&a, "mass"), owed = quern_account_of(&a, "owed");
+	const double momentum[3] = { quern_account_of(&a, "momentum_x"), quern_account_of(&a, "momentum_y"),
+		quern_account_of(&a, "momentum_z") };
 	struct rusage usage;
 	getrusage(RUSAGE_SELF, &usage);
 	json_t *root = json_object();
@@ -123,19 +157,19 @@ bool quern_summary_write(
 	json_object_set_new(root, "wall_seconds", number(wall));
 	json_object_set_new(root, "settle_seconds", number(run->settle_wall));
 	json_object_set_new(root, "threads", json_integer(quern_pool_workers(run->pool)));
-	json_object_set_new(root, "grains", json_integer(quern_host_table.set(run, "grain").n));
-	json_object_set_new(root, "points", json_integer(quern_host_table.set(run, "point").n));
-	json_object_set_new(root, "grain_steps", json_integer(run->clock.grain_steps));
-	json_object_set_new(root, "point_steps", json_integer(run->clock.point_steps));
+	put_counts(root, run);
 	json_object_set_new(root, "seconds_by_stage", stages(run));
 	json_object_set_new(root, "mass_initial", number(run->mass_initial));
-	json_object_set_new(root, "mass_final", number(a.mass));
-	json_object_set_new(root, "mass_ledger", number(a.owed));
+	json_object_set_new(root, "mass_final", number(mass));
+	json_object_set_new(root, "mass_ledger", number(owed));
 	json_object_set_new(
-		root, "mass_defect", number(run->mass_initial > 0 ? (a.mass + a.owed) / run->mass_initial - 1 : 0));
-	json_object_set_new(root, "invariant_defect", number(a.defect));
-	json_object_set_new(root, "momentum", vector(a.momentum, dim));
-	json_object_set_new(root, "energy", number(a.kinetic + a.potential + a.elastic));
+		root, "mass_defect", number(run->mass_initial > 0 ? (mass + owed) / run->mass_initial - 1 : 0));
+	json_object_set_new(root, "invariant_defect", number(quern_account_of(&a, "defect")));
+	json_object_set_new(root, "momentum", vector(momentum, dim));
+	json_object_set_new(root, "energy",
+		number(quern_account_of(&a, "kinetic") + quern_account_of(&a, "potential") +
+			   quern_account_of(&a, "elastic")));
+	json_object_set_new(root, "sums", sums(&a));
 	json_object_set_new(root, "discrete_share", number(discrete_share(run, series, &a)));
 	json_object_set_new(root, "peak_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024));
 	json_object_set_new(root, "observers", observers(run, series));

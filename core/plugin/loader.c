@@ -17,32 +17,22 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-const char *const quern_kind_names[] = { "solver", "contact", "neighbours", "integrator", "body", "material",
-	"shape", "transfer", "coupling", "oracle", "packer", "observer", NULL };
-
-const char *quern_kind_name(uint32_t kind) {
-	return kind > 0 && kind < QUERN_KINDS ? quern_kind_names[kind - 1] : NULL;
-}
-
 const char *quern_shape_name(uint32_t shape) {
 	static const char *const names[] = { NULL, "a scalar", "a vector", "an axial vector",
 		"a symmetric tensor", "a tensor", "an index", "an id" };
 	return shape < sizeof names / sizeof *names ? names[shape] : NULL;
 }
 
-uint32_t quern_kind_of(const char *name) {
-	for (uint32_t k = 1; k < QUERN_KINDS; k++)
-		if (!strcmp(quern_kind_names[k - 1], name)) return k;
-	return 0;
+const char *quern_id_name(const char *id) {
+	char kind[24];
+	const size_t n = strcspn(id, ".");
+	snprintf(kind, sizeof kind, "%.*s", (int)n, id);
+	return n < sizeof kind && quern_is_name(kind) && id[n] && quern_is_name(id + n + 1) ? id + n + 1 : NULL;
 }
 
-const char *quern_id_name(const char *id) {
-	for (uint32_t k = 1; k < QUERN_KINDS; k++) {
-		const char *kind = quern_kind_name(k);
-		const size_t n = strlen(kind);
-		if (!strncmp(id, kind, n) && id[n] == '.' && quern_is_name(id + n + 1)) return id + n + 1;
-	}
-	return NULL;
+bool quern_id_is_of(const char *id, const char *kind) {
+	const size_t n = strlen(kind);
+	return !strncmp(id, kind, n) && id[n] == '.';
 }
 
 struct quern_loader {
@@ -51,8 +41,12 @@ struct quern_loader {
 	char *own; /* the program's; NULL: there is none */
 	quern_plugin_file **files;
 	size_t n_files, files_capacity;
+	quern_section_of *sections; /* of all solvers that can be found, once somebody has asked */
+	size_t n_sections, sections_capacity;
+	quern_kind **kinds; /* that they call; all that hangs on one is in its own memory */
+	size_t n_kinds, kinds_capacity;
 	int level;
-	bool wary;
+	bool wary, asked; /* for sections */
 };
 
 static bool is_folder(const char *path) {
@@ -102,8 +96,17 @@ quern_loader *quern_loader_create(void) {
 	return loader;
 }
 
+static void section_of_finish(quern_section_of *s) {
+	for (size_t k = 0; k < s->n_sets; k++) free(s->sets[k]);
+	free(s->sets);
+	free(s->section);
+	free(s->solver);
+}
+
 static void file_destroy(quern_plugin_file *file) {
 	if (!file) return;
+	for (size_t i = 0; i < file->n_views; i++) free(file->views[i].ops);
+	free(file->views);
 	free(file->path);
 	quern_table_finish(&file->table);
 	free(file);
@@ -114,6 +117,10 @@ void quern_loader_destroy(quern_loader *loader) {
 	if (!loader) return;
 	for (size_t i = 0; i < loader->n_files; i++) file_destroy(loader->files[i]);
 	for (size_t i = 0; i < loader->n_folders; i++) free(loader->folders[i]);
+	for (size_t i = 0; i < loader->n_sections; i++) section_of_finish(&loader->sections[i]);
+	free(loader->sections);
+	for (size_t i = 0; i < loader->n_kinds; i++) free(loader->kinds[i]);
+	free(loader->kinds);
 	free(loader->files);
 	free(loader->own);
 	free(loader->folders);
@@ -133,7 +140,7 @@ const quern_plugin_file *quern_loader_at(const quern_loader *loader, size_t i) {
 /* ---- reading one library ---- */
 
 static const char *no_library(void *handle, char why[160]) {
-	for (unsigned v = 2; v < 10; v++) {
+	for (unsigned v = 1; v < 10; v++) {
 		char symbol[32];
 		snprintf(symbol, sizeof symbol, "quern_library_%u", v);
 		if (!dlsym(handle, symbol)) continue;
@@ -142,7 +149,8 @@ static const char *no_library(void *handle, char why[160]) {
 			QUERN_ABI_MAJOR);
 		return why;
 	}
-	return "exports no quern_library_1, so it is no Quern plugin: end its source with QUERN_LIBRARY(...)";
+	return "exports no " QUERN_LIBRARY_SYMBOL
+		   ", so it is no Quern plugin: end its source with QUERN_LIBRARY(...)";
 }
 
 static const quern_plugin_file *refuse(
@@ -218,7 +226,7 @@ static void ask(void *arg) {
 	const char *changed;
 	void *handle = open_object(q->path, &changed);
 	*q->mapped = true;
-	const quern_library *lib = handle ? dlsym(handle, "quern_library_1") : NULL;
+	const quern_library *lib = handle ? dlsym(handle, QUERN_LIBRARY_SYMBOL) : NULL;
 	quern_text why = { 0 };
 	quern_table table;
 	if (lib)
@@ -262,7 +270,7 @@ static const quern_plugin_file *open_level(
 		free(text);
 		return NULL;
 	}
-	void *symbol = dlsym(handle, "quern_library_1");
+	void *symbol = dlsym(handle, QUERN_LIBRARY_SYMBOL);
 	if (!symbol) return refuse(report, mark, path, no_library(handle, why));
 	return add_file(loader, path, level, handle, symbol, report, mark);
 }
@@ -352,12 +360,12 @@ static char *find_object(
 }
 
 const quern_plugin_file *quern_loader_find(
-	quern_loader *loader, quern_kind kind, const char *name, quern_report *report, quern_mark mark) {
-	char *id = quern_format("%s.%s", quern_kind_name(kind), name);
+	quern_loader *loader, const char *kind, const char *name, quern_report *report, quern_mark mark) {
+	char *id = quern_format("%s.%s", kind, name);
 	int level = 1;
 	char *found = quern_is_name(name) ? find_object(loader, id, &level, report, mark) : NULL;
 	const quern_plugin_file *file = NULL;
-	if (!found) unknown(loader, quern_kind_name(kind), name, report, mark);
+	if (!found) unknown(loader, kind, name, report, mark);
 	else if (level) file = open_level(loader, found, level, report, mark);
 	if (file && strcmp(file->plugin.id, id) != 0) {
 		quern_report_add(report, mark, "plugin %s calls itself %s: name the file %s.so", found,
@@ -375,16 +383,16 @@ static int by_name(const void *a, const void *b) {
 	return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* "contact.linear" of "contact.linear.v3.so", or NULL if that is no object whose name begins with a kind. */
+/* KIND.NAME of "KIND.NAME.v3.so", or NULL if that is no object whose name begins with a word. */
 static char *id_of_object(const char *name) {
 	const size_t length = strlen(name), n = strcspn(name, ".");
 	if (length < 4 || strcmp(name + length - 3, ".so") != 0) return NULL;
 	char *id = quern_copy(name);
 	id[n] = 0;
-	const bool ours = quern_kind_of(id) != 0;
+	const bool word = quern_is_name(id);
 	memcpy(id, name, n + 1);
 	id[length - (level_of(name) == 1 ? 3 : 6)] = 0;
-	if (ours) return id;
+	if (word) return id;
 	free(id);
 	return NULL;
 }
@@ -435,20 +443,183 @@ char **quern_loader_ids(const quern_loader *loader) {
 	return list.at;
 }
 
+typedef struct {
+	quern_loader *loader;
+	quern_report *report;
+} stray_report;
+
+/* What has no second word is a library of somebody's, unless the word is a kind. */
 static void report_stray(void *to, const char *folder, const char *object, char *id) {
-	if (!quern_id_name(id))
-		quern_report_add(to, (quern_mark) { 0 },
+	const stray_report *r = to;
+	if (!quern_id_name(id) && (strchr(id, '.') || quern_loader_kind(r->loader, id)))
+		quern_report_add(r->report, (quern_mark) { 0 },
 			"plugin %s/%s cannot be asked for by its name: call it KIND.NAME.so, NAME in letters, digits and "
 			"underscores",
 			folder, object);
 	free(id);
 }
 
-void quern_loader_report_strays(const quern_loader *loader, quern_report *report) {
-	visit(loader, report_stray, report);
+void quern_loader_report_strays(quern_loader *loader, quern_report *report) {
+	stray_report r = { loader, report };
+	visit(loader, report_stray, &r);
 }
 
 void quern_loader_free_ids(char **ids) {
 	for (size_t i = 0; ids && ids[i]; i++) free(ids[i]);
 	free(ids);
+}
+
+/* ---- as a caller sees it ---- */
+
+const void *quern_loader_ops(quern_loader *loader, const quern_plugin_file *of, const quern_kind *kind,
+	quern_report *report, quern_mark mark) {
+	quern_plugin_file *file = NULL;
+	quern_text why = { 0 };
+	for (size_t i = 0; i < loader->n_files; i++)
+		if (loader->files[i] == of) file = loader->files[i];
+	for (size_t i = 0; file && i < file->n_views; i++)
+		if (file->views[i].kind == kind || file->views[i].kind->ops_size == kind->ops_size)
+			return file->views[i].ops;
+	void *ops = file ? quern_table_ops_for(&file->table, kind, &why) : NULL;
+	if (!ops) refuse(report, mark, of->path, quern_text_string(&why));
+	quern_text_finish(&why);
+	if (!ops) return NULL;
+	file->views = quern_grow(file->views, file->n_views, &file->views_capacity, sizeof *file->views);
+	file->views[file->n_views++] = (quern_plugin_view) { kind, ops };
+	return ops;
+}
+
+/* ---- which solver reads which section ---- */
+
+bool quern_solver_steps(const quern_solver_ops *ops) {
+	for (const quern_stage *stage = ops->stages; stage->name; stage++)
+		if (stage->phase > QUERN_SETUP && stage->phase < QUERN_OUTPUT) return true;
+	return false;
+}
+
+static char **names_of(const quern_set *sets, size_t *n) {
+	char **names = NULL;
+	size_t capacity = 0;
+	for (*n = 0; sets->name; sets++) {
+		names = quern_grow(names, *n, &capacity, sizeof *names);
+		names[(*n)++] = quern_copy(sets->name);
+	}
+	return names;
+}
+
+/* One block: the kind, its functions, all names. */
+static quern_kind *copy_kind(const quern_kind *kind) {
+	size_t n = 0, letters = strlen(kind->name) + 1;
+	while (kind->functions[n].name) letters += strlen(kind->functions[n++].name) + 1;
+	quern_kind *own = quern_take(1, sizeof *own + (n + 1) * sizeof(quern_function) + letters);
+	quern_function *functions = (quern_function *)(void *)(own + 1);
+	char *names = (char *)(functions + n + 1);
+	*own = *kind;
+	own->functions = functions;
+	own->doc = NULL;
+	own->name = strcpy(names, kind->name);
+	names += strlen(names) + 1;
+	for (size_t i = 0; i < n; i++) {
+		functions[i] = kind->functions[i];
+		functions[i].name = strcpy(names, kind->functions[i].name);
+		names += strlen(names) + 1;
+	}
+	return own;
+}
+
+/* The longest table of a kind that any solver knows. */
+static void note_kind(quern_loader *loader, const quern_kind *kind) {
+	for (size_t i = 0; i < loader->n_kinds; i++) {
+		if (strcmp(loader->kinds[i]->name, kind->name) != 0) continue;
+		if (loader->kinds[i]->ops_size >= kind->ops_size) return;
+		free(loader->kinds[i]);
+		loader->kinds[i] = copy_kind(kind);
+		return;
+	}
+	loader->kinds =
+		quern_grow(loader->kinds, loader->n_kinds, &loader->kinds_capacity, sizeof *loader->kinds);
+	loader->kinds[loader->n_kinds++] = copy_kind(kind);
+}
+
+static void note_section(quern_loader *loader, const quern_library *lib) {
+	quern_table table;
+	quern_text why = { 0 };
+	if (quern_table_read(&table, lib, &why)) { /* what is wrong with it is said when somebody asks for it */
+		const quern_solver_ops *ops = table.plugin.ops;
+		const bool solver = !strcmp(table.kind, quern_solver_kind.name);
+		for (const quern_slot *slot = solver ? ops->slots : NULL; slot && slot->name; slot++)
+			note_kind(loader, slot->kind);
+		if (solver && ops->section) {
+			loader->sections = quern_grow(
+				loader->sections, loader->n_sections, &loader->sections_capacity, sizeof *loader->sections);
+			quern_section_of *s = &loader->sections[loader->n_sections++];
+			*s = (quern_section_of) { quern_copy(ops->section), quern_copy(quern_id_name(table.plugin.id)),
+				NULL, 0 };
+			s->sets = names_of(ops->sets, &s->n_sets);
+			s->steps = quern_solver_steps(ops);
+		}
+	}
+	quern_table_finish(&table);
+	quern_text_finish(&why);
+}
+
+/* Mapped for a moment only: a scene maps what it asks for and no more. */
+static void ask_solver(quern_loader *loader, const char *id, quern_report *nobody) {
+	int level = 1;
+	char *path = find_object(loader, id, &level, nobody, (quern_mark) { 0 });
+	if (path && (!loader->wary || survives(path, nobody, (quern_mark) { 0 }))) {
+		quern_watch_enter(path, "its start-up code");
+		void *handle = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
+		quern_watch_leave();
+		const quern_library *lib = handle ? dlsym(handle, QUERN_LIBRARY_SYMBOL) : NULL;
+		if (lib) note_section(loader, lib);
+		if (handle) dlclose(handle);
+	}
+	free(path);
+}
+
+static int by_section(const void *a, const void *b) {
+	const quern_section_of *x = a, *y = b;
+	const int order = strcmp(x->section, y->section);
+	return order ? order : strcmp(x->solver, y->solver);
+}
+
+static void ask_solvers(quern_loader *loader) {
+	if (!loader->asked) {
+		quern_report *nobody = quern_report_create();
+		char **ids = quern_loader_ids(loader);
+		for (size_t i = 0; ids[i]; i++)
+			if (quern_id_is_of(ids[i], quern_solver_kind.name)) ask_solver(loader, ids[i], nobody);
+		if (loader->n_sections)
+			qsort(loader->sections, loader->n_sections, sizeof *loader->sections, by_section);
+		quern_loader_free_ids(ids);
+		quern_report_destroy(nobody);
+		loader->asked = true;
+	}
+}
+
+const quern_section_of *quern_loader_sections(quern_loader *loader, size_t *n) {
+	ask_solvers(loader);
+	*n = loader->n_sections;
+	return loader->sections;
+}
+
+const quern_kind *quern_loader_kind(quern_loader *loader, const char *name) {
+	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind };
+	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+		if (!strcmp(own[i]->name, name)) return own[i];
+	ask_solvers(loader);
+	for (size_t i = 0; i < loader->n_kinds; i++)
+		if (!strcmp(loader->kinds[i]->name, name)) return loader->kinds[i];
+	return NULL;
+}
+
+char *quern_loader_data(const quern_loader *loader, const char *name) {
+	for (size_t i = 0; i <= loader->n_folders; i++) {
+		const char *folder = i < loader->n_folders ? loader->folders[i] : loader->own;
+		char *path = folder ? quern_format("%s/%s", folder, name) : NULL;
+		if (path && !access(path, R_OK)) return path;
+		free(path);
+	}
+	return NULL;
 }

@@ -4,6 +4,12 @@
 #include "plugin_table.h"
 #include "report.h"
 
+/* The ops of a plugin in the eyes of one caller. */
+typedef struct quern_plugin_view {
+	const quern_kind *kind;
+	void *ops;
+} quern_plugin_view;
+
 /* A plugin as the host sees it: its tables are copies in the host's own layout, see table.h. */
 typedef struct quern_plugin_file {
 	char *path;
@@ -15,8 +21,17 @@ typedef struct quern_plugin_file {
 	const quern_param *params;
 	const quern_use *uses;
 	size_t n_params, n_uses;
+	quern_plugin_view *views;
+	size_t n_views, views_capacity;
 	quern_table table;
 } quern_plugin_file;
+
+/* A solver that reads a section unless the scene names another, and the sets that it makes. */
+typedef struct quern_section_of {
+	char *section, *solver, **sets;
+	size_t n_sets;
+	bool steps; /* it has something to do in a step */
+} quern_section_of;
 
 typedef struct quern_loader quern_loader;
 
@@ -33,9 +48,23 @@ void quern_loader_beware(quern_loader *);
 
 /* The plugin of that kind and bare name, or NULL after one sentence in the report. */
 const quern_plugin_file *quern_loader_find(
-	quern_loader *, quern_kind, const char *name, quern_report *, quern_mark);
+	quern_loader *, const char *kind, const char *name, quern_report *, quern_mark);
 /* One object by its path, whatever its name; NULL after one sentence. */
 const quern_plugin_file *quern_loader_open(quern_loader *, const char *path, quern_report *, quern_mark);
+
+/* Its ops as a caller knows the kind, see quern_table_ops_for; NULL after one sentence. They and `kind` live as long as the
+ * loader. */
+const void *quern_loader_ops(
+	quern_loader *, const quern_plugin_file *, const quern_kind *, quern_report *, quern_mark);
+
+/* All sections that an installed solver reads by itself, sorted. Asks every solver once, and keeps none of them mapped. */
+const quern_section_of *quern_loader_sections(quern_loader *, size_t *n);
+/* Whether any of its stages runs in a step. */
+bool quern_solver_steps(const quern_solver_ops *);
+/* A kind by its name, as whoever calls such plugins describes it; NULL if no installed solver does. */
+const quern_kind *quern_loader_kind(quern_loader *, const char *name);
+/* The path of a file that lies among the plugins, such as a template; NULL if there is none; free() it. */
+char *quern_loader_data(const quern_loader *, const char *name);
 
 /* What is mapped so far, in the order of loading. */
 size_t quern_loader_count(const quern_loader *);
@@ -43,15 +72,12 @@ const quern_plugin_file *quern_loader_at(const quern_loader *, size_t);
 
 /* Every id in the search path, sorted, NULL-terminated; free with quern_loader_free_ids. Loads nothing. */
 char **quern_loader_ids(const quern_loader *);
-/* One sentence for every object there whose name begins with a kind and is no id, so that nobody can ask for it. */
-void quern_loader_report_strays(const quern_loader *, quern_report *);
+/* One sentence for every object there whose name begins with a word and is no id, so that nobody can ask for it. */
+void quern_loader_report_strays(quern_loader *, quern_report *);
 void quern_loader_free_ids(char **);
 
-/* "contact"; NULL if there is no such kind */
-const char *quern_kind_name(uint32_t kind);
-/* "linear" of "contact.linear"; NULL if it is no id */
+/* NAME of KIND.NAME; NULL if it is no id */
 const char *quern_id_name(const char *id);
+bool quern_id_is_of(const char *id, const char *kind);
 /* "an axial vector"; NULL if there is no such shape */
 const char *quern_shape_name(uint32_t shape);
-uint32_t quern_kind_of(const char *name);    /* 0: none */
-extern const char *const quern_kind_names[]; /* NULL-terminated, without the zeroth */

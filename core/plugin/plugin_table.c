@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What interface 1.0 has of each table: less was built with none of our headers. */
+/* What interface 2.0 has of each table: less was built with none of our headers. */
 #define UP_TO(type, member) (offsetof(type, member) + sizeof(((type *)0)->member))
 enum {
-	LIBRARY_1_0 = UP_TO(quern_library, plugin),
-	PLUGIN_1_0 = UP_TO(quern_plugin, ops),
-	PARAM_1_0 = UP_TO(quern_param, pad),
-	USE_1_0 = UP_TO(quern_use, hook),
+	LIBRARY_2_0 = UP_TO(quern_library, plugin),
+	PLUGIN_2_0 = UP_TO(quern_plugin, ops),
+	PARAM_2_0 = UP_TO(quern_param, pad),
+	USE_2_0 = UP_TO(quern_use, hook),
 	WIDEST_ROW = 1024,
 	LONGEST_DOC = 1 << 16,
 	MOST_IN_ALL = 4096
@@ -234,7 +234,7 @@ static bool library(quern_table_reader *r, const quern_library *lib) {
 	quern_library *l = &r->table->library;
 	uint32_t head[2]; /* size and abi, which every version has */
 	memcpy(head, lib, sizeof head);
-	if (head[1] >> 16 != QUERN_ABI_MAJOR || (head[1] & 0xffffu) > QUERN_ABI_MINOR || head[0] < LIBRARY_1_0) {
+	if (head[1] >> 16 != QUERN_ABI_MAJOR || (head[1] & 0xffffu) > QUERN_ABI_MINOR || head[0] < LIBRARY_2_0) {
 		quern_text_add(r->why,
 			"is built for interface %u.%u, this program speaks %u.%u: rebuild it with this header",
 			head[1] >> 16, head[1] & 0xffffu, QUERN_ABI_MAJOR, QUERN_ABI_MINOR);
@@ -245,7 +245,7 @@ static bool library(quern_table_reader *r, const quern_library *lib) {
 		quern_text_add(r->why, "is built for another number format: rebuild it with this program's header");
 		return false;
 	}
-	if (!is_stride(l->param_size, PARAM_1_0) || !is_stride(l->use_size, USE_1_0))
+	if (!is_stride(l->param_size, PARAM_2_0) || !is_stride(l->use_size, USE_2_0))
 		return quern_table_refuse(
 			r, "rows of %u and %u bytes: end the source with QUERN_LIBRARY(...)", l->param_size, l->use_size);
 	if (!is_doc(l->name) || !is_doc(l->version) || !is_doc(l->license) || !is_doc(l->build))
@@ -256,12 +256,12 @@ static bool library(quern_table_reader *r, const quern_library *lib) {
 }
 
 static bool identity(quern_table_reader *r, const quern_plugin *p) {
-	const char *kind = quern_kind_name(p->kind);
-	const size_t n = kind ? strlen(kind) : 0;
-	if (!is_dotted(p->id, 2) || !kind || strncmp(p->id, kind, n) != 0 || p->id[n] != '.') {
-		quern_text_add(r->why, "has an id that does not begin with its kind: name it KIND.NAME");
+	const size_t n = p->id ? strcspn(p->id, ".") : 0;
+	if (!is_dotted(p->id, 2) || n >= sizeof r->table->kind) {
+		quern_text_add(r->why, "has an id that is not KIND.NAME, two words");
 		return false;
 	}
+	snprintf(r->table->kind, sizeof r->table->kind, "%.*s", (int)n, p->id);
 	if (!p->dims || p->dims & ~(uint32_t)(QUERN_2D | QUERN_3D))
 		return quern_table_refuse(r, "dims is %u, must be QUERN_2D, QUERN_3D or both", p->dims);
 	if (!p->instance_size || p->instance_size > QUERN_LARGEST_INSTANCE)
@@ -276,7 +276,7 @@ static bool plugin(quern_table_reader *r) {
 	quern_table *t = r->table;
 	quern_plugin *p = &t->plugin;
 	const quern_plugin *from = t->library.plugin;
-	if (from && from->size >= PLUGIN_1_0) memcpy(p, from, from->size < sizeof *p ? from->size : sizeof *p);
+	if (from && from->size >= PLUGIN_2_0) memcpy(p, from, from->size < sizeof *p ? from->size : sizeof *p);
 	if (!p->id || !p->ops || !p->params || !p->uses) {
 		quern_text_add(r->why, "describes no plugin: its table lacks id, params, uses or ops");
 		return false;

@@ -6,12 +6,17 @@
  * it was looked at here. Where a pointer leads cannot be asked: that takes a child, see child.h. */
 #pragma once
 #include "text.h"
-#include <quern/abi.h>
+#include <quern/observer.h>
+#include <quern/solver.h>
+
+/* Most sums that the account of a solver may give, and that all of them may give together. */
+enum { QUERN_MOST_SUMS = 64 };
 
 /* The copies; all of them belong to `owned`. */
 typedef struct quern_table {
 	quern_library library; /* texts that are missing are "" */
-	quern_plugin plugin;   /* params, uses and ops are copies */
+	quern_plugin plugin;   /* params and uses are copies; ops too, of kinds that the program itself calls */
+	char kind[24];         /* the first word of its id */
 	quern_param *params;
 	quern_use *uses;
 	size_t n_params, n_uses;
@@ -28,14 +33,6 @@ void quern_table_finish(quern_table *);
  * free() it. */
 quern_use *quern_table_uses_for(const quern_table *, const quern_library *reader);
 
-/* A function of the ops of a kind, by its place in their table. */
-typedef struct quern_function {
-	const char *name; /* "force" */
-	uint32_t kind, at;
-	uint32_t dim; /* 2, 3; 0: for both */
-	bool required;
-} quern_function;
-
-extern const quern_function quern_functions[]; /* name NULL: the end */
-/* NULL if the table has no such function. */
-void (*quern_function_of(const quern_plugin *, const quern_function *))(void);
+/* The ops as a caller who knows the kind so far reads them: what an older plugin lacks is zero. Every function that the kind
+ * requires for the plugin's dimensions is there. NULL after "has a faulty table: ..."; free() it. */
+void *quern_table_ops_for(const quern_table *, const quern_kind *, quern_text *why);

@@ -1,110 +1,84 @@
 /* SPDX-License-Identifier: MIT */
-/* table_ops - the functions of every kind, and the tables that solvers and observers hang on theirs */
-#include "loader.h"
+/* table_ops - tables of functions: their length by their kind, and what solvers and observers hang on theirs */
 #include "param.h"
 #include "plugin_table_read.h"
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_SETS = 32, MOST_SLOTS = 32, MOST_STAGES = 64, MOST_STAGE_USES = 256, LARGEST_OPS = 4096 };
+enum {
+	MOST_SETS = 32,
+	MOST_SLOTS = 32,
+	MOST_STAGES = 64,
+	MOST_STAGE_USES = 256,
+	MOST_FUNCTIONS = 64,
+	MOST_SECTIONS = 16,
+	LARGEST_OPS = 4096,
+	LARGEST_ENTRY = 1024
+};
 
-#define EACH(kind, type, member)                                                                             \
-	{ #member, kind, (uint32_t)offsetof(type, member[0]), 2, true }, {                                       \
-#member, kind, (uint32_t)offsetof(type, member[1]), 3, true                                          \
-	}
-#define EITHER(kind, type, member)                                                                           \
-	{ #member, kind, (uint32_t)offsetof(type, member[0]), 2, false }, {                                      \
-#member, kind, (uint32_t)offsetof(type, member[1]), 3, false                                         \
-	}
-#define ONE(kind, type, member)                                                                              \
-	{ #member, kind, (uint32_t)offsetof(type, member), 0, true }
-#define MAYBE(kind, type, member)                                                                            \
-	{ #member, kind, (uint32_t)offsetof(type, member), 0, false }
+/* ---- a kind's functions ---- */
 
-const quern_function quern_functions[] = { EACH(QUERN_CONTACT, quern_contact_ops, force),
-	MAYBE(QUERN_CONTACT, quern_contact_ops, period), MAYBE(QUERN_CONTACT, quern_contact_ops, stiffness),
-	MAYBE(QUERN_CONTACT, quern_contact_ops, reach), MAYBE(QUERN_CONTACT, quern_contact_ops, damping),
-	ONE(QUERN_NEIGHBOURS, quern_neighbour_ops, keys), MAYBE(QUERN_NEIGHBOURS, quern_neighbour_ops, index),
-	ONE(QUERN_NEIGHBOURS, quern_neighbour_ops, pairs), EACH(QUERN_INTEGRATOR, quern_integrator_ops, close),
-	EITHER(QUERN_INTEGRATOR, quern_integrator_ops, open), ONE(QUERN_BODY, quern_body_ops, closest),
-	MAYBE(QUERN_BODY, quern_body_ops, features), ONE(QUERN_BODY, quern_body_ops, bounds),
-	EACH(QUERN_MATERIAL, quern_material_ops, update), EACH(QUERN_MATERIAL, quern_material_ops, assign),
-	ONE(QUERN_MATERIAL, quern_material_ops, moduli), ONE(QUERN_SHAPE, quern_shape_ops, weights),
-	ONE(QUERN_SHAPE, quern_shape_ops, shares), ONE(QUERN_SHAPE, quern_shape_ops, stiffness),
-	EACH(QUERN_TRANSFER, quern_transfer_ops, gather), ONE(QUERN_COUPLING, quern_coupling_ops, couple),
-	ONE(QUERN_ORACLE, quern_oracle_ops, mark), ONE(QUERN_ORACLE, quern_oracle_ops, decide),
-	MAYBE(QUERN_ORACLE, quern_oracle_ops, surface), EACH(QUERN_PACKER, quern_packer_ops, pack),
-	MAYBE(QUERN_OBSERVER, quern_observer_ops, map), MAYBE(QUERN_OBSERVER, quern_observer_ops, whole),
-	MAYBE(QUERN_SOLVER, quern_solver_ops, ready), MAYBE(QUERN_SOLVER, quern_solver_ops, limit),
-	MAYBE(QUERN_SOLVER, quern_solver_ops, substeps), MAYBE(QUERN_SOLVER, quern_solver_ops, settled),
-	MAYBE(QUERN_SOLVER, quern_solver_ops, account), MAYBE(QUERN_SOLVER, quern_solver_ops, settling),
-	{ .name = NULL } };
+typedef void function(void);
 
-/* The host's own sizes. */
-static const size_t sizes[QUERN_KINDS] = { [QUERN_SOLVER] = sizeof(quern_solver_ops),
-	[QUERN_CONTACT] = sizeof(quern_contact_ops),
-	[QUERN_NEIGHBOURS] = sizeof(quern_neighbour_ops),
-	[QUERN_INTEGRATOR] = sizeof(quern_integrator_ops),
-	[QUERN_BODY] = sizeof(quern_body_ops),
-	[QUERN_MATERIAL] = sizeof(quern_material_ops),
-	[QUERN_SHAPE] = sizeof(quern_shape_ops),
-	[QUERN_TRANSFER] = sizeof(quern_transfer_ops),
-	[QUERN_COUPLING] = sizeof(quern_coupling_ops),
-	[QUERN_ORACLE] = sizeof(quern_oracle_ops),
-	[QUERN_PACKER] = sizeof(quern_packer_ops),
-	[QUERN_OBSERVER] = sizeof(quern_observer_ops) };
-
-void (*quern_function_of(const quern_plugin *p, const quern_function *f))(void) {
-	void (*function)(void);
-	memcpy(&function, (const char *)p->ops + f->at, sizeof function);
-	return function;
+static function *function_at(const void *ops, const quern_function *f) {
+	function *at;
+	memcpy(&at, (const char *)ops + f->offset, sizeof at);
+	return at;
 }
 
-static bool functions(quern_table_reader *r) {
-	const quern_plugin *p = &r->table->plugin;
-	for (const quern_function *f = quern_functions; f->name; f++) {
-		if (f->kind != p->kind || !f->required || quern_function_of(p, f)) continue;
-		if (!f->dim) return quern_table_refuse(r, "ops lacks the function %s", f->name);
-		if (p->dims & (f->dim == 2 ? QUERN_2D : QUERN_3D))
-			return quern_table_refuse(
-				r, "ops lacks the function %s for %u-D, which dims promises", f->name, f->dim);
+static bool has_functions(quern_text *why, const quern_plugin *p, const quern_kind *kind, const void *ops) {
+	for (const quern_function *f = kind->functions; f->name; f++) {
+		const uint32_t dims = f->dim == 2 ? QUERN_2D : QUERN_3D;
+		if (!f->required || function_at(ops, f) || (f->dim && !(p->dims & dims))) continue;
+		quern_text_add(why, "has a faulty table: ops lacks the function %s", f->name);
+		if (f->dim) quern_text_add(why, " for %u-D, which dims promises", f->dim);
+		return false;
 	}
 	return true;
 }
 
-/* ---- observers ---- */
-
-static bool observer(quern_table_reader *r, const quern_observer_ops *ops) {
-	size_t n = 0;
-	if ((ops->map != NULL) == (ops->whole != NULL) || (ops->map && !ops->set))
-		return quern_table_refuse(r, "ops has map, with the set that it runs over, or whole, and not both");
-	for (const quern_output *o = ops->outputs; o && o->name; o++) {
-		if (n++ >= QUERN_MOST_ROWS)
-			return quern_table_refuse(r, "more than %d outputs, so the last one has a name", QUERN_MOST_ROWS);
-		if (!quern_table_text(o->name, QUERN_LONGEST_NAME) || !quern_is_name(o->name) ||
-			o->combine > QUERN_MIN)
-			return quern_table_refuse(
-				r, "output '%.60s' has a name that is no word, or another way to combine", o->name);
-		if (!quern_table_text(o->unit, QUERN_LONGEST_NAME) || !quern_table_text(o->doc, 1 << 16))
-			return quern_table_refuse(r, "unit or doc of output %s is no plain text", o->name);
+void *quern_table_ops_for(const quern_table *t, const quern_kind *kind, quern_text *why) {
+	uint32_t size;
+	memcpy(&size, t->plugin.ops, sizeof size);
+	if (size > kind->ops_size) {
+		quern_text_add(why,
+			"has %u bytes of functions, where whoever calls it knows %u of a %s: it is built with a newer "
+			"header "
+			"of its kind; rebuild both with one",
+			size, kind->ops_size, kind->name);
+		return NULL;
 	}
-	return n || quern_table_refuse(r, "an observer without outputs");
+	void *ops = quern_take(1, kind->ops_size);
+	memcpy(ops, t->plugin.ops, size);
+	if (has_functions(why, &t->plugin, kind, ops)) return ops;
+	free(ops);
+	return NULL;
 }
 
-/* ---- solvers ---- */
+/* ---- tables of entries that have a name first ---- */
 
-/* How many entries a table of named things has; false if it goes on beyond `most`. Its entries have no stride: they are
- * what this header says they are. */
+/* How many entries there are, each of `stride` bytes; false if they go on beyond `most`. */
 static bool count(
-	quern_table_reader *r, const char *what, const void *table, size_t size, size_t most, size_t *n) {
+	quern_table_reader *r, const char *what, const void *table, uint32_t stride, size_t most, size_t *n) {
+	if (stride < sizeof(char *) || stride > LARGEST_ENTRY || stride % 8)
+		return quern_table_refuse(r,
+			"%s of %u bytes each: set the sizes of ops by QUERN_SOLVER_SIZES, or output_size", what, stride);
 	for (*n = 0; table; ++*n) {
 		const char *name;
-		memcpy(&name, (const char *)table + *n * size, sizeof name);
+		memcpy(&name, (const char *)table + *n * stride, sizeof name);
 		if (!name) break;
 		if (*n >= most)
 			return quern_table_refuse(r, "more than %zu %s, so the last one has a name", most, what);
 	}
 	return true;
+}
+
+/* A copy in the host's own layout: what the plugin does not know is zero. */
+static void *copy(quern_table_reader *r, const void *table, uint32_t stride, size_t own, size_t n) {
+	char *to = quern_table_keep(r, (n + 1) * own);
+	for (size_t i = 0; i < n; i++)
+		memcpy(to + i * own, (const char *)table + i * stride, stride < own ? stride : own);
+	return to;
 }
 
 static bool is_short_name(const char *name) { return quern_table_text(name, 23) && quern_is_name(name); }
@@ -113,30 +87,89 @@ static bool is_label(const char *name) {
 	return !name || (*name && quern_table_text(name, QUERN_LONGEST_NAME));
 }
 
+/* ---- numbers that come out ---- */
+
+static bool outputs(quern_table_reader *r, const char *what, const quern_output **table, uint32_t stride,
+	size_t most, size_t *n) {
+	if (!count(r, what, *table, stride, most, n)) return false;
+	quern_output *own = copy(r, *table, stride, sizeof *own, *n);
+	for (size_t i = 0; i < *n; i++) {
+		if (!quern_table_text(own[i].name, QUERN_LONGEST_NAME) || !quern_is_name(own[i].name) ||
+			own[i].combine > QUERN_MIN)
+			return quern_table_refuse(
+				r, "output '%.60s' has a name that is no word, or another way to combine", own[i].name);
+		if (!quern_table_text(own[i].unit, QUERN_LONGEST_NAME) || !quern_table_text(own[i].doc, 1 << 16))
+			return quern_table_refuse(r, "unit or doc of output %s is no plain text", own[i].name);
+	}
+	*table = own;
+	return true;
+}
+
+static bool observer(quern_table_reader *r, quern_observer_ops *ops) {
+	size_t n;
+	if ((ops->map != NULL) == (ops->whole != NULL) || (ops->map && !ops->set))
+		return quern_table_refuse(r, "ops has map, with the set that it runs over, or whole, and not both");
+	if (!outputs(r, "outputs", &ops->outputs, ops->output_size, QUERN_MOST_ROWS, &n)) return false;
+	return n || quern_table_refuse(r, "an observer without outputs");
+}
+
+/* ---- kinds that a solver calls ---- */
+
+static bool functions(quern_table_reader *r, quern_kind *kind) {
+	size_t n;
+	if (!count(r, "functions of a kind", kind->functions, kind->function_size, MOST_FUNCTIONS, &n))
+		return false;
+	quern_function *own = copy(r, kind->functions, kind->function_size, sizeof *own, n);
+	for (size_t i = 0; i < n; i++)
+		if (!is_short_name(own[i].name) || own[i].offset < 8 || own[i].offset % 8 ||
+			own[i].offset + sizeof(function *) > kind->ops_size || own[i].dim == 1 || own[i].dim > 3)
+			return quern_table_refuse(r, "kind %s: function %zu is faulty; use QUERN_KIND", kind->name, i);
+	kind->functions = own;
+	return true;
+}
+
+static bool kind(quern_table_reader *r, const char *slot, const quern_kind **at) {
+	uint32_t size = 0;
+	if (*at) memcpy(&size, *at, sizeof size);
+	if (size < offsetof(quern_kind, functions) + sizeof(void *) || size > LARGEST_ENTRY)
+		return quern_table_refuse(r, "slot %s: there is no kind; use QUERN_KIND", slot);
+	quern_kind *own = quern_table_keep(r, sizeof *own);
+	memcpy(own, *at, size < sizeof *own ? size : sizeof *own);
+	if (!own->name || !is_short_name(own->name) || !quern_table_text(own->doc, 1 << 16) ||
+		own->ops_size < 8 || own->ops_size > LARGEST_OPS || own->ops_size % 8)
+		return quern_table_refuse(
+			r, "slot %s: its kind has no name, or ops of %u bytes", slot, own->ops_size);
+	if (!strcmp(own->name, quern_solver_kind.name))
+		return quern_table_refuse(r, "slot %s: a solver sits in no slot", slot);
+	*at = own;
+	return functions(r, own);
+}
+
+/* ---- solvers ---- */
+
 static bool has_stage(const quern_solver_ops *ops, const char *name) {
-	for (const quern_stage *s = ops->stages; s && s->name; s++)
+	for (const quern_stage *s = ops->stages; s->name; s++)
 		if (!strcmp(s->name, name)) return true;
 	return false;
 }
 
 static bool has_slot(const quern_solver_ops *ops, const char *name) {
-	for (const quern_slot *s = ops->slots; s && s->name; s++)
+	for (const quern_slot *s = ops->slots; s->name; s++)
 		if (!strcmp(s->name, name)) return true;
 	return false;
 }
 
-static bool sets(quern_table_reader *r, const quern_solver_ops *ops) {
-	size_t n;
-	if (!count(r, "sets", ops->sets, sizeof(quern_set), MOST_SETS, &n)) return false;
-	for (const quern_set *s = ops->sets; s && s->name; s++) {
-		if (!is_short_name(s->name))
-			return quern_table_refuse(r, "set '%.60s': a word of at most 23 letters is wanted", s->name);
-		if (s->rows && s->rows != 8)
-			return quern_table_refuse(r, "set %s: rows is %u, must be 0 or 8", s->name, s->rows);
-		if (!is_label(s->slot) || (s->slot && !has_slot(ops, s->slot)))
-			return quern_table_refuse(
-				r, "set %s hangs on the slot '%.60s', and there is none", s->name, s->slot);
-	}
+static bool set(quern_table_reader *r, const quern_solver_ops *ops, const quern_set *s) {
+	if (!is_short_name(s->name))
+		return quern_table_refuse(r, "set '%.60s': a word of at most 23 letters is wanted", s->name);
+	if (s->rows && s->rows != 8)
+		return quern_table_refuse(r, "set %s: rows is %u, must be 0 or 8", s->name, s->rows);
+	if (s->plural && !is_short_name(s->plural))
+		return quern_table_refuse(r, "set %s: the plural '%.60s' is no word", s->name, s->plural);
+	if (!(s->cost[0] >= 0 && s->cost[0] < 1 && s->cost[1] >= 0 && s->cost[1] < 1))
+		return quern_table_refuse(r, "set %s: a step of one entry costs less than a second", s->name);
+	if (!is_label(s->slot) || (s->slot && !has_slot(ops, s->slot)))
+		return quern_table_refuse(r, "set %s hangs on the slot '%.60s', and there is none", s->name, s->slot);
 	return true;
 }
 
@@ -154,10 +187,9 @@ static bool slot(quern_table_reader *r, const quern_solver_ops *ops, quern_slot 
 	quern_param *rows;
 	if (!quern_table_text(s->name, QUERN_LONGEST_NAME) || !quern_table_text(s->doc, 1 << 16) ||
 		!quern_table_text(s->def, 1 << 16) || !is_label(s->same_as) || !is_label(s->repeat) ||
-		!is_label(s->particle) || !is_label(s->override))
+		!is_label(s->again) || !is_label(s->particle) || !is_label(s->override))
 		return quern_table_refuse(r, "slot '%.60s': one of its texts is no plain text", s->name);
-	if (!quern_kind_name(s->kind) || s->kind == QUERN_SOLVER)
-		return quern_table_refuse(r, "slot %s: kind %u is unknown", s->name, s->kind);
+	if (!kind(r, s->name, &s->kind)) return false;
 	for (int h = 0; h < 3; h++)
 		if (!is_label(s->stage[h]) || (s->stage[h] && !has_stage(ops, s->stage[h])))
 			return quern_table_refuse(r, "slot %s: there is no stage '%.60s'", s->name, s->stage[h]);
@@ -166,6 +198,8 @@ static bool slot(quern_table_reader *r, const quern_solver_ops *ops, quern_slot 
 	if (s->override && !strchr(s->override, '.'))
 		return quern_table_refuse(
 			r, "slot %s: it overrides '%s', which is no SECTION.SLOT", s->name, s->override);
+	if (!s->repeat != !s->again)
+		return quern_table_refuse(r, "slot %s: repeat and again are a pair of sets", s->name);
 	if (!s->rows != !s->item_size || s->item_size > QUERN_LARGEST_INSTANCE)
 		return quern_table_refuse(
 			r, "slot %s: rows and item_size go together, and it is %u", s->name, s->item_size);
@@ -180,45 +214,72 @@ static bool stage(quern_table_reader *r, quern_stage *s) {
 	quern_use *uses;
 	if (!is_label(s->name) || !quern_table_text(s->doc, 1 << 16))
 		return quern_table_refuse(r, "stage '%.60s': its name or doc is no plain text", s->name);
-	if (s->phase >= QUERN_PHASES || !s->run || !s->uses)
-		return quern_table_refuse(
-			r, "stage %s: phase %u is unknown, or there is no run or no uses", s->name, s->phase);
+	if (s->phase >= QUERN_PHASES || !s->run || !s->uses || s->flags > 2 * QUERN_SETTLES - 1)
+		return quern_table_refuse(r,
+			"stage %s: phase %u or flags %u are unknown, or there is no run or no uses", s->name, s->phase,
+			s->flags);
+	if (s->flags & QUERN_SETTLES && s->phase != QUERN_SUBSTEP)
+		return quern_table_refuse(r, "stage %s: only what runs in QUERN_SUBSTEP settles", s->name);
 	if (!quern_table_uses(r, s->name, s->uses, MOST_STAGE_USES, r->table->params, &uses, &n)) return false;
 	s->uses = uses;
 	return true;
 }
 
-/* Slots and stages are copied for the sake of the rows that hang on them. */
-static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
-	size_t n_slots, n_stages;
-	if (!count(r, "slots", ops->slots, sizeof(quern_slot), MOST_SLOTS, &n_slots) ||
-		!count(r, "stages", ops->stages, sizeof(quern_stage), MOST_STAGES, &n_stages) || !sets(r, ops))
-		return false;
-	if (!n_stages) return quern_table_refuse(r, "a solver without stages");
-	quern_slot *slots = quern_table_keep(r, (n_slots + 1) * sizeof *slots);
-	quern_stage *stages = quern_table_keep(r, (n_stages + 1) * sizeof *stages);
-	if (n_slots) memcpy(slots, ops->slots, n_slots * sizeof *slots);
-	memcpy(stages, ops->stages, n_stages * sizeof *stages);
-	for (size_t i = 0; i < n_stages; i++)
-		if (!stage(r, &stages[i])) return false;
-	for (size_t i = 0; i < n_slots; i++)
-		if (!slot(r, ops, &slots[i])) return false;
-	ops->slots = slots;
-	ops->stages = stages;
+static bool sections(quern_table_reader *r, const char *what, const char *const *list) {
+	for (size_t n = 0; list && list[n]; n++)
+		if (n >= MOST_SECTIONS || !is_short_name(list[n]))
+			return quern_table_refuse(
+				r, "%s: '%.60s' is no section, or there is no NULL at the end", what, list[n]);
 	return true;
 }
 
+static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
+	size_t n_sets, n_slots, n_stages, n_sums = 0;
+	if (ops->section && !is_short_name(ops->section))
+		return quern_table_refuse(r, "the section '%.60s' is no word", ops->section);
+	if (ops->bound_size < sizeof(void *) || ops->bound_size > LARGEST_ENTRY || ops->bound_size % 8)
+		return quern_table_refuse(
+			r, "bound_size is %u: set the sizes of ops by QUERN_SOLVER_SIZES", ops->bound_size);
+	if (!sections(r, "needs", ops->needs) || !sections(r, "with", ops->with) ||
+		!sections(r, "after", ops->after))
+		return false;
+	if (!count(r, "sets", ops->sets, ops->set_size, MOST_SETS, &n_sets) ||
+		!count(r, "slots", ops->slots, ops->slot_size, MOST_SLOTS, &n_slots) ||
+		!count(r, "stages", ops->stages, ops->stage_size, MOST_STAGES, &n_stages) ||
+		!outputs(r, "sums", &ops->sums, ops->output_size, QUERN_MOST_SUMS, &n_sums))
+		return false;
+	if (!n_stages) return quern_table_refuse(r, "a solver without stages");
+	if (!n_sums != !ops->account) return quern_table_refuse(r, "sums and account go together");
+	quern_set *own_sets = copy(r, ops->sets, ops->set_size, sizeof *own_sets, n_sets);
+	quern_slot *own_slots = copy(r, ops->slots, ops->slot_size, sizeof *own_slots, n_slots);
+	quern_stage *own_stages = copy(r, ops->stages, ops->stage_size, sizeof *own_stages, n_stages);
+	ops->sets = own_sets, ops->slots = own_slots, ops->stages = own_stages;
+	for (size_t i = 0; i < n_stages; i++)
+		if (!stage(r, &own_stages[i])) return false;
+	for (size_t i = 0; i < n_sets; i++)
+		if (!set(r, ops, &own_sets[i])) return false;
+	for (size_t i = 0; i < n_slots; i++)
+		if (!slot(r, ops, &own_slots[i])) return false;
+	return true;
+}
+
+/* ---- of any plugin ---- */
+
 bool quern_table_ops(quern_table_reader *r, const void *from) {
-	quern_plugin *p = &r->table->plugin;
-	const size_t own = sizes[p->kind];
+	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind };
 	uint32_t size;
 	memcpy(&size, from, sizeof size);
 	if (size < 8 || size > LARGEST_OPS || size % 8)
 		return quern_table_refuse(r, "ops has the size %u: set .size = sizeof ops", size);
-	void *ops = quern_table_keep(r, own);
-	memcpy(ops, from, size < own ? size : own);
-	p->ops = ops;
-	if (p->kind == QUERN_SOLVER) return solver(r, ops) && functions(r);
-	if (p->kind == QUERN_OBSERVER) return observer(r, ops) && functions(r);
-	return functions(r);
+	for (size_t k = 0; k < sizeof own / sizeof *own; k++) {
+		if (strcmp(r->table->kind, own[k]->name) != 0) continue;
+		void *ops = quern_table_ops_for(r->table, own[k], r->why);
+		if (!ops) return false;
+		void *kept = quern_table_keep(r, own[k]->ops_size);
+		memcpy(kept, ops, own[k]->ops_size);
+		free(ops);
+		r->table->plugin.ops = kept;
+		return k == 0 ? solver(r, kept) : observer(r, kept);
+	}
+	return true;
 }

@@ -63,15 +63,16 @@ static const quern_plugin_file *plugin_at(uintptr_t address) {
 static const char *function_at(const quern_plugin_file *f, uintptr_t address) {
 	const char *name = NULL;
 	uintptr_t best = 0;
-	for (const quern_function *o = quern_functions; o->name; o++) {
-		if (o->kind != f->plugin.kind) continue;
-		const uintptr_t at = (uintptr_t)quern_function_of(&f->plugin, o);
+	const quern_plugin_view *view = f->n_views ? &f->views[0] : NULL;
+	for (const quern_function *o = view ? view->kind->functions : NULL; o && o->name; o++) {
+		uintptr_t at;
+		memcpy(&at, (const char *)view->ops + o->offset, sizeof at);
 		if (at && at <= address && at > best) best = at, name = o->name;
 	}
 	return name;
 }
 
-/* "quern: error: contact.linear crashed in force, called by dem.forces, at FILE+0x1234; out/x keeps ..." */
+/* "quern: error: PLUGIN crashed in FUNCTION, called by STAGE, at FILE+0x1234; out/x keeps ..." */
 static void say(const char *what, uintptr_t address) {
 	const quern_plugin_file *f = plugin_at(address);
 	const bool other =

@@ -6,19 +6,32 @@
 
 static const double day = 86400;
 
-/* A rough price: 40 and 100 ns per grain and step in 2-D and 3-D on one core, before anything was measured here. */
+/* s on one core for one step of all entries that are counted, by the rough prices in the tables of their solvers: in
+ * substeps, or else in whole steps. */
+static double price(const quern_run *run, bool substeps) {
+	double sum = 0;
+	for (size_t i = 0; i < run->scene->n_sections; i++) {
+		const quern_section *section = &run->scene->sections[i];
+		if (quern_section_takes_substeps(section) != substeps) continue;
+		for (const quern_set *set = section->ops->sets; set->name; set++)
+			if (set->counted)
+				sum += set->cost[run->scene->general.dimension - 2] *
+					   quern_host_table.set((quern_run *)(uintptr_t)run, set->name).n;
+	}
+	return sum;
+}
+
 quern_estimate quern_estimate_of(quern_run *run) {
 	const quern_general *g = &run->scene->general;
-	const double each = g->dimension == 2 ? 40e-9 : 100e-9;
-	const double grains = quern_host_table.set(run, "grain").n, points = quern_host_table.set(run, "point").n;
+	const double substep = price(run, true), step = price(run, false);
 	quern_estimate e = { .substeps = quern_run_substeps(run) };
 	const double limit = quern_run_limit(run, &e.hard, e.reason, e.hard_reason);
 	e.step = g->step > 0 ? g->step : limit;
 	if (g->step > 0) snprintf(e.reason, sizeof e.reason, "the scene's time.step");
 	if (!run->clock.settled) e.settle_steps = ceil(quern_run_settling(run, &e.settle_step));
 	e.steps = isfinite(e.step) ? ceil((g->end - quern_run_time(run)) / e.step) : 1;
-	e.settling = e.settle_steps * grains * each;
-	e.running = e.steps * (e.substeps * grains + points) * each;
+	e.settling = e.settle_steps * substep;
+	e.running = e.steps * (e.substeps * substep + step);
 	return e;
 }
 

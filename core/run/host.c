@@ -128,4 +128,5 @@ const quern_host quern_host_table = {
 	.cover = host_cover,
 	.extension = host_extension,
 	.has = host_has,
+	.keeps = quern_scene_keeps,
 };

@@ -64,10 +64,24 @@ static void arena_reset(quern_arena *a) {
 	a->used = a->n_extra = a->extra_bytes = 0;
 }
 
-static double published(const quern_scene *scene, const char *name) {
-	for (size_t i = 0; i < scene->n_published; i++)
-		if (!strcmp(scene->published[i].name, name)) return scene->published[i].value;
-	return NAN;
+/* The one cell that all solvers wish for; 0 after one sentence. */
+static double grid_cell(const quern_scene *scene) {
+	const quern_section *first = NULL;
+	double cell = 0;
+	for (size_t i = 0; i < scene->n_sections; i++) {
+		const quern_section *s = &scene->sections[i];
+		const double wish = s->ops->cell ? s->ops->cell(s->solver->self) : 0;
+		if (!(wish > 0)) continue;
+		if (first && wish != cell) {
+			quern_report_add(scene->report, s->mark,
+				"%s wants a grid with cells of %.6g m, and %s one of %.6g m", s->name, wish, first->name,
+				cell);
+			return 0;
+		}
+		first = s, cell = wish;
+	}
+	if (!first) quern_report_add(scene->report, (quern_mark) { 0 }, "the grid has no cell size");
+	return cell;
 }
 
 static bool needs_grid(const quern_store *store) {
@@ -95,10 +109,9 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	run->has_grid = needs_grid(&run->plan->store);
 	if (run->has_grid && !quern_report_errors(scene->report)) {
 		const quern_general *g = &scene->general;
-		const double cell = published(scene, "grid.cell");
-		if (!(cell > 0)) quern_report_add(scene->report, (quern_mark) { 0 }, "the grid has no cell size");
-		else if (quern_grid_init(&run->grid, (uint32_t)g->dimension, cell, g->lower, g->upper, g->periodic) !=
-				 QUERN_OK)
+		const double cell = grid_cell(scene);
+		if (cell > 0 && quern_grid_init(&run->grid, (uint32_t)g->dimension, cell, g->lower, g->upper,
+							g->periodic) != QUERN_OK)
 			quern_report_add(scene->report,
 				quern_param_mark(scene->tree->root, "domain.upper", (quern_mark) { 0 }),
 				"the domain has more than 2^22 cells along an axis, or 2^31 in all: make it smaller or the "
@@ -223,10 +236,15 @@ quern_step quern_run_record(quern_run *run, const quern_section *section) {
 	return step;
 }
 
-static bool steps_grains(const quern_run *run, const quern_section *section) {
-	for (size_t k = 0; k < run->plan->n_stages; k++)
-		if (run->plan->stages[k].section == section && run->plan->stages[k].phase == QUERN_GRAINS)
-			return true;
+bool quern_section_takes_substeps(const quern_section *section) {
+	for (const quern_stage *s = section->ops->stages; s->name; s++)
+		if (s->phase == QUERN_SUBSTEP) return true;
+	return false;
+}
+
+static bool settles(const quern_section *section) {
+	for (const quern_stage *s = section->ops->stages; s->name; s++)
+		if (s->flags & QUERN_SETTLES) return true;
 	return false;
 }
 
@@ -247,7 +265,7 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 		if (!s->ops->limit) continue;
 		quern_step step = quern_run_record(run, s);
 		step.settling = false; /* the steps after the release are meant, whenever this is asked */
-		const uint32_t times = steps_grains(run, s) ? n : 1;
+		const uint32_t times = quern_section_takes_substeps(s) ? n : 1;
 		char why[160] = "";
 		double beyond = INFINITY;
 		const double limit = times * limit_of(s, &step, &beyond, why);
@@ -344,7 +362,8 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
 	for (size_t o = 0; o < run->plan->n_stages; o++) {
 		quern_plan_stage *stage = &run->plan->stages[run->plan->order[o]];
-		if (stage->phase != phase) continue;
+		const bool rests = phase == QUERN_SUBSTEP && !run->clock.settled && !stage->settles;
+		if (stage->phase != phase || rests) continue;
 		const quern_status status = run_stage(run, stage, dt);
 		if (status != QUERN_OK) return status;
 	}
@@ -353,16 +372,16 @@ static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
 
 quern_status quern_run_setup(quern_run *run) {
 	const quern_status status = run_phase(run, QUERN_SETUP, 0);
-	if (status == QUERN_OK) run->mass_initial = quern_run_account(run).mass;
+	if (status == QUERN_OK) run->mass_initial = quern_run_carries(run, "mass");
 	return status;
 }
 
-/* The least limit of those who step grains, not the continuum's. */
+/* The least limit of those who settle. */
 static double settle_dt(quern_run *run) {
 	double least = INFINITY;
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
-		if (!steps_grains(run, s) || !s->ops->limit) continue;
+		if (!settles(s) || !s->ops->limit) continue;
 		const quern_step step = quern_run_record(run, s);
 		double hard;
 		char why[160];
@@ -386,7 +405,7 @@ double quern_run_settling(quern_run *run, double *dt) {
 	return most;
 }
 
-/* One grain step of the settling phase, or none if all is at rest. */
+/* One step of settling, or none if all is at rest. */
 static void settle(quern_run *run) {
 	quern_clock *c = &run->clock;
 	bool rest = true;
@@ -403,27 +422,40 @@ static void settle(quern_run *run) {
 		c->settled = 1;
 		return;
 	}
-	run_phase(run, QUERN_GRAINS, c->settle_dt);
+	run_phase(run, QUERN_SUBSTEP, c->settle_dt);
 	c->settle_step++;
 }
 
-static uint32_t count(const quern_run *run, const char *set) {
-	const int i = quern_store_set(&run->plan->store, set);
-	return i < 0 ? 0 : run->plan->store.sets[i].n;
+static bool owns(const quern_section *section, const quern_set *set) {
+	for (const quern_set *s = section->ops->sets; s->name; s++)
+		if (s == set) return true;
+	return false;
+}
+
+/* Steps of the entries that are counted: of those in substeps after these, of all others at the end. */
+static void count_steps(quern_run *run, bool substeps, uint32_t times) {
+	const quern_scene *scene = run->scene;
+	for (size_t k = 0; k < run->plan->store.n_sets; k++) {
+		quern_set_store *set = &run->plan->store.sets[k];
+		for (size_t i = 0; i < scene->n_sections && set->table && set->table->counted; i++)
+			if (owns(&scene->sections[i], set->table) &&
+				quern_section_takes_substeps(&scene->sections[i]) == substeps)
+				set->stepped += (int64_t)set->n * times;
+	}
 }
 
 static quern_status do_step(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const uint32_t substeps = quern_run_substeps(run);
-	quern_status status = run_phase(run, QUERN_CONVERT, c->dt);
+	quern_status status = run_phase(run, QUERN_BEGIN, c->dt);
 	for (uint32_t k = 0; k < substeps && status == QUERN_OK; k++) {
-		status = run_phase(run, QUERN_GRAINS, c->dt / substeps);
+		status = run_phase(run, QUERN_SUBSTEP, c->dt / substeps);
 		c->substep++;
 	}
-	c->grain_steps += (int64_t)count(run, "grain") * substeps;
-	for (int phase = QUERN_TO_GRID; phase <= QUERN_OBSERVE && status == QUERN_OK; phase++)
+	count_steps(run, true, substeps);
+	for (int phase = QUERN_DEPOSIT; phase <= QUERN_END && status == QUERN_OK; phase++)
 		status = run_phase(run, (quern_phase)phase, c->dt);
-	c->point_steps += count(run, "point");
+	count_steps(run, false, 1);
 	c->step++;
 	c->at++;
 	return status;
@@ -448,33 +480,79 @@ quern_event quern_run_next(quern_run *run) {
 
 quern_status quern_run_look(quern_run *run) { return run_phase(run, QUERN_OUTPUT, run->clock.dt); }
 
+/* ---- what is carried ---- */
+
+static double *sum_named(quern_account *a, const quern_output *row) {
+	for (size_t k = 0; k < a->n; k++)
+		if (!strcmp(a->sum[k].name, row->name)) return &a->sum[k].value;
+	if (a->n == QUERN_MOST_SUMS) return NULL;
+	a->sum[a->n].name = row->name;
+	a->sum[a->n].unit = row->unit ? row->unit : "1";
+	a->sum[a->n].value = row->combine == QUERN_MAX ? -INFINITY : row->combine == QUERN_MIN ? INFINITY : 0;
+	return &a->sum[a->n++].value;
+}
+
+static void add_section(quern_account *a, const quern_section *s, const quern_step *step) {
+	double value[QUERN_MOST_SUMS] = { 0 };
+	quern_watch_enter(s->solver->file->plugin.id, "account");
+	s->ops->account(s->solver->self, step, value);
+	quern_watch_leave();
+	for (size_t k = 0; s->ops->sums[k].name; k++) {
+		const quern_output *row = &s->ops->sums[k];
+		double *sum = sum_named(a, row);
+		if (!sum) return;
+		if (row->combine == QUERN_SUM) *sum += value[k];
+		else if (row->combine == QUERN_MAX ? !(value[k] <= *sum) : !(value[k] >= *sum)) *sum = value[k];
+	}
+}
+
 quern_account quern_run_account(quern_run *run) {
-	quern_account account = { 0 };
+	quern_account account = { .n = 0 };
 	quern_plan_refresh(run->plan);
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *s = &run->scene->sections[i];
 		const quern_step step = quern_run_record(run, s);
-		if (!s->ops->account) continue;
-		quern_watch_enter(s->solver->file->plugin.id, "account");
-		s->ops->account(s->solver->self, &step, &account);
-		quern_watch_leave();
+		if (s->ops->account) add_section(&account, s, &step);
 	}
 	return account;
 }
 
+double quern_account_of(const quern_account *a, const char *name) {
+	for (size_t k = 0; k < a->n; k++)
+		if (!strcmp(a->sum[k].name, name)) return a->sum[k].value;
+	return 0;
+}
+
+double quern_run_carries(quern_run *run, const char *name) {
+	const quern_account a = quern_run_account(run);
+	return quern_account_of(&a, name);
+}
+
 quern_status quern_run_check_account(quern_run *run) {
 	const quern_account a = quern_run_account(run);
-	const struct {
-		const char *name;
-		double value;
-	} sums[] = { { "mass", a.mass + a.discrete + a.owed },
-		{ "momentum", a.momentum[0] + a.momentum[1] + a.momentum[2] }, { "kinetic energy", a.kinetic },
-		{ "potential energy", a.potential }, { "elastic energy", a.elastic },
-		{ "defect of the invariants", a.defect } };
-	for (size_t k = 0; k < sizeof sums / sizeof *sums; k++)
-		if (!isfinite(sums[k].value))
+	for (size_t k = 0; k < a.n; k++)
+		if (!isfinite(a.sum[k].value))
 			return quern_run_stop(run, QUERN_E_NUMERIC,
-				"the %s of the run is no finite number at t = %.6g s (step %lld)", sums[k].name,
+				"the sum '%s' of the run is no finite number at t = %.6g s (step %lld)", a.sum[k].name,
 				quern_run_time(run), (long long)run->clock.step);
 	return QUERN_OK;
+}
+
+bool quern_run_accept(quern_run *run, quern_text *why) {
+	bool good = run->status == QUERN_OK;
+	quern_plan_refresh(run->plan);
+	for (size_t i = 0; i < run->scene->n_sections && good; i++) {
+		const quern_section *s = &run->scene->sections[i];
+		if (!s->ops->accept) continue;
+		const quern_step step = quern_run_record(run, s);
+		quern_watch_enter(s->solver->file->plugin.id, "accept");
+		good = s->ops->accept(s->solver->self, &step) == QUERN_OK && run->status == QUERN_OK;
+		quern_watch_leave();
+		if (good) continue;
+		quern_text_add(why, "%s", run->message ? run->message : s->name);
+		free(run->message);
+		run->message = NULL;
+		run->status = QUERN_OK;
+	}
+	return good;
 }

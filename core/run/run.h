@@ -4,17 +4,17 @@
 #include "grid.h"
 #include "log.h"
 #include "plan.h"
+#include "text.h"
 
 /* Steps are counted in whole numbers: an interval runs from `begin` to `end`, when a frame is due, in `steps_in` equal
  * steps. Both ends are kept, so that a scene whose output changes on resume changes nothing that was. */
 typedef struct quern_clock {
-	int64_t step, substep, settle_step; /* since the start; substep counts grain steps after release */
+	int64_t step, substep, settle_step; /* since the start; substep counts those after the release */
 	int64_t frame;                      /* last frame written; -1: none */
 	int64_t at, steps_in;               /* steps done and to do in this interval; steps_in 0: between two */
 	double begin, end;                  /* s, of this interval; between two, both are now */
 	double dt, settle_dt;
-	int64_t settled; /* 1: the grains' own phase is over */
-	int64_t grain_steps, point_steps;
+	int64_t settled; /* 1: settling is over */
 } quern_clock;
 
 typedef struct quern_arena {
@@ -58,7 +58,7 @@ quern_status quern_run_setup(quern_run *);
 /* What a run has done last, or waits for. */
 typedef enum quern_event {
 	QUERN_STOPPED,      /* run->message says why */
-	QUERN_SETTLING,     /* one step of the grains alone */
+	QUERN_SETTLING,     /* one step of what settles alone */
 	QUERN_FRAME_IS_DUE, /* at the release and at the end of an interval; nothing is done before quern_run_frame */
 	QUERN_STEPPED,
 	QUERN_OVER
@@ -87,12 +87,25 @@ double quern_run_time(const quern_run *); /* s since the release */
 bool quern_run_over(const quern_run *);
 /* The step record for code that is called between stages. */
 quern_step quern_run_record(quern_run *, const quern_section *);
+/* What all solvers carry, summed up by the names that they give. */
+typedef struct quern_account {
+	struct {
+		const char *name, *unit;
+		double value;
+	} sum[QUERN_MOST_SUMS];
+	size_t n;
+} quern_account;
 quern_account quern_run_account(quern_run *);
+double quern_account_of(const quern_account *, const char *name); /* 0 if nobody gives it */
+double quern_run_carries(quern_run *, const char *name);
+/* Whether all solvers can go on from the state as it is; else `why` says which cannot, and the run stays what it was. */
+bool quern_run_accept(quern_run *, quern_text *why);
 /* QUERN_E_NUMERIC with run->message if a sum over all that is carried is not finite. */
 quern_status quern_run_check_account(quern_run *);
 /* The smallest recommended long step, the smallest hard limit and what sets the first. */
 double quern_run_limit(quern_run *, double *hard, char reason[200], char hard_reason[200]);
 uint32_t quern_run_substeps(const quern_run *);
+bool quern_section_takes_substeps(const quern_section *);
 /* Ends the run: keeps the first message. */
 quern_status quern_run_stop(quern_run *, quern_status, const char *fmt, ...)
 	__attribute__((format(printf, 3, 4)));

@@ -41,33 +41,6 @@ static bool numbers_hold(const quern_store *store, const quern_field *field) {
 	return true;
 }
 
-/* Positions become numbers of cells. A fixed grain may lie outside of the domain by as much as that is wide. */
-static bool positions_hold(const quern_run *run, const quern_field *field) {
-	const quern_general *g = &run->scene->general;
-	const uint32_t n = run->plan->store.sets[field->set].n;
-	if (field->shape != QUERN_VECTOR || strcmp(strchr(field->name, '.'), ".position") != 0) return true;
-	for (uint8_t k = 0; k < field->n_components; k++) {
-		const double width = g->upper[k] - g->lower[k];
-		const quern_real *x = field->data[field->now][k];
-		for (uint32_t i = 0; i < n; i++)
-			if (!(x[i] >= g->lower[k] - 1.5 * width && x[i] <= g->upper[k] + 1.5 * width)) return false;
-	}
-	return true;
-}
-
-/* Radii become numbers of cells too. A fixed grain may be a floor as wide as the domain, and rounder. */
-static bool radii_hold(const quern_run *run, const quern_field *field) {
-	const quern_general *g = &run->scene->general;
-	const uint32_t n = run->plan->store.sets[field->set].n;
-	double widest = 0;
-	if (field->shape != QUERN_SCALAR || strcmp(strchr(field->name, '.'), ".radius") != 0) return true;
-	for (int k = 0; k < g->dimension; k++) widest = fmax(widest, g->upper[k] - g->lower[k]);
-	const quern_real *r = field->data[field->now][0];
-	for (uint32_t i = 0; i < n; i++)
-		if (!(r[i] > 0 && r[i] <= 10 * widest)) return false;
-	return true;
-}
-
 /* Indices are followed blindly later on, so they are looked at now. */
 static bool indices_hold(const quern_store *store, const quern_field *field) {
 	const int32_t *index = field->data[field->now][0];
@@ -96,9 +69,7 @@ const char *quern_state_fault(const quern_run *run, const quern_field *field) {
 	if (field->shape == QUERN_INDEX)
 		return field->target < 0 || indices_hold(store, field) ? NULL : "an index out of its set";
 	if (!field->state) return NULL;
-	if (!numbers_hold(store, field)) return "a number that is not finite";
-	if (!radii_hold(run, field)) return "a radius of no grain, or far wider than the domain";
-	return positions_hold(run, field) ? NULL : "a position far outside of the domain";
+	return numbers_hold(store, field) ? NULL : "a number that is not finite";
 }
 
 /* ---- writing ---- */

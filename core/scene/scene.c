@@ -1,25 +1,23 @@
 /* SPDX-License-Identifier: MIT */
 #include "scene.h"
 #include "section.h"
+#include "sections.h"
 #include "text.h"
 #include "watch.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-const quern_section_name quern_section_names[] = { { "bodies", "bodies" }, { "grains", "dem" },
-	{ "continuum", "mpm" }, { "hybrid", "hybrid" }, { NULL, NULL } };
-
-enum { MODEL_ALL, MODEL_GRAINS, MODEL_CONTINUUM };
-static const char *const models[] = { "all", "grains", "continuum", NULL };
 static const char *const instructions[] = { "auto", "v1", "v3", "v4", NULL };
 
 #define ROW(m, name_, unit_, ...) QUERN_PARAM_AS(quern_general, m, name_, unit_, __VA_ARGS__)
 const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version of the scene format: 1.",
 											   .flags = QUERN_REQUIRED, .min = 1, .max = 1e9),
 	ROW(name, "name", NULL, "A title for people.", .text = "scene"),
-	ROW(model, "model", "1", "Which representations to keep: all sections, or grains or continuum alone.",
-		.choices = models),
+	ROW(model, "model", NULL,
+		"Which representation to keep: all sections, or the name of one, which then runs with those that it "
+		"needs.",
+		.text = "all"),
 	ROW(dimension, "dimension", "1", "2 (a slab one metre thick) or 3.", .flags = QUERN_REQUIRED, .min = 2,
 		.max = 3),
 	ROW(seed, "seed", "1", "Seed of all random numbers.", .def = 1, .max = 2147483647),
@@ -31,7 +29,7 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 		.max = 1e9),
 	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED, .max = 1e12),
 	ROW(step_text, "time.step", "s",
-		"The long step, or auto; grains alone: their step. Taken a little shorter, so that a whole number of "
+		"The long step, or auto. Taken a little shorter, so that a whole number of "
 		"equal steps leads to the next frame.",
 		.text = "auto"),
 	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit."),
@@ -44,7 +42,7 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 	ROW(checkpoint, "checkpoint.every", "s",
 		"Time on the clock between checkpoints; 0: only at the release and at the end.", .def = 300,
 		.max = 1e9),
-	ROW(batch, "run.batch", "1", "Most contacts in a batch; results do not depend on it.", .def = 256,
+	ROW(batch, "run.batch", "1", "Most entities in a batch; results do not depend on it.", .def = 256,
 		.min = 8, .max = 512, .flags = QUERN_ADVANCED),
 	ROW(instructions, "run.instructions", "1",
 		"Highest instruction set to use, x86-64-v1 to v4; results do not depend on it.",
@@ -54,12 +52,10 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 const quern_general_list quern_general_lists[] = {
 	{ "domain.periodic", "true or false",
 		"Directions in which the domain repeats itself, one per dimension; default: none." },
-	{ "output.fields", "text", "Fields to write out beside those that frames always have: grain.velocity." },
+	{ "output.fields", "text",
+		"Fields to write out beside those that frames always have: SET.NAME, as `quern plan` lists them." },
 	{ NULL, NULL, NULL }
 };
-
-static const char *const general_also[] = { "domain.periodic", "output.fields", "observe", "bodies", "grains",
-	"continuum", "hybrid", NULL };
 
 quern_reading quern_scene_reading(const quern_scene *s) {
 	return (quern_reading) { s->report, s->units, (uint32_t)s->general.dimension, s->published,
@@ -84,9 +80,16 @@ void quern_scene_publish(const quern_setup *setup, const char *name, const char 
 	quern_scene *s = setup->scene;
 	for (size_t i = 0; i < s->n_published; i++)
 		if (!strcmp(s->published[i].name, name))
-			return; /* the first to know is right: grains before points */
+			return; /* the first to know is right: in the order of reading */
 	s->published = quern_grow(s->published, s->n_published, &s->published_capacity, sizeof(quern_published));
 	s->published[s->n_published++] = (quern_published) { name, unit, value };
+}
+
+bool quern_scene_keeps(const quern_setup *setup, const char *section) {
+	const quern_scene *s = setup->scene;
+	for (size_t i = 0; i < s->n_kept; i++)
+		if (!strcmp(s->kept[i], section)) return true;
+	return false;
 }
 
 quern_setup quern_scene_setup(const quern_scene *s, const char *path) {
@@ -159,7 +162,7 @@ static void read_fields(quern_scene *s, const quern_node *output) {
 		const quern_node *value = node->entries[k].value;
 		if (value->kind != QUERN_NODE_SCALAR || !strchr(value->text, '.')) {
 			quern_report_add(s->report, value->mark,
-				"scene: output.fields: %s is no field name such as grain.velocity",
+				"scene: output.fields: %s is no field: SET.NAME, as quern plan lists them",
 				quern_node_say(value, say));
 			continue;
 		}
@@ -204,7 +207,7 @@ static void check_domain(quern_scene *s, const quern_node *root, bool sound) {
 				"gravity acts along the periodic axis %d alone: what falls there never lands", k);
 }
 
-static void read_general(quern_scene *s, quern_node *root) {
+static void read_general(quern_scene *s, quern_node *root, const char *const *also) {
 	quern_reading r = quern_scene_reading(s);
 	char why[160];
 	double dimension = 0;
@@ -213,7 +216,7 @@ static void read_general(quern_scene *s, quern_node *root) {
 		quern_quantity_read(s->units, node->text, "1", &dimension, why);
 	r.dim = dimension == 3 ? 3 : 2;
 	s->general.dimension = (int32_t)r.dim;
-	quern_params_read(&r, "scene", quern_general_rows, root, root->mark, general_also, &s->general);
+	quern_params_read(&r, "scene", quern_general_rows, root, root->mark, also, &s->general);
 	s->general.dimension = (int32_t)r.dim;
 	if (s->general.version > 1)
 		quern_report_add(s->report, quern_param_mark(root, "quern", root->mark),
@@ -228,41 +231,6 @@ static void read_general(quern_scene *s, quern_node *root) {
 	quern_loader_limit(s->loader, (const int[]) { 4, 1, 3, 4 }[s->general.instructions]);
 }
 
-static bool wanted(const quern_scene *s, const char *section) {
-	const bool grains = !strcmp(section, "grains"), continuum = !strcmp(section, "continuum");
-	if (s->general.model == MODEL_GRAINS) return grains || !strcmp(section, "bodies");
-	if (s->general.model == MODEL_CONTINUUM) return continuum || !strcmp(section, "bodies");
-	return true;
-}
-
-static void check_sections(quern_scene *s, quern_mark mark) {
-	const quern_section *grains = quern_scene_section(s, "grains"),
-						*hybrid = quern_scene_section(s, "hybrid"),
-						*continuum = quern_scene_section(s, "continuum");
-	if (!grains && !continuum && s->general.model == MODEL_ALL)
-		quern_report_add(s->report, mark, "scene: nothing to simulate: add a section grains or continuum");
-	else if (!grains && !continuum)
-		quern_report_add(s->report, quern_param_mark(s->tree->root, "model", mark),
-			"scene: model keeps %s alone, and there is no such section", models[s->general.model]);
-	else if (grains && continuum && !hybrid)
-		quern_report_add(s->report, continuum->mark,
-			"scene: grains and continuum do not feel each other without a section hybrid; add it, or keep "
-			"one of them "
-			"with 'model: grains' or 'model: continuum'");
-}
-
-/* A hybrid lives on what the other two publish; without them only their absence is worth a message. */
-static bool lacks_a_side(quern_scene *s, const quern_section_name *name, const quern_entry *entry) {
-	if (strcmp(name->section, "hybrid") != 0) return false;
-	const char *missing = !quern_scene_section(s, "grains")      ? "grains"
-						  : !quern_scene_section(s, "continuum") ? "continuum"
-																 : NULL;
-	if (missing)
-		quern_report_add(
-			s->report, entry->mark, "scene: hybrid needs both grains and continuum; %s is missing", missing);
-	return missing != NULL;
-}
-
 /* ---- observers ---- */
 
 static const quern_param observe_rows[] = {
@@ -273,7 +241,7 @@ static const quern_param observe_rows[] = {
 	QUERN_END_PARAMS
 };
 const quern_slot quern_observe_slot = { .name = "observe",
-	.kind = QUERN_OBSERVER,
+	.kind = &quern_observer_kind,
 	.list = 1,
 	.rows = observe_rows,
 	.item_size = sizeof(quern_observe_item) };
@@ -324,17 +292,11 @@ static void resolve(quern_scene *s) {
 		quern_report_add(s->report, root->mark, "a scene is a map, not %s", quern_node_say(root, say));
 		return;
 	}
-	read_general(s, root);
+	const char **also = quern_sections_known(s, root);
+	read_general(s, root, also);
+	free(also);
 	publish_scene(s);
-	bool failed = false;
-	for (const quern_section_name *names = quern_section_names; names->section; names++) {
-		const quern_entry *entry = quern_node_entry(root, names->section);
-		if (!entry || quern_node_is_null(entry->value) || !wanted(s, names->section)) continue;
-		const size_t before = s->n_sections;
-		if (failed || !lacks_a_side(s, names, entry)) quern_section_read(s, names, entry);
-		failed = failed || s->n_sections == before;
-	}
-	if (!failed) check_sections(s, root->mark);
+	quern_sections_read(s, root);
 	s->observe.slot = &quern_observe_slot;
 	s->observe.path = quern_copy("observe");
 	quern_slot_fill(s, &s->observe, quern_node_find(root, "observe"), root->mark);
@@ -349,6 +311,10 @@ static quern_scene *create(const quern_host *host) {
 	s->loader = quern_loader_create();
 	quern_watch_know(s->loader);
 	return s;
+}
+
+bool quern_scene_is_whole(const quern_scene *s) {
+	return !s->general.model || !strcmp(s->general.model, "all");
 }
 
 quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *host) {

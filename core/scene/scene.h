@@ -8,9 +8,10 @@
 /* One plugin with its parameters filled in. */
 typedef struct quern_instance {
 	const quern_plugin_file *file;
+	const void *ops;       /* as whoever calls it knows them */
 	const quern_node *map; /* its parameters as the scene gives them, or NULL */
 	quern_mark mark;
-	char *path; /* "grains.contact" */
+	char *path; /* SECTION.SLOT */
 	void *self;
 	bool ready; /* init has succeeded: finish is owed */
 } quern_instance;
@@ -25,14 +26,14 @@ typedef struct quern_filling {
 
 typedef struct quern_slot_use {
 	const quern_slot *slot;
-	char *path;             /* "grains.contact" */
+	char *path;             /* SECTION.SLOT */
 	quern_filling *filling; /* same_as: those of that slot */
 	size_t n, capacity;
 	bool borrowed;
 } quern_slot_use;
 
 typedef struct quern_section {
-	const char *name; /* "grains" */
+	const char *name;
 	quern_node *node;
 	quern_mark mark;
 	quern_instance *solver;
@@ -49,8 +50,8 @@ extern const quern_slot quern_observe_slot;
 
 /* What the core itself takes from a scene. */
 typedef struct quern_general {
-	int32_t version, dimension, seed, model, batch, instructions;
-	const char *name, *step_text;
+	int32_t version, dimension, seed, batch, instructions;
+	const char *name, *model, *step_text;
 	quern_real gravity[3], lower[3], upper[3];
 	bool periodic[3];
 	quern_real end, every, checkpoint, step; /* s; step 0: auto */
@@ -58,6 +59,8 @@ typedef struct quern_general {
 	bool compress;
 	bool every_given; /* output.every stands in the scene */
 } quern_general;
+
+enum { QUERN_MOST_SECTIONS = 16 };
 
 typedef struct quern_scene {
 	quern_general general;
@@ -68,8 +71,10 @@ typedef struct quern_scene {
 	quern_tree *tree;
 	quern_tree **defaults; /* slots filled by their `def` */
 	size_t n_defaults, defaults_capacity;
-	quern_section sections[8];
+	quern_section sections[QUERN_MOST_SECTIONS]; /* in the order in which they were read */
 	size_t n_sections;
+	const char *kept[QUERN_MOST_SECTIONS]; /* names of all that take part, once it is known */
+	size_t n_kept;
 	quern_slot_use observe;
 	char **fields; /* output.fields */
 	quern_mark *field_marks;
@@ -96,19 +101,16 @@ typedef struct quern_general_list {
 	const char *name, *item, *doc;
 } quern_general_list;
 extern const quern_general_list quern_general_lists[];
-/* Sections and the solver that reads each by default, NULL-name terminated. */
-typedef struct quern_section_name {
-	const char *section, *solver;
-} quern_section_name;
-extern const quern_section_name quern_section_names[];
 
 const quern_section *quern_scene_section(const quern_scene *, const char *name);
+/* Whether `model` keeps everything that stands there. */
+bool quern_scene_is_whole(const quern_scene *);
 /* What rows of this scene are read with. */
 quern_reading quern_scene_reading(const quern_scene *);
 /* The set-up record that every init gets. */
 quern_setup quern_scene_setup(const quern_scene *, const char *path);
 
-/* The services of the set-up phase; core/host.c puts them into the table. */
+/* The services of the set-up phase; run/host.c puts them into the table. */
 struct quern_err {
 	quern_report *report;
 	const quern_node *map;
@@ -118,3 +120,4 @@ struct quern_err {
 quern_status quern_scene_fail(quern_err *, quern_status, const char *param, const char *fmt, ...)
 	__attribute__((format(printf, 4, 5)));
 void quern_scene_publish(const quern_setup *, const char *name, const char *unit, quern_real value);
+bool quern_scene_keeps(const quern_setup *, const char *section);

@@ -164,11 +164,14 @@ static void read_entry(quern_scene *s, const quern_slot *slot, quern_filling *f)
 	free(also);
 }
 
-static void add_filling(quern_scene *s, quern_slot_use *use, const choice *c, quern_kind kind) {
+static void add_filling(quern_scene *s, quern_slot_use *use, const choice *c) {
 	if (!c->name) return;
-	const quern_plugin_file *file = quern_loader_find(s->loader, kind, c->name, s->report, c->mark);
-	quern_instance *it = file ? instance_create(s, file, c->map, c->mark, use->path) : NULL;
+	const quern_kind *kind = use->slot->kind;
+	const quern_plugin_file *file = quern_loader_find(s->loader, kind->name, c->name, s->report, c->mark);
+	const void *ops = file ? quern_loader_ops(s->loader, file, kind, s->report, c->mark) : NULL;
+	quern_instance *it = ops ? instance_create(s, file, c->map, c->mark, use->path) : NULL;
 	if (!it) return;
+	it->ops = ops;
 	use->filling = quern_grow(use->filling, use->n, &use->capacity, sizeof(quern_filling));
 	quern_filling *f = &use->filling[use->n++];
 	*f = (quern_filling) { .instance = it };
@@ -200,8 +203,8 @@ void quern_slot_fill(quern_scene *s, quern_slot_use *use, quern_node *node, quer
 		quern_report_add(s->report, mark, "%s is missing: %s", use->path, slot->doc ? slot->doc : "");
 	if (!node) return;
 	choice *choices;
-	const size_t n = choices_of(s, use->path, node, slot->list, &choices, quern_kind_name(slot->kind));
-	for (size_t i = 0; i < n; i++) add_filling(s, use, &choices[i], slot->kind);
+	const size_t n = choices_of(s, use->path, node, slot->list, &choices, slot->kind->name);
+	for (size_t i = 0; i < n; i++) add_filling(s, use, &choices[i]);
 	free(choices);
 }
 
@@ -272,6 +275,7 @@ static void fill_variants(quern_scene *s, quern_slot_use *use) {
 			if (!any) continue;
 			quern_instance *it = instance_create(s, base->file, keep->root, given->mark, use->path);
 			if (!it) continue;
+			it->ops = base->ops;
 			const size_t before = quern_report_errors(s->report);
 			instance_read(s, it, NULL);
 			instance_init(s, it, before);
@@ -297,6 +301,41 @@ static const char **section_also(const quern_solver_ops *ops, size_t *n) {
 	return also;
 }
 
+/* The plugins of a slot as its solver sees them: with its strides, in memory that finish_slot frees. */
+static void *bind_slot(const quern_section *section, const quern_slot_use *use) {
+	const size_t stride = section->ops->bound_size;
+	char *bound = quern_take(use->n, stride);
+	for (size_t i = 0; i < use->n; i++) {
+		const quern_filling *f = &use->filling[i];
+		const quern_plugin_file *file = f->instance->file;
+		const void **variant = quern_take(f->n_variant, sizeof(void *));
+		for (size_t v = 0; v < f->n_variant; v++)
+			variant[v] = f->variant[v] ? f->variant[v]->self : f->instance->self;
+		const quern_bound own = { .self = f->instance->self,
+			.ops = f->instance->ops,
+			.item = f->item,
+			.variant = variant,
+			.uses = quern_table_uses_for(&file->table, section->solver->file->library),
+			.n_uses = (uint32_t)file->n_uses,
+			.id = file->plugin.id,
+			.path = use->path,
+			.n_variant = (uint32_t)f->n_variant };
+		memcpy(bound + i * stride, &own, stride < sizeof own ? stride : sizeof own);
+	}
+	return bound;
+}
+
+static void unbind_slot(const quern_section *section, const quern_slot_use *use, char *bound) {
+	for (size_t i = 0; i < use->n; i++) {
+		quern_bound own = { 0 };
+		const size_t stride = section->ops->bound_size;
+		memcpy(&own, bound + i * stride, stride < sizeof own ? stride : sizeof own);
+		free((void *)(uintptr_t)own.variant);
+		free((void *)(uintptr_t)own.uses);
+	}
+	free(bound);
+}
+
 static void section_ready(quern_scene *s, quern_section *section) {
 	if (!section->ops->ready || quern_report_errors(s->report)) return;
 	const quern_setup setup = quern_scene_setup(s, section->name);
@@ -304,70 +343,44 @@ static void section_ready(quern_scene *s, quern_section *section) {
 	const quern_bound **slots = quern_take(section->n_slots, sizeof(*slots));
 	uint32_t *counts = quern_take(section->n_slots, sizeof(uint32_t));
 	for (size_t k = 0; k < section->n_slots; k++) {
-		const quern_slot_use *use = &section->slots[k];
-		quern_bound *bound = quern_take(use->n, sizeof(quern_bound));
-		for (size_t i = 0; i < use->n; i++) {
-			const quern_filling *f = &use->filling[i];
-			bound[i] = (quern_bound) { .self = f->instance->self,
-				.ops = f->instance->file->plugin.ops,
-				.item = f->item,
-				.uses = quern_table_uses_for(&f->instance->file->table, section->solver->file->library),
-				.n_uses = (uint32_t)f->instance->file->n_uses,
-				.id = f->instance->file->plugin.id,
-				.path = use->path,
-				.n_variant = (uint32_t)f->n_variant };
-			const void **variant = quern_take(f->n_variant, sizeof(void *));
-			for (size_t v = 0; v < f->n_variant; v++)
-				variant[v] = f->variant[v] ? f->variant[v]->self : f->instance->self;
-			bound[i].variant = variant;
-		}
-		slots[k] = bound;
-		counts[k] = (uint32_t)use->n;
+		slots[k] = bind_slot(section, &section->slots[k]);
+		counts[k] = (uint32_t)section->slots[k].n;
 	}
 	quern_watch_enter(section->solver->file->plugin.id, "ready");
 	const quern_status status = section->ops->ready(section->solver->self, &setup, slots, counts, &err);
 	quern_watch_leave();
 	if (status != QUERN_OK && !quern_report_errors(s->report))
 		quern_report_add(s->report, section->mark, "%s: cannot be set up", section->name);
-	for (size_t k = 0; k < section->n_slots; k++) {
-		for (size_t i = 0; i < counts[k]; i++) {
-			free((void *)(uintptr_t)slots[k][i].variant);
-			free((void *)(uintptr_t)slots[k][i].uses);
-		}
-		free((void *)(uintptr_t)slots[k]);
-	}
+	for (size_t k = 0; k < section->n_slots; k++)
+		unbind_slot(section, &section->slots[k], (char *)(uintptr_t)slots[k]);
 	free(slots);
 	free(counts);
 }
 
-void quern_section_read(quern_scene *s, const quern_section_name *names, const quern_entry *entry) {
+void quern_section_read(quern_scene *s, const quern_plugin_file *file, const quern_entry *entry) {
 	quern_node *node = entry->value;
 	const bool map = node->kind == QUERN_NODE_MAP;
-	const quern_node *swap = map ? quern_node_find(node, "solver") : NULL;
-	const char *name = swap && swap->kind == QUERN_NODE_SCALAR ? swap->text : names->solver;
-	const quern_plugin_file *file =
-		quern_loader_find(s->loader, QUERN_SOLVER, name, s->report, swap ? swap->mark : entry->mark);
-	quern_instance *solver =
-		file ? instance_create(s, file, map ? node : NULL, entry->mark, names->section) : NULL;
+	quern_instance *solver = instance_create(s, file, map ? node : NULL, entry->mark, entry->key);
 	if (!solver) return;
+	solver->ops = file->plugin.ops;
 	quern_section *section = &s->sections[s->n_sections++];
 	*section = (quern_section) {
-		.name = names->section, .node = node, .mark = entry->mark, .ops = file->plugin.ops, .solver = solver
+		.name = entry->key, .node = node, .mark = entry->mark, .ops = file->plugin.ops, .solver = solver
 	};
-	for (const quern_slot *slot = section->ops->slots; slot && slot->name; slot++) section->n_slots++;
+	for (const quern_slot *slot = section->ops->slots; slot->name; slot++) section->n_slots++;
 	section->slots = quern_take(section->n_slots, sizeof(quern_slot_use));
 	bool is_list = false; /* the section is itself the list of its one slot */
 	for (size_t k = 0; k < section->n_slots; k++) {
 		quern_slot_use *use = &section->slots[k];
 		use->slot = &section->ops->slots[k];
-		use->path = *use->slot->name ? quern_format("%s.%s", names->section, use->slot->name)
-									 : quern_copy(names->section);
+		use->path = *use->slot->name ? quern_format("%s.%s", section->name, use->slot->name)
+									 : quern_copy(section->name);
 		is_list = is_list || !*use->slot->name;
 	}
 	char say[64];
 	if (!map && !is_list) {
 		quern_report_add(
-			s->report, node->mark, "%s must be a map, not %s", names->section, quern_node_say(node, say));
+			s->report, node->mark, "%s must be a map, not %s", section->name, quern_node_say(node, say));
 		for (size_t k = 0; k < section->n_slots; k++) free(section->slots[k].path);
 		free(section->slots);
 		s->n_sections--;

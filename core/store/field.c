@@ -13,6 +13,13 @@ uint8_t quern_components(uint8_t shape, uint32_t dim) {
 
 size_t quern_field_bytes(const quern_field *field) { return field->shape == QUERN_INDEX ? 4 : 8; }
 
+const char *quern_set_plural(const quern_set_store *set) {
+	if (set->table) return set->table->plural ? set->table->plural : set->name;
+	return set->grid ? "cells" : set->name;
+}
+
+bool quern_set_is_counted(const quern_set_store *set) { return set->table && set->table->counted; }
+
 void quern_store_init(quern_store *store, quern_pool *pool) { *store = (quern_store) { .pool = pool }; }
 
 void quern_store_finish(quern_store *store) {

@@ -4,9 +4,10 @@
 #pragma once
 #include "pool.h"
 #include <quern/abi.h>
+#include <quern/solver.h>
 
 typedef struct quern_field {
-	char name[56]; /* "grain.velocity" */
+	char name[56]; /* SET.NAME */
 	const char *unit, *doc;
 	int set, target; /* indices of sets; target -1 unless INDEX into one */
 	uint8_t shape, n_components;
@@ -29,8 +30,10 @@ typedef struct quern_set_store {
 	uint32_t *block;
 	double *row; /* of a row set: n rows of 8 */
 	int64_t next_id;
-	void *spare[2]; /* [0] 8-byte, [1] 4-byte: the other half of a reordering */
-	bool grid;      /* entries belong to grid blocks: cells and nodes */
+	void *spare[2];         /* [0] 8-byte, [1] 4-byte: the other half of a reordering */
+	bool grid;              /* entries belong to grid blocks: cells and nodes */
+	const quern_set *table; /* the solver's row; NULL: the host's own */
+	int64_t stepped;        /* steps of entries so far, where the row says that they are counted */
 } quern_set_store;
 
 typedef struct quern_store {
@@ -43,6 +46,10 @@ typedef struct quern_store {
 
 uint8_t quern_components(uint8_t shape, uint32_t dim);
 size_t quern_field_bytes(const quern_field *); /* of one component of one entry */
+
+/* A set as people call it: its plural. */
+const char *quern_set_plural(const quern_set_store *);
+bool quern_set_is_counted(const quern_set_store *);
 
 void quern_store_init(quern_store *, quern_pool *);
 void quern_store_finish(quern_store *);

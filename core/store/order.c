@@ -147,7 +147,7 @@ static void mark_kept(quern_plan *p) {
 	}
 	for (size_t k = 0; k < store->n_fields; k++) {
 		quern_field *field = &store->fields[k];
-		bool shown = field->shown; /* a contact's grains go with its force */
+		bool shown = field->shown; /* what something points at goes with it */
 		for (size_t i = 0; i < store->n_fields && field->target >= 0; i++)
 			shown = shown || (store->fields[i].set == field->set && store->fields[i].shown);
 		field->kept = !field->local && (field->kept || shown || field->state || field->shape == QUERN_ID);
@@ -166,7 +166,7 @@ static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(co
 static bool reads_others(const quern_use *row) { return row->flags & QUERN_OTHERS; }
 static bool adds(const quern_use *row) { return row->access == QUERN_ADD; }
 
-/* Before the first frame, whoever looks at it finds it as the grains' own phase has left it. */
+/* Before the first frame, whoever looks at it finds it as settling has left it. */
 static bool is_looked_at(const quern_plan *p, int field) {
 	bool renewed = false;
 	for (int i = 0; i < (int)p->n_stages; i++)
@@ -178,7 +178,7 @@ static bool is_looked_at(const quern_plan *p, int field) {
 static void mark_settles(quern_plan *p) {
 	for (size_t i = 0; i < p->n_uses; i++) {
 		const quern_plan_use *u = &p->uses[i];
-		if (u->target < 0 || u->stage < 0 || p->stages[u->stage].phase != QUERN_GRAINS) continue;
+		if (u->target < 0 || u->stage < 0 || !p->stages[u->stage].settles) continue;
 		quern_field *field = &p->store.fields[u->target];
 		if (quern_plan_settles(u->row) && (field->state || is_looked_at(p, u->target))) field->settles = true;
 	}

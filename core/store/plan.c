@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const quern_phase_names[] = { "setup", "convert", "grains", "to grid", "couple", "from grid",
-	"observe", "output" };
+const char *const quern_phase_names[] = { "setup", "begin", "substep", "deposit", "exchange", "advance",
+	"end", "output" };
 
 /* ---- sets ---- */
 
@@ -15,22 +15,21 @@ static bool slot_filled(const quern_section *section, const char *slot) {
 	return false;
 }
 
-static void add_set(quern_plan *p, const char *name, uint32_t rows, bool grid) {
+static void add_set(quern_plan *p, const char *name, const quern_set *table, bool grid) {
 	quern_store *store = &p->store;
 	store->sets = quern_grow(store->sets, store->n_sets, &store->sets_capacity, sizeof(quern_set_store));
 	quern_set_store *set = &store->sets[store->n_sets++];
-	*set = (quern_set_store) { .rows = rows, .grid = grid };
+	*set = (quern_set_store) { .rows = table ? table->rows : 0, .grid = grid, .table = table };
 	snprintf(set->name, sizeof set->name, "%s", name);
 }
 
 static void gather_sets(quern_plan *p) {
-	add_set(p, "total", 0, false);
-	add_set(p, "cell", 0, true);
+	add_set(p, "total", NULL, false);
+	add_set(p, "cell", NULL, true);
 	for (size_t i = 0; i < p->scene->n_sections; i++) {
 		const quern_section *section = &p->scene->sections[i];
 		for (const quern_set *set = section->ops->sets; set && set->name; set++)
-			if (!set->slot || slot_filled(section, set->slot))
-				add_set(p, set->name, set->rows, set->rows != 0);
+			if (!set->slot || slot_filled(section, set->slot)) add_set(p, set->name, set, set->rows != 0);
 	}
 }
 
@@ -100,7 +99,8 @@ static void gather_stages(quern_plan *p) {
 							 .section = section,
 							 .phase = (quern_phase)s->phase,
 							 .solver = (int)i,
-							 .sometimes = s->sometimes != 0 });
+							 .sometimes = (s->flags & QUERN_SOMETIMES) != 0,
+							 .settles = (s->flags & QUERN_SETTLES) != 0 });
 			quern_plan_stage *stage = &p->stages[p->n_stages - 1];
 			for (const quern_use *row = s->uses; row && row->field; row++, stage->n_uses++)
 				add_use(p, row, (int)p->n_stages - 1, s->name, section->mark)->counts =
@@ -109,15 +109,20 @@ static void gather_stages(quern_plan *p) {
 	}
 }
 
+static void rename_set(quern_plan_use *u, const char *set, const char *other) {
+	const size_t n = strlen(set);
+	if (!strncmp(u->row->field, set, n) && u->row->field[n] == '.')
+		snprintf(u->field, sizeof u->field, "%.23s.%.31s", other, u->row->field + n + 1);
+}
+
 /* `caller`: the solver in whose slot it sits; NULL: the host. */
-static quern_plan_bound *add_bound(quern_plan *p, quern_bound *place, const quern_slot *slot,
-	const quern_filling *f, const char *path, int stage, const quern_plugin_file *caller) {
+static quern_plan_bound *add_bound(quern_plan *p, const quern_slot *slot, const quern_filling *f,
+	const char *path, int stage, const quern_plugin_file *caller) {
 	quern_plan_bound *b = quern_take(1, sizeof *b);
 	const quern_instance *it = f->instance;
-	b->bound = place;
 	b->uses = caller ? quern_table_uses_for(&it->file->table, caller->library) : NULL;
-	*place = (quern_bound) { .self = it->self,
-		.ops = it->file->plugin.ops,
+	b->bound = (quern_bound) { .self = it->self,
+		.ops = it->ops,
 		.item = f->item,
 		.uses = b->uses ? b->uses : it->file->uses,
 		.n_uses = (uint32_t)it->file->n_uses,
@@ -126,9 +131,9 @@ static quern_plan_bound *add_bound(quern_plan *p, quern_bound *place, const quer
 		.path = path };
 	b->variant = quern_take(f->n_variant, sizeof(void *));
 	for (size_t v = 0; v < f->n_variant; v++) b->variant[v] = f->variant[v] ? f->variant[v]->self : it->self;
-	b->bound->variant = f->n_variant ? b->variant : NULL;
+	b->bound.variant = f->n_variant ? b->variant : NULL;
 	b->column = quern_take(it->file->n_uses, sizeof(quern_column));
-	b->bound->column = b->column;
+	b->bound.column = b->column;
 	b->first_use = p->n_uses;
 	b->first_again = SIZE_MAX;
 	for (size_t k = 0; k < it->file->n_uses; k++) {
@@ -137,20 +142,18 @@ static quern_plan_bound *add_bound(quern_plan *p, quern_bound *place, const quer
 		quern_plan_use *u =
 			add_use(p, row, slot ? stage_named(p, called) : stage, it->file->plugin.id, it->mark);
 		u->counts = u->stage >= 0 && holds(it, row->when);
-		if (slot && slot->particle && !strncmp(row->field, "particle.", 9))
-			snprintf(u->field, sizeof u->field, "%s.%.32s", slot->particle, row->field + 9);
+		if (slot && slot->particle) rename_set(u, "particle", slot->particle);
 	}
 	if (slot && slot->repeat) {
 		b->again = quern_take(it->file->n_uses, sizeof(quern_column));
-		b->bound->again = b->again;
+		b->bound.again = b->again;
 		b->first_again = p->n_uses;
 		for (size_t k = 0; k < it->file->n_uses; k++) {
 			const quern_use *row = &it->file->uses[k];
 			const char *called = row->hook < 3 ? slot->stage[row->hook] : NULL;
 			quern_plan_use *u = add_use(p, row, stage_named(p, called), it->file->plugin.id, it->mark);
 			u->counts = u->stage >= 0 && holds_anywhere(f, row->when);
-			if (!strncmp(row->field, "contact.", 8))
-				snprintf(u->field, sizeof u->field, "%s.%.32s", slot->repeat, row->field + 8);
+			rename_set(u, slot->repeat, slot->again);
 		}
 	}
 	p->bounds = quern_grow(p->bounds, p->n_bounds, &p->bounds_capacity, sizeof(b));
@@ -164,11 +167,14 @@ static void gather_slots(quern_plan *p) {
 		p->n_slot[i] = quern_take(section->n_slots, sizeof(uint32_t));
 		for (size_t k = 0; k < section->n_slots; k++) {
 			const quern_slot_use *use = &section->slots[k];
-			p->slots[i][k] = quern_take(use->n, sizeof(quern_bound));
+			const size_t stride = section->ops->bound_size;
+			char *place = p->slots[i][k] = quern_take(use->n, stride);
 			p->n_slot[i][k] = (uint32_t)use->n;
-			for (size_t e = 0; e < use->n; e++)
-				add_bound(
-					p, &p->slots[i][k][e], use->slot, &use->filling[e], use->path, -1, section->solver->file);
+			for (size_t e = 0; e < use->n; e++) {
+				const quern_plan_bound *b =
+					add_bound(p, use->slot, &use->filling[e], use->path, -1, section->solver->file);
+				memcpy(place + e * stride, &b->bound, stride < sizeof b->bound ? stride : sizeof b->bound);
+			}
 		}
 	}
 	const quern_slot_use *observe = &p->scene->observe;
@@ -178,8 +184,7 @@ static void gather_slots(quern_plan *p) {
 						 .observer = &observe->filling[e],
 						 .phase = QUERN_OUTPUT,
 						 .solver = 100 + (int)e });
-		p->observers[e] = add_bound(p, quern_take(1, sizeof(quern_bound)), NULL, &observe->filling[e],
-			"observe", (int)p->n_stages - 1, NULL);
+		p->observers[e] = add_bound(p, NULL, &observe->filling[e], "observe", (int)p->n_stages - 1, NULL);
 	}
 }
 
@@ -200,13 +205,16 @@ static quern_field *add_field(quern_plan *p, const quern_plan_use *u) {
 	return field;
 }
 
-/* A field of a section that this scene goes without, as its twins of pure grains or pure continuum do. */
+/* A field of a section that this scene goes without, as one does that keeps one model alone. */
 static bool section_left_out(const quern_plan *p, const char *field) {
-	static const char *const usual[] = { "grain.", "contact.", "touch.", "point.", "cell.", NULL };
-	const bool here = set_of(p, field) >= 0 && p->scene->general.model == 0;
-	for (size_t k = 0; usual[k]; k++)
-		if (!strncmp(field, usual[k], strlen(usual[k]))) return !here;
-	return false;
+	size_t n;
+	const quern_section_of *known = quern_loader_sections(p->scene->loader, &n);
+	const size_t length = strcspn(field, ".");
+	bool usual = !strncmp(field, "cell.", 5); /* the host's own, where there is a grid */
+	for (size_t i = 0; i < n; i++)
+		for (size_t k = 0; k < known[i].n_sets; k++)
+			usual = usual || (!strncmp(known[i].sets[k], field, length) && !known[i].sets[k][length]);
+	return usual && (set_of(p, field) < 0 || !quern_scene_is_whole(p->scene));
 }
 
 /* A row that goes with another field counts only where that one exists. */
@@ -268,7 +276,7 @@ static bool add_asked(quern_plan *p) {
 static void miss_asked(quern_plan *p, size_t k) {
 	const quern_scene *s = p->scene;
 	if (section_left_out(p, s->fields[k])) {
-		if (s->general.model == 0)
+		if (quern_scene_is_whole(s))
 			quern_report_warn(s->report, s->field_marks[k],
 				"scene: output.fields: '%s' is left out: the section that makes it is not in this scene",
 				s->fields[k]);
@@ -294,7 +302,7 @@ static void make_fields(quern_plan *p) {
 		if (quern_store_field(&p->store, p->scene->fields[k]) < 0) miss_asked(p, k);
 }
 
-/* Who else takes a field, and how: "solver.dem: an index". The first one has made it. */
+/* Who else takes a field, and how: "SOLVER: an index". The first one has made it. */
 static const quern_plan_use *first_use_of(const quern_plan *p, const char *field) {
 	for (size_t i = 0; i < p->n_uses; i++)
 		if (quern_plan_demands(&p->uses[i]) && !strcmp(p->uses[i].field, field)) return &p->uses[i];
@@ -393,7 +401,7 @@ void quern_plan_refresh(quern_plan *p) {
 	}
 	for (size_t i = 0; i < p->n_bounds; i++) {
 		quern_plan_bound *b = p->bounds[i];
-		for (size_t k = 0; k < b->bound->n_uses; k++) {
+		for (size_t k = 0; k < b->bound.n_uses; k++) {
 			b->column[k] = column_of(p, &p->uses[b->first_use + k], NULL);
 			if (b->again) b->again[k] = column_of(p, &p->uses[b->first_again + k], NULL);
 		}
@@ -421,7 +429,6 @@ quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
 
 void quern_plan_destroy(quern_plan *p) {
 	if (!p) return;
-	for (size_t e = 0; e < p->scene->observe.n; e++) free(p->observers[e]->bound);
 	for (size_t i = 0; i < p->n_bounds; i++) {
 		free(p->bounds[i]->column);
 		free(p->bounds[i]->again);

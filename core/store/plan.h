@@ -7,7 +7,7 @@
 typedef struct quern_plan_use {
 	const quern_use *row;
 	char field[56];    /* "particle." and repeated sets resolved */
-	const char *owner; /* "dem.forces", "contact.linear" */
+	const char *owner; /* a stage, or a plugin in its slot */
 	quern_mark mark;
 	int stage;  /* -1: called by nobody here */
 	int target; /* index of its field in the store; -1: the row does not count */
@@ -21,16 +21,16 @@ typedef struct quern_plan_stage {
 	const quern_filling *observer;
 	quern_phase phase;
 	int solver, sequence, order; /* order: place in the step, from 0 */
-	bool sometimes;
+	bool sometimes, settles;
 	size_t first_use, n_uses; /* its own rows in plan->uses */
 	quern_column *column;
 	int *swaps, *zeros; /* fields to swap after, to zero before; -1 ends */
 	double seconds;
 } quern_plan_stage;
 
-/* A plugin in a slot with its columns; what bound->column and bound->again point to is kept fresh. */
+/* A plugin in a slot with its columns; what bound.column and bound.again point to is kept fresh. */
 typedef struct quern_plan_bound {
-	quern_bound *bound;            /* in its slot's array; an observer's own */
+	quern_bound bound;             /* its solver has a copy, as long as the solver knows it */
 	size_t first_use, first_again; /* into plan->uses; first_again == SIZE_MAX: no repeat */
 	quern_column *column, *again;
 	quern_use *uses; /* with the stride of whoever calls it */
@@ -47,8 +47,8 @@ typedef struct quern_plan {
 	int *order;                /* stages in the order of a step */
 	quern_plan_bound **bounds; /* all */
 	size_t n_bounds, bounds_capacity;
-	quern_bound **slots[8]; /* by section: by slot: array */
-	uint32_t *n_slot[8];
+	void **slots[QUERN_MOST_SECTIONS]; /* by section: by slot: bounds with the stride of the solver */
+	uint32_t *n_slot[QUERN_MOST_SECTIONS];
 	quern_plan_bound **observers; /* by entry of scene->observe */
 	uint64_t fresh;               /* store version of the columns */
 } quern_plan;
@@ -61,7 +61,7 @@ void quern_plan_destroy(quern_plan *);
 void quern_plan_refresh(quern_plan *);
 
 extern const char *const quern_phase_names[];
-/* Whether a use by a stage of grains changes its field while they settle. */
+/* Whether a use by a stage that settles changes its field then. */
 bool quern_plan_settles(const quern_use *);
 /* Bytes of one entry of a set, of what is stored. */
 size_t quern_plan_entry_bytes(const quern_plan *, int set);

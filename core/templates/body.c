@@ -4,6 +4,7 @@
  * there; contact laws and the continuum's walls both live on that. The pose, that is where it is and how it moves, is
  * the host's. */
 #include <math.h>
+#include <quern/body.h>
 #include <quern/vec.h>
 
 typedef struct {
@@ -56,7 +57,6 @@ static void bounds(const void *self, uint32_t dim, quern_real lower[3], quern_re
 
 static const quern_body_ops ops = { .size = sizeof ops, .closest = closest, .bounds = bounds };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_BODY,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "body.my_name",

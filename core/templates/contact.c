@@ -3,6 +3,7 @@
  * A law sees batches of pairs. For each it adds a force on the first grain; the second gets the opposite, and torques,
  * weights and energies are the solver's business. A law must not depend on other pairs, and must scale: with stiffness
  * and mass doubled, all forces double. */
+#include <quern/contact.h>
 #include <quern/math.h>
 #include <quern/vec.h>
 
@@ -76,7 +77,6 @@ static const quern_contact_ops ops = {
 	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_CONTACT,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "contact.my_name",

@@ -2,7 +2,7 @@
  *
  * A coupling sees the nodes of one block of the grid, with masses and velocities of both, and changes the velocities. It
  * must keep the momentum of each node: what one gets, the other gives. */
-#include <quern/abi.h>
+#include <quern/coupling.h>
 
 typedef struct {
 	quern_real share;
@@ -32,7 +32,6 @@ static void couple(const void *self, const quern_coupling_job *job) {
 
 static const quern_coupling_ops ops = { .size = sizeof ops, .couple = couple };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_COUPLING,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "coupling.my_name",

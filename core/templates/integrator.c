@@ -2,7 +2,7 @@
  *
  * `close` gets forces and the old state of a batch of grains and writes the new state. A scheme that also acts before
  * the forces has an `open` as well, and keeps what it must remember in fields of its own, such as grain.acceleration. */
-#include <quern/abi.h>
+#include <quern/integrator.h>
 
 typedef struct {
 	quern_real drag;
@@ -44,7 +44,6 @@ static void close_3d(const void *self, const quern_integrator_batch *b) { close(
 
 static const quern_integrator_ops ops = { .size = sizeof ops, .close = { close_2d, close_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_INTEGRATOR,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "integrator.my_name",

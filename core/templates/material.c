@@ -3,6 +3,7 @@
  * A material sees batches of points after the grid has moved them: the velocity gradient, the density that follows from
  * it, and the stress of the last step, tension positive, which it replaces. History of its own would be rows of
  * "point.NAME", QUERN_UPDATE. */
+#include <quern/material.h>
 #include <quern/math.h>
 
 typedef struct {
@@ -72,7 +73,6 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.assign = { assign_2d, assign_3d },
 	.moduli = moduli };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_MATERIAL,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.my_name",

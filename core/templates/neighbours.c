@@ -4,7 +4,7 @@
  * by block and in parallel, the pairs that are near. The cost here grows with the length of a column of grains across
  * the axis: best for long, thin flows. */
 #include <math.h>
-#include <quern/abi.h>
+#include <quern/neighbours.h>
 
 typedef struct {
 	quern_real slab; /* from the scene */
@@ -91,7 +91,6 @@ static const quern_neighbour_ops ops = {
 	.size = sizeof ops, .keys = keys, .index = make_index, .pairs = pairs
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_NEIGHBOURS,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "neighbours.my_name",

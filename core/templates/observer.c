@@ -4,6 +4,7 @@
  * hundred entries of one set; the host combines them, always in the same order. What needs everything at once has a
  * `whole` instead, and no set. */
 #include <quern/math.h>
+#include <quern/observer.h>
 #include <quern/vec.h>
 
 typedef struct {
@@ -40,9 +41,10 @@ static void map(const void *self, const quern_observer_batch *b, quern_real *par
 	}
 }
 
-static const quern_observer_ops ops = { .size = sizeof ops, .set = "grain", .outputs = outputs, .map = map };
+static const quern_observer_ops ops = {
+	.size = sizeof ops, .output_size = sizeof(quern_output), .set = "grain", .outputs = outputs, .map = map
+};
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_OBSERVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.my_name",

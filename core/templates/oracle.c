@@ -3,7 +3,7 @@
  * An oracle is asked twice. `mark` says which cells are inside, level > 0; from their surface the solver measures the
  * distance inwards. `decide` then wishes a zone for each cell. Where several oracles speak, the least continuous wish
  * wins; what it takes to change slowly is the solver's. */
-#include <quern/abi.h>
+#include <quern/oracle.h>
 
 typedef struct {
 	quern_real height, depth;
@@ -34,7 +34,6 @@ static void decide(const void *self, const quern_cell_batch *b) {
 
 static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_ORACLE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "oracle.my_name",

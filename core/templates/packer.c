@@ -3,7 +3,7 @@
  * A packer fills one region. The job hands it one grain at a time, whose radius is drawn already, and knows where the
  * region ends and what is in the way; the packer's part is to find places. Random numbers come from the job's own stream,
  * host->random(stream, key, counter++, ...), so that every run gives the same grains. */
-#include <quern/abi.h>
+#include <quern/packer.h>
 
 typedef struct {
 	quern_real gap;
@@ -36,7 +36,6 @@ static void pack(const void *self, quern_pack_job *job) {
 
 static const quern_packer_ops ops = { .size = sizeof ops, .pack = { pack, pack } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_PACKER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "packer.my_name",

@@ -3,6 +3,7 @@
  * Weights along the axes are multiplied by the solver. Of three nodes from `first` on they must sum to one, and their
  * slopes to zero, also next to walls, which lie on node lines and beyond which there is no node. */
 #include <quern/math.h>
+#include <quern/shape.h>
 
 typedef struct {
 	int32_t unused;
@@ -49,7 +50,6 @@ static const quern_shape_ops ops = {
 	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SHAPE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.my_name",

@@ -5,7 +5,7 @@
  * A solver owns sets of entities and stages that work on their fields. Nothing is allocated by hand: a field exists
  * because a stage names it, and is written out, saved and restored because of how stages use it. The order of stages
  * follows from their phases. */
-#include <quern/abi.h>
+#include <quern/solver.h>
 #include <stdio.h>
 
 typedef struct {
@@ -23,7 +23,12 @@ static const quern_param params[] = { QUERN_PARAM(flight, count, "1", "Number of
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
-static const quern_set sets[] = { { .name = "grain", .doc = "Discs or spheres." }, { .name = NULL } };
+static const quern_set sets[] = { { .name = "grain",
+									  .plural = "grains",
+									  .doc = "Discs or spheres.",
+									  .counted = 1,
+									  .cost = { 10e-9, 15e-9 } },
+	{ .name = NULL } };
 static const quern_slot slots[] = { { .name = NULL } }; /* places for plugins of other kinds */
 
 /* A row per field and stage; their numbers index step->use. */
@@ -124,7 +129,7 @@ static const quern_stage stages[] = { { .name = "my_name.fill",
 										  .run = fill },
 	{ .name = "my_name.move",
 		.doc = "Gravity, motion, the floor.",
-		.phase = QUERN_GRAINS,
+		.phase = QUERN_SUBSTEP,
 		.uses = move_uses,
 		.run = move },
 	{ .name = NULL } };
@@ -140,27 +145,31 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 }
 
 /* What the solver carries goes to the summary, and guards against lost mass. */
-static void account(const void *self, const quern_step *s, quern_account *a) {
+enum { MASS, DISCRETE, MOMENTUM, KINETIC = MOMENTUM + 3, POTENTIAL };
+static const quern_output sums[] = { { .name = "mass", .unit = "kg", .doc = "Carried." },
+	{ .name = "discrete", .unit = "kg", .doc = "Carried by grains." },
+	{ .name = "momentum_x", .unit = "kg m/s" }, { .name = "momentum_y", .unit = "kg m/s" },
+	{ .name = "momentum_z", .unit = "kg m/s" }, { .name = "kinetic", .unit = "J" },
+	{ .name = "potential", .unit = "J" }, { .name = NULL } };
+
+static void account(const void *self, const quern_step *s, quern_real *sum) {
 	const flight *p = self;
 	const uint32_t n = s->host->set(s->run, "grain").n;
 	const quern_real area = 3.141592653589793 * p->radius * p->radius;
 	const quern_real mass = p->density * (s->dim == 2 ? area : 4.0 / 3 * area * p->radius);
-	a->mass += n * mass;
-	a->discrete += n * mass;
+	sum[MASS] = sum[DISCRETE] = n * mass;
 	for (uint32_t i = 0; i < n; i++)
 		for (uint32_t k = 0; k < s->dim; k++) {
 			const quern_real x = s->use[FILL_POSITION].real[k][i], v = s->use[FILL_VELOCITY].real[k][i];
-			a->momentum[k] += mass * v;
-			a->kinetic += 0.5 * mass * v * v;
-			a->potential -= mass * s->gravity[k] * x;
+			sum[MOMENTUM + k] += mass * v;
+			sum[KINETIC] += 0.5 * mass * v * v;
+			sum[POTENTIAL] -= mass * s->gravity[k] * x;
 		}
 }
 
-static const quern_solver_ops ops = {
-	.size = sizeof ops, .sets = sets, .slots = slots, .stages = stages, .limit = limit, .account = account
-};
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .sets = sets, .slots = slots, .stages = stages,
+	.limit = limit, .sums = sums, .account = account };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SOLVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.my_name",

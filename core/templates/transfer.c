@@ -3,6 +3,7 @@
  * A transfer sees batches of points, or of grains. The solver has gathered at each the grid's velocity (`pic`) and how
  * much the grid's velocity has changed (`change`); the transfer makes the new velocity of it. */
 #include <quern/math.h>
+#include <quern/transfer.h>
 
 typedef struct {
 	quern_real rate;
@@ -29,7 +30,6 @@ static void gather_3d(const void *self, const quern_transfer_batch *b) { gather(
 
 static const quern_transfer_ops ops = { .size = sizeof ops, .gather = { gather_2d, gather_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_TRANSFER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "transfer.my_name",

@@ -1,9 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* quern/abi.h - everything a plugin needs, and the only promise Quern makes to it. C17 and C++17.
+/* quern/abi.h - what a plugin of any kind needs: parameters, fields, the host's services, its own table. C17 and C++17.
  *
- * A plugin is one shared object, KIND.NAME.so, that exports one constant table, quern_library_1. Nothing
+ * A plugin is one shared object, KIND.NAME.so, that exports one constant table, quern_library_2. Nothing
  * runs when it is loaded: `quern list`, `describe`, `schema`, the scene reader and the tests of
  * `quern check` are all fed by the rows of that table.
+ *
+ * A kind is a name, with a header of its own (quern/contact.h, ...) that belongs to whoever calls plugins of that kind. The
+ * program itself calls two kinds, `solver` (quern/solver.h) and `observer` (quern/observer.h); all others are called by
+ * solvers, which describe them in their tables, and a solver may bring a kind that nobody has heard of.
  *
  * Threads.  [setup]  main thread, once per instance; may allocate, may fail through host->fail.
  *           [stage]  main thread, between parallel regions; may call every host service.
@@ -18,11 +22,12 @@
  *           nobody relies on them. A result never depends on how entities are cut into batches.
  * Units.    SI. A 2-D scene is a slab one metre thick: kg, N, Pa and kg/m^3 mean the same in both
  *           dimensions. 2-D vectors have two components, axial ones (spin, torque, slip) one.
- * Growth.   Structs grow at the end only. What a plugin fills carries its size (or a stride in
- *           quern_library), and the host takes an older, shorter one: what it does not know is zero. Sets,
- *           slots, stages and outputs carry none yet, so they cannot grow. What the host fills needs none,
- *           since a host refuses a plugin whose minor version is newer than its own. A breaking change
- *           renames the exported symbol.
+ * Growth.   Structs grow at the end only. What a plugin fills carries its size, or its owner carries a stride, and
+ *           the host takes an older, shorter one: what it does not know is zero. What the host fills and hands over by
+ *           pointer needs none, since a host refuses a plugin whose minor version is newer than its own; what it
+ *           returns by value (set views) never grows. With kinds it is the same between a solver and what sits in its
+ *           slots: a batch grows only together with the table of the kind, so that a table which is longer than its
+ *           caller's tells of a newer header, and is refused. A breaking change renames the exported symbol.
  * Looks.    The host looks at all tables when it loads a plugin, and refuses by one sentence what cannot be
  *           true: rows without an end, members outside the instance, a function missing for a dimension. */
 #pragma once
@@ -34,7 +39,7 @@
 extern "C" {
 #endif
 
-#define QUERN_ABI_MAJOR 1u
+#define QUERN_ABI_MAJOR 2u
 #define QUERN_ABI_MINOR 0u
 #define QUERN_ABI (QUERN_ABI_MAJOR << 16 | QUERN_ABI_MINOR)
 #define QUERN_LANES 8u
@@ -56,22 +61,6 @@ typedef enum {
 	QUERN_E_MEMORY,
 	QUERN_E_IO
 } quern_status;
-
-typedef enum {
-	QUERN_SOLVER = 1,
-	QUERN_CONTACT,
-	QUERN_NEIGHBOURS,
-	QUERN_INTEGRATOR,
-	QUERN_BODY,
-	QUERN_MATERIAL,
-	QUERN_SHAPE,
-	QUERN_TRANSFER,
-	QUERN_COUPLING,
-	QUERN_ORACLE,
-	QUERN_PACKER,
-	QUERN_OBSERVER,
-	QUERN_KINDS
-} quern_kind;
 
 enum { QUERN_2D = 1, QUERN_3D = 2 };
 
@@ -275,9 +264,11 @@ typedef struct quern_host {
 	/* [stage] Allocates exactly these blocks of the grid and their neighbours; cells keep their fields. */
 	quern_status (*cover)(quern_run *, uint32_t n, const int32_t (*block)[3]);
 	const void *(*extension)(const char *id); /* [any] NULL if unknown */
-	/* [stage] Whether the scene has this section: "grains", "continuum", "hybrid", "bodies". A field or a set says
-	 * nothing about that, since a scene may have it made only to be written out. */
+	/* [stage] Whether this section takes part in the run. A field or a set says nothing about that, since a scene may
+	 * have it made only to be written out. */
 	bool (*has)(quern_run *, const char *section);
+	/* [setup] The same while the scene is read: sections that come later count too. */
+	bool (*keeps)(const struct quern_setup *, const char *section);
 } quern_host;
 
 typedef struct quern_setup {
@@ -293,16 +284,16 @@ typedef struct quern_setup {
 /* ==== plugin and library ==== */
 
 typedef struct quern_plugin {
-	uint32_t size, kind, revision, dims; /* dims: QUERN_2D | QUERN_3D */
-	const char *id;                      /* "contact.linear": kind and name; the file is contact.linear.so */
-	const char *brief, *doc, *cite;      /* one line; a paragraph; the source of the formulas */
-	uint32_t instance_size, pad;
-	const quern_param *params; /* QUERN_END_PARAMS-terminated */
-	const quern_use *uses;     /* QUERN_END_USES-terminated */
+	uint32_t size, revision;        /* revision: the author's count of changes to results; named on resume */
+	uint32_t dims, instance_size;   /* QUERN_2D | QUERN_3D; bytes */
+	const char *id;                 /* "contact.linear": kind and name; the file is contact.linear.so */
+	const char *brief, *doc, *cite; /* one line; a paragraph; the source of the formulas */
+	const quern_param *params;      /* QUERN_END_PARAMS-terminated */
+	const quern_use *uses;          /* QUERN_END_USES-terminated */
 	/* [setup] derived constants and cross-checks; params are filled in already. May be NULL. */
 	quern_status (*init)(void *self, const quern_setup *, quern_err *);
 	void (*finish)(void *self); /* [setup] frees what init took; may be NULL */
-	const void *ops;            /* quern_contact_ops, ... by kind */
+	const void *ops;            /* quern_contact_ops, ... by kind: begins with its size in bytes */
 } quern_plugin;
 
 typedef struct quern_library {
@@ -311,25 +302,56 @@ typedef struct quern_library {
 	const quern_plugin *plugin;
 } quern_library;
 
+#define QUERN_LIBRARY_SYMBOL "quern_library_2"
 #define QUERN_EXPORT __attribute__((visibility("default")))
 #define QUERN_LIBRARY(plugin_, version_, license_)                                                           \
-	QUERN_EXPORT extern const quern_library quern_library_1;                                                 \
-	const quern_library quern_library_1 = { sizeof(quern_library), QUERN_ABI, sizeof(quern_real),            \
+	QUERN_EXPORT extern const quern_library quern_library_2;                                                 \
+	const quern_library quern_library_2 = { sizeof(quern_library), QUERN_ABI, sizeof(quern_real),            \
 		QUERN_LANES, sizeof(quern_param), sizeof(quern_use), __FILE__, version_, license_, __VERSION__,      \
 		&(plugin_) }
 
-/* What a solver holds of a plugin in one of its slots. */
-typedef struct quern_bound {
-	const void *self, *ops;
-	const void *item;           /* the slot's own rows for this entry, or NULL */
-	const void *const *variant; /* by entry of the slot that overrides this one: the instance to use there */
-	const quern_use *uses;
-	const quern_column
-		*column; /* by row of `uses`: columns of the whole set, NULL where the row does not count */
-	const quern_column *again; /* the same for the slot's `repeat` set */
-	uint32_t n_uses, n_variant;
-	const char *id, *path; /* "contact.linear"; "grains.contact", for messages */
-} quern_bound;
+/* Most rows that the uses of one plugin in a slot may have, whatever its kind; a plugin with more is refused when it is
+ * loaded. Whoever calls plugins sizes its arrays of columns by it. The rows of a solver's stages are the solver's own. */
+enum { QUERN_MOST_USES = 32 };
+
+/* A number that comes out: of an observer in series.csv, of a solver's account in summary.json. */
+typedef enum { QUERN_SUM, QUERN_MAX, QUERN_MIN } quern_combine;
+typedef struct quern_output {
+	const char *name, *unit, *doc; /* the name is a word */
+	uint32_t combine, pad;         /* how parts of it make a whole: quern_combine */
+} quern_output;
+
+/* ==== kinds ==== */
+
+/* A function of a kind's table: by its place, and whether a plugin must have it. */
+typedef struct quern_function {
+	const char *name;
+	uint32_t offset;
+	uint8_t dim, required; /* dim 2, 3: for plugins that have this dimension; 0: for all */
+	uint16_t pad;
+} quern_function;
+
+typedef struct quern_kind {
+	uint32_t size, function_size;    /* of this struct and of one of `functions` */
+	const char *name, *doc;          /* "contact": a word */
+	uint32_t ops_size, pad;          /* of the kind's table as its header, and so the caller, knows it */
+	const quern_function *functions; /* QUERN_END_FUNCTIONS-terminated */
+} quern_kind;
+
+/* Rows of functions for the member m of the table T: a pair by dimension that must be there, or need not; one for both. */
+#define QUERN_FUNCTION_(T, m, at, dim, required)                                                             \
+	{ #m, (uint32_t)(offsetof(T, m) + (at) * sizeof(void (*)(void))), dim, required, 0 }
+#define QUERN_EACH(T, m) QUERN_FUNCTION_(T, m, 0, 2, 1), QUERN_FUNCTION_(T, m, 1, 3, 1)
+#define QUERN_EITHER(T, m) QUERN_FUNCTION_(T, m, 0, 2, 0), QUERN_FUNCTION_(T, m, 1, 3, 0)
+#define QUERN_ONE(T, m) QUERN_FUNCTION_(T, m, 0, 0, 1)
+#define QUERN_OPTIONALLY(T, m) QUERN_FUNCTION_(T, m, 0, 0, 0)
+#define QUERN_END_FUNCTIONS                                                                                  \
+	{ NULL, 0, 0, 0, 0 }
+/* A kind NAME whose table is the struct T, and its rows of functions. */
+#define QUERN_KIND(NAME, T, doc_, ...)                                                                       \
+	static const quern_function quern_##NAME##_functions[] = { __VA_ARGS__, QUERN_END_FUNCTIONS };           \
+	static const quern_kind quern_##NAME##_kind = { sizeof(quern_kind), sizeof(quern_function), #NAME, doc_, \
+		sizeof(T), 0, quern_##NAME##_functions }
 
 /* ==== kernels ==== */
 
@@ -339,5 +361,3 @@ typedef struct quern_bound {
 #ifdef __cplusplus
 }
 #endif
-
-#include <quern/kinds.h>

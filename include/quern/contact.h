@@ -1,8 +1,66 @@
 /* SPDX-License-Identifier: MIT */
-/* quern/contact.h - what contact laws share: restitution, first touch, the Coulomb cone. docs/theory/contacts.md */
+/* quern/contact.h - the kind `contact`: a law for pairs of grains, and what such laws share: restitution, first touch, the Coulomb cone.
+ * docs/theory/contacts.md. One law, one pair of materials, one dimension per batch. */
 #pragma once
 #include <quern/math.h>
 #include <quern/vec.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The first of a pair is the grain of lower id, for ever; against a body it is the grain. Open pairs may be in a
+ * batch (overlap <= 0): a law without reach gives them exactly zero force and sets its history to `initial`, by
+ * select. Weights, levers and torques b x f are the solver's; hence a law is homogeneous of degree 1 in
+ * (stiffness, mass). */
+typedef struct quern_contact_batch {
+	uint32_t n, cap;
+	quern_real dt;
+	const quern_real *overlap;      /* m, r1 + r2 - distance */
+	const quern_real *normal[3];    /* unit, from second to first */
+	const quern_real *velocity[3];  /* m/s, of first relative to second at the contact, spin included */
+	const quern_real *spin[3];      /* rad/s, first minus second; NULL unless grain.spin exists */
+	const quern_real *turn[3];      /* rad/s, mean of first and second; 3-D with spin, else NULL */
+	const quern_real *radius;       /* m, r1 r2/(r1 + r2) */
+	const quern_real *mass;         /* kg, m1 m2/(m1 + m2), unweighted */
+	const quern_column *use;        /* by row: contact.*: this batch's; grain.* READ: the first's */
+	const quern_column *use_second; /* grain.* READ: the second's (against a body: the first's) */
+	quern_real *force[3];           /* N on first; laws of a list ADD to it */
+	/* N m on first, minus that on second; laws ADD to it. NULL unless a law of the list has a use of "contact.couple"
+	 * (N m, QUERN_ADD, QUERN_AXIAL), which says that there are couples and no more. */
+	quern_real *couple[3];
+	/* NULL unless energy is observed: */
+	quern_real *dashpot[3]; /* N on first, ADDed: the part of `force` that damps or clamps */
+	quern_real *stored;     /* J, ADDed: in the normal spring */
+	quern_real *sheared;    /* J, ADDed: in the tangential spring */
+	quern_real *rubbed;     /* J, ADDed: lost to sliding in this step */
+	quern_real
+		*drag_couple[3]; /* N m on first, ADDed: the part of `couple` that damps; NULL without couples too */
+} quern_contact_batch;
+
+typedef struct quern_contact_ops {
+	uint32_t size, pad;
+	void (*force[2])(const void *self, const quern_contact_batch *); /* [batch] [0] 2-D, [1] 3-D */
+	/* [setup] s, half the shortest undamped period of a contact over all its modes: pi/omega */
+	quern_real (*period)(const void *self, uint32_t dim, quern_real mass, quern_real radius);
+	/* [setup] N/m, tangent normal stiffness at a normal force of `force` N */
+	quern_real (*stiffness)(const void *self, uint32_t dim, quern_real radius, quern_real force);
+	quern_real (*reach)(const void *self, quern_real radius); /* [setup] m beyond touching; NULL: 0 */
+	/* [setup] damping ratio gamma/(2 sqrt(k m)) of the mode that is damped most, at the stiffness that `period` is of: an
+	 * explicit dashpot has a limit of its own; NULL: 0 */
+	quern_real (*damping)(const void *self, uint32_t dim);
+} quern_contact_ops;
+
+QUERN_KIND(contact, quern_contact_ops, "A force between two grains in contact.",
+	QUERN_EACH(quern_contact_ops, force), QUERN_OPTIONALLY(quern_contact_ops, period),
+	QUERN_OPTIONALLY(quern_contact_ops, stiffness), QUERN_OPTIONALLY(quern_contact_ops, reach),
+	QUERN_OPTIONALLY(quern_contact_ops, damping));
+
+#ifdef __cplusplus
+}
+#endif
+
+/* ==== what laws share ==== */
 
 /* Damping ratio zeta of a linear contact m x'' + 2 zeta w m x' + w^2 m x = 0 whose force is never attractive and which
  * rebounds with restitution e in (0, 1]: -ln e = 2 zeta F(zeta), F(zeta) = R_C(zeta^2, 1) (Schwager & Poeschel 2007,

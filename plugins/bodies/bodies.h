@@ -2,7 +2,8 @@
 /* bodies - what every body takes besides its own shape; the keys of a scene's `bodies` entries */
 #pragma once
 #include <math.h>
-#include <quern/abi.h>
+#include <quern/body.h>
+#include <quern/solver.h>
 
 enum { BODY_ALWAYS, BODY_SETTLING, BODY_RUNNING };
 enum { BOUNDARY_SLIP, BOUNDARY_STICKY, BOUNDARY_NONE };

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* body.plane - a half-space: everything on the side that the normal does not point to. docs/theory/bodies.md */
 #include <math.h>
+#include <quern/body.h>
 #include <quern/vec.h>
 
 typedef struct {
@@ -60,7 +61,6 @@ static void bounds(const void *self, uint32_t dim, quern_real lower[3], quern_re
 
 static const quern_body_ops ops = { .size = sizeof ops, .closest = closest, .bounds = bounds };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_BODY,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "body.plane",

@@ -20,11 +20,13 @@ static const quern_param rows[] = { QUERN_PARAM_AS(body_item, when, "while", "1"
 		.min = 0, .max = 100),
 	QUERN_END_PARAMS };
 
-static const quern_set sets[] = { { .name = "body", .doc = "Walls and bodies, in the order of the scene." },
-	{ .name = NULL } };
+static const quern_set sets[] = {
+	{ .name = "body", .plural = "bodies", .doc = "Walls and bodies, in the order of the scene." },
+	{ .name = NULL }
+};
 static const quern_slot slots[] = { { .name = "",
+										.kind = &quern_body_kind,
 										.doc = "Bodies.",
-										.kind = QUERN_BODY,
 										.list = 1,
 										.stage = { "bodies.place" },
 										.override = "grains.contact",
@@ -63,11 +65,9 @@ static const quern_stage stages[] = { { .name = "bodies.place",
 										  .run = place },
 	{ .name = NULL } };
 
-static const quern_solver_ops ops = {
-	.size = sizeof ops, .sets = sets, .slots = slots, .stages = stages, .ready = ready
-};
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "bodies", .sets = sets, .slots = slots,
+	.stages = stages, .ready = ready };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SOLVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.bodies",

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* cloud - grains or points as what they carry: how much each does, and sums over all */
 #pragma once
-#include <quern/abi.h>
+#include <quern/solver.h>
 
 typedef struct cloud {
 	const quern_real *mass, *weight; /* kg; the share of it that is carried, NULL: all */
@@ -58,12 +58,4 @@ QUERN_INLINE quern_real cloud_height(
 	quern_real sum = 0;
 	for (uint32_t k = 0; k < dim; k++) sum -= gravity[k] * x->real[k][i];
 	return sum;
-}
-
-/* Adds mass, momentum and the energy of height. */
-static inline void cloud_account(const cloud_sums *c, const quern_column *x, const quern_column *v,
-	const quern_step *s, quern_account *out) {
-	out->mass += cloud_total(c);
-	for (uint32_t k = 0; k < s->dim; k++) CLOUD_ADD(c, i, v->real[k][i], out->momentum[k]);
-	CLOUD_ADD(c, i, cloud_height(x, i, s->dim, s->gravity), out->potential);
 }

@@ -2,6 +2,7 @@
 /* cover - which grid blocks the material needs, and points in the order of blocks and cells */
 #pragma once
 #include <quern/grid.h>
+#include <quern/solver.h>
 
 typedef struct cover {
 	quern_column point, grain; /* positions; grain.real[0] NULL: points alone count */

@@ -3,7 +3,7 @@
  * gravity is strongest. One definition for whoever needs it. */
 #pragma once
 #include <math.h>
-#include <quern/abi.h>
+#include <quern/solver.h>
 
 /* The axis along which gravity acts most; the last one where there is none. */
 static inline uint32_t quern_vertical(uint32_t dim, const quern_real gravity[3]) {

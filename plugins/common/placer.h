@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
 #pragma once
+#include <quern/packer.h>
+#include <quern/solver.h>
 #include <quern/space.h>
 
 typedef struct placer {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* radius - the distribution of grain radii, by the number of the draw */
 #pragma once
-#include <quern/abi.h>
+#include <quern/solver.h>
 
 /* kg of a sphere of that radius; in 2-D of a disc one metre deep. */
 QUERN_INLINE quern_real quern_radius_mass(quern_real radius, quern_real density, uint32_t dim) {

@@ -3,6 +3,7 @@
  * share. `dim` is a constant in every caller. docs/theory/materials.md, 1 and 2 */
 #pragma once
 #include "symmetric.h"
+#include <quern/material.h>
 
 typedef struct tensor {
 	quern_real xx, xy, xz, yx, yy, yz, zx, zy, zz;

@@ -3,6 +3,8 @@
 #pragma once
 #include <math.h>
 #include <quern/grid.h>
+#include <quern/shape.h>
+#include <quern/solver.h>
 
 enum { STENCIL = 64 }; /* particles at once */
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* stressed - points whose stress is given: the rest of their state by the material's state-from-stress */
 #pragma once
-#include <quern/abi.h>
+#include <quern/material.h>
+#include <quern/solver.h>
 
 /* Whole columns of the set; energy.real[0] may be NULL. */
 typedef struct stressed_points {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* tools - what several solvers need and no plugin author would miss */
 #pragma once
-#include <quern/abi.h>
+#include <quern/solver.h>
 
 /* Columns of a batch that begins at entry `first` of the whole set. */
 QUERN_INLINE quern_column quern_column_from(quern_column c, uint8_t shape, uint32_t first) {
@@ -42,6 +42,18 @@ static inline quern_real quern_brought_back(quern_real x, quern_real lower, quer
 	x = x >= upper ? x - (upper - lower) : x;
 	x = x < lower ? x + (upper - lower) : x;
 	return x >= upper ? lower : x;
+}
+
+/* Positions become numbers of cells, so none may be far outside: what is fixed may lie beyond the domain by as much as that
+ * is wide. */
+static inline bool quern_positions_hold(const quern_step *s, const quern_column *x, uint32_t n) {
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real width = s->upper[k] - s->lower[k];
+		for (uint32_t i = 0; i < n; i++)
+			if (!(x->real[k][i] >= s->lower[k] - 1.5 * width && x->real[k][i] <= s->upper[k] + 1.5 * width))
+				return false;
+	}
+	return true;
 }
 
 /* A column by its number, of whatever kind. */

@@ -4,6 +4,7 @@
 #pragma once
 #include "stencil.h"
 #include "tools.h"
+#include <quern/transfer.h>
 #include <string.h>
 
 typedef struct trips {

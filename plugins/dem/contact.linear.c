@@ -145,7 +145,6 @@ static const quern_contact_ops ops = { .size = sizeof ops,
 	.stiffness = stiffness,
 	.damping = damping };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_CONTACT,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "contact.linear",

@@ -2,10 +2,14 @@
 /* dem - the grain solver's own parameters and its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"
-#include "../common/cloud.h"
+#include "../common/account.h"
 #include "../common/radius.h"
 #include "../common/tools.h"
 #include "rows.h"
+#include <quern/contact.h>
+#include <quern/integrator.h>
+#include <quern/neighbours.h>
+#include <quern/packer.h>
 
 typedef struct dem {
 	quern_real density, skin, rest, settle_step; /* from the scene */

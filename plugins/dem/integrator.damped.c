@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* integrator.damped - for coming to rest: symplectic Euler with a drag and a local damping. docs/theory/grains.md,
  * section 6 */
-#include <quern/abi.h>
+#include <quern/integrator.h>
 
 typedef struct {
 	quern_real drag, local;
@@ -50,7 +50,6 @@ static void close_3d(const void *self, const quern_integrator_batch *b) { close(
 
 static const quern_integrator_ops ops = { .size = sizeof ops, .damps = 1, .close = { close_2d, close_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_INTEGRATOR,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "integrator.damped",

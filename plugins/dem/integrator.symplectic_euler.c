@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* integrator.symplectic_euler - velocities first, positions with the new ones. docs/theory/grains.md, section 3 */
-#include <quern/abi.h>
+#include <quern/integrator.h>
 
 typedef struct {
 	int32_t unused;
@@ -38,7 +38,6 @@ static void close_3d(const void *self, const quern_integrator_batch *b) { (void)
 
 static const quern_integrator_ops ops = { .size = sizeof ops, .close = { close_2d, close_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_INTEGRATOR,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "integrator.symplectic_euler",

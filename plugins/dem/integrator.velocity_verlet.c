@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* integrator.velocity_verlet - second order, also with dashpots: forces see v + dt a, the velocity that the old
  * acceleration predicts. docs/theory/grains.md, section 3 */
-#include <quern/abi.h>
+#include <quern/integrator.h>
 
 typedef struct {
 	int32_t unused;
@@ -88,7 +88,6 @@ static const quern_integrator_ops ops = {
 	.size = sizeof ops, .close = { close_2d, close_3d }, .open = { open_2d, open_3d }
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_INTEGRATOR,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "integrator.velocity_verlet",

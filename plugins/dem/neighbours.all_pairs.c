@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* neighbours.all_pairs - every pair is looked at: the reference that faster searches are held against */
+#include <quern/neighbours.h>
 #include <quern/space.h>
 
 typedef struct {
@@ -39,7 +40,6 @@ static uint32_t pairs(
 
 static const quern_neighbour_ops ops = { .size = sizeof ops, .keys = keys, .pairs = pairs };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_NEIGHBOURS,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "neighbours.all_pairs",

@@ -2,6 +2,7 @@
 /* neighbours.cells - linked cells as wide as the farthest pair; blocks of 16 x 16 or 8 x 8 x 8 of them.
  * docs/theory/grains.md, section 4 */
 #include <math.h>
+#include <quern/neighbours.h>
 #include <quern/space.h>
 
 typedef struct {
@@ -141,7 +142,6 @@ static const quern_neighbour_ops ops = {
 	.size = sizeof ops, .keys = keys, .index = index_cells, .pairs = pairs
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_NEIGHBOURS,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "neighbours.cells",

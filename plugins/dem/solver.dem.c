@@ -63,38 +63,48 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
-static const quern_set sets[] = { { .name = "grain", .doc = "Discs or spheres, sorted by block and cell." },
-	{ .name = "contact", .doc = "Pairs of grains that are near; by block, pairs across blocks in both." },
-	{ .name = "touch", .doc = "Grains near bodies, by block, body and grain.", .slot = "bodies" },
+static const quern_set sets[] = { { .name = "grain",
+									  .plural = "grains",
+									  .doc = "Discs or spheres, sorted by block and cell.",
+									  .counted = 1,
+									  .cost = { 40e-9, 100e-9 } },
+	{ .name = "contact",
+		.plural = "contacts",
+		.doc = "Pairs of grains that are near; by block, pairs across blocks in both." },
+	{ .name = "touch",
+		.plural = "touches",
+		.doc = "Grains near bodies, by block, body and grain.",
+		.slot = "bodies" },
 	{ .name = NULL } };
 
 static const quern_slot slots[] = {
 	{ .name = "contact",
+		.kind = &quern_contact_kind,
 		.doc = "a contact law, such as {linear: {stiffness: 1e6 N/m}}; forces of a list add up, [] is none",
-		.kind = QUERN_CONTACT,
 		.list = 1,
 		.required = 1,
 		.stage = { "dem.forces" },
-		.repeat = "touch" },
+		.repeat = "contact",
+		.again = "touch" },
 	{ .name = "neighbours",
+		.kind = &quern_neighbours_kind,
 		.doc = "the search for near pairs",
-		.kind = QUERN_NEIGHBOURS,
 		.def = "cells",
 		.stage = { "dem.neighbours" } },
 	{ .name = "integrator",
+		.kind = &quern_integrator_kind,
 		.doc = "the step in time",
-		.kind = QUERN_INTEGRATOR,
 		.def = "symplectic_euler",
 		.stage = { "dem.forces", "dem.open" } },
-	{ .name = "bodies", .kind = QUERN_BODY, .list = 1, .stage = { "dem.forces" }, .same_as = "bodies" },
+	{ .name = "bodies", .kind = &quern_body_kind, .list = 1, .stage = { "dem.forces" }, .same_as = "bodies" },
 	{ .name = "fill.packer",
+		.kind = &quern_packer_kind,
 		.doc = "who places the grains",
-		.kind = QUERN_PACKER,
 		.def = "two_point_tangent",
 		.stage = { "dem.fill" } },
 	{ .name = "settling",
+		.kind = &quern_integrator_kind,
 		.doc = "the step in time while settling",
-		.kind = QUERN_INTEGRATOR,
 		.def = "damped",
 		.stage = { "dem.forces", "dem.open" } },
 	{ .name = NULL }
@@ -113,24 +123,26 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 										  .run = quern_dem_fill },
 	{ .name = "dem.open",
 		.doc = "The integrator's part before the forces, if it has one.",
-		.phase = QUERN_GRAINS,
+		.phase = QUERN_SUBSTEP,
+		.flags = QUERN_SETTLES,
 		.uses = open_uses,
 		.run = quern_dem_open },
 	{ .name = "dem.neighbours",
 		.doc = "Sorts grains, lists near pairs, carries their history.",
-		.phase = QUERN_GRAINS,
-		.sometimes = 1,
+		.phase = QUERN_SUBSTEP,
+		.flags = QUERN_SOMETIMES | QUERN_SETTLES,
 		.uses = near_uses,
 		.run = quern_dem_neighbours },
 	{ .name = "dem.forces",
 		.doc = "Block by block: test, laws, sums, integration.",
-		.phase = QUERN_GRAINS,
+		.phase = QUERN_SUBSTEP,
+		.flags = QUERN_SETTLES,
 		.uses = force_uses,
 		.run = quern_dem_forces },
 	{ .name = "dem.list",
 		.doc = "The list of the release, before anything has moved.",
 		.phase = QUERN_OUTPUT,
-		.sometimes = 1,
+		.flags = QUERN_SOMETIMES,
 		.uses = near_uses,
 		.run = quern_dem_list },
 	{ .name = "dem.observe",
@@ -365,7 +377,11 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	return by_period ? fast.period / 50 : 0.5 * first.hard;
 }
 
-static void account(const void *self, const quern_step *s, quern_account *out) {
+enum { SUM_DISCRETE = SUM_OWN };
+static const quern_output sums[] = { ACCOUNT_ROWS,
+	{ .name = "discrete", .unit = "kg", .doc = "Carried by grains." }, { .name = NULL } };
+
+static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *use = s->use;
 	const cloud grains = dem_cloud(s, use[FILL_WEIGHT].real[0]);
 	const quern_real *radius = use[FILL_RADIUS].real[0], turning = quern_radius_inertia(s->dim);
@@ -374,24 +390,40 @@ static void account(const void *self, const quern_step *s, quern_account *out) {
 	(void)self;
 	if (!grains.n || !cloud_open(&c, s->host, s->run, &grains)) return;
 	cloud_account(&c, &use[FILL_POSITION], &use[FILL_VELOCITY], s, out);
-	out->discrete += cloud_total(&c);
+	out[SUM_DISCRETE] += cloud_total(&c);
 	CLOUD_ADD(&c, i,
 		0.5 * (cloud_square(&use[FILL_VELOCITY], i, s->dim) +
 				  turning * radius[i] * radius[i] * cloud_square(&use[FILL_SPIN], i, n_spin)),
-		out->kinetic);
+		out[SUM_KINETIC]);
 }
 
-static const quern_solver_ops ops = { .size = sizeof ops,
-	.sets = sets,
-	.slots = slots,
-	.stages = stages,
-	.ready = ready,
-	.limit = limit,
-	.settled = quern_dem_settled,
-	.account = account,
-	.settling = quern_dem_settling };
+/* Radii become numbers of cells too. A fixed grain may be a floor as wide as the domain, and rounder. */
+static bool radii_hold(const quern_step *s, const quern_real *radius, uint32_t n) {
+	quern_real widest = 0;
+	for (uint32_t k = 0; k < s->dim; k++) widest = fmax(widest, s->upper[k] - s->lower[k]);
+	for (uint32_t i = 0; i < n; i++)
+		if (!(radius[i] > 0 && radius[i] <= 10 * widest)) return false;
+	return true;
+}
+
+static quern_status accept(const void *self, const quern_step *s) {
+	const uint32_t n = s->host->set(s->run, "grain").n;
+	(void)self;
+	if (!radii_hold(s, s->use[FILL_RADIUS].real[0], n))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+			"grain.radius holds a radius of no grain, or far wider than the domain");
+	if (!quern_positions_hold(s, &s->use[FILL_POSITION], n))
+		return s->host->stop(
+			s->run, QUERN_E_NUMERIC, NULL, -1, "grain.position holds a position far outside of the domain");
+	return QUERN_OK;
+}
+
+static const char *const with[] = { "bodies", NULL };
+
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .with = with, .sets = sets,
+	.slots = slots, .stages = stages, .sums = sums, .ready = ready, .limit = limit,
+	.settled = quern_dem_settled, .account = account, .settling = quern_dem_settling, .accept = accept };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SOLVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.dem",

@@ -2,6 +2,7 @@
 /* coupling.affine - the same exchange of momentum at each node, between clouds that send v + L (x_i - x): so both speak
  * of the velocity at the node, and strain rates and rotations pass unchanged. docs/theory/hybrid.md, section 2 */
 #include "exchange.h"
+#include <quern/coupling.h>
 
 typedef struct {
 	int32_t unused;
@@ -18,7 +19,6 @@ static void couple(const void *self, const quern_coupling_job *job) { (void)self
 
 static const quern_coupling_ops ops = { .size = sizeof ops, .affine = 1, .couple = couple };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_COUPLING,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "coupling.affine",

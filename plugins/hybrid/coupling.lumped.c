@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* coupling.lumped - an inelastic exchange of momentum at each node. docs/theory/hybrid.md, section 2 */
 #include "exchange.h"
+#include <quern/coupling.h>
 
 typedef struct {
 	int32_t unused;
@@ -12,7 +13,6 @@ static void couple(const void *self, const quern_coupling_job *job) { (void)self
 
 static const quern_coupling_ops ops = { .size = sizeof ops, .affine = 0, .couple = couple };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_COUPLING,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "coupling.lumped",

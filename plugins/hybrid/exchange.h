@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* exchange - the inelastic exchange of momentum that both couplings make, node by node */
 #pragma once
-#include <quern/abi.h>
+#include <quern/coupling.h>
 
 /* v = (m_c v_c + m_d v_d)/(m_c + m_d), by one impulse that both take: its momentum is kept to the last bit but one. */
 static inline void exchange(const quern_coupling_job *job) {

@@ -2,11 +2,17 @@
 /* hybrid - the parameters of the hybrid solver and its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"
-#include "../common/cloud.h"
+#include "../common/account.h"
 #include "../common/radius.h"
 #include "../common/tools.h"
 #include "rows.h"
+#include <quern/coupling.h>
 #include <quern/grid.h>
+#include <quern/material.h>
+#include <quern/oracle.h>
+#include <quern/packer.h>
+#include <quern/shape.h>
+#include <quern/transfer.h>
 
 typedef struct hybrid {
 	int32_t substeps, update, samples; /* from the scene */

@@ -36,32 +36,39 @@ static const quern_set sets[] = { { .name = "mixture", .doc = "What grains bring
 
 static const quern_slot slots[] = {
 	{ .name = "oracle",
+		.kind = &quern_oracle_kind,
 		.doc = "who says where grains are needed; the least continuous wish wins",
-		.kind = QUERN_ORACLE,
 		.list = 1,
 		.stage = { "hybrid.update" } },
 	{ .name = "packer",
+		.kind = &quern_packer_kind,
 		.doc = "who places new grains",
-		.kind = QUERN_PACKER,
 		.def = "two_point_tangent",
 		.stage = { "hybrid.update" } },
 	{ .name = "coupling",
+		.kind = &quern_coupling_kind,
 		.doc = "how grains and continuum meet at a node",
-		.kind = QUERN_COUPLING,
 		.def = "affine",
 		.stage = { "hybrid.couple" } },
 	{ .name = "material",
-		.kind = QUERN_MATERIAL,
+		.kind = &quern_material_kind,
 		.stage = { NULL, "hybrid.update" }, /* moduli, for the audit, are no stage's */
 		.same_as = "continuum.material" },
-	{ .name = "shape", .kind = QUERN_SHAPE, .stage = { "hybrid.raster" }, .same_as = "continuum.shape" },
+	{ .name = "shape",
+		.kind = &quern_shape_kind,
+		.stage = { "hybrid.raster" },
+		.same_as = "continuum.shape" },
 	{ .name = "transfer",
+		.kind = &quern_transfer_kind,
 		.doc = "from the nodes back to the grains",
-		.kind = QUERN_TRANSFER,
 		.def = "picflip: {rate: 0}",
 		.stage = { "hybrid.back" },
 		.particle = "grain" },
-	{ .name = "bodies", .kind = QUERN_BODY, .list = 1, .stage = { "hybrid.update" }, .same_as = "bodies" },
+	{ .name = "bodies",
+		.kind = &quern_body_kind,
+		.list = 1,
+		.stage = { "hybrid.update" },
+		.same_as = "bodies" },
 	{ .name = NULL }
 };
 
@@ -74,34 +81,34 @@ static const quern_use audit_uses[] = QUERN_USE_ROWS(AUDIT_USES);
 
 static const quern_stage stages[] = { { .name = "hybrid.update",
 										  .doc = "Zones, weights, books, new grains and points.",
-										  .phase = QUERN_CONVERT,
-										  .sometimes = 1,
+										  .phase = QUERN_BEGIN,
+										  .flags = QUERN_SOMETIMES,
 										  .uses = update_uses,
 										  .run = quern_hybrid_update },
 	{ .name = "hybrid.sample",
 		.doc = "Contact stress by cell.",
-		.phase = QUERN_GRAINS,
-		.sometimes = 1,
+		.phase = QUERN_SUBSTEP,
+		.flags = QUERN_SOMETIMES,
 		.uses = sample_uses,
 		.run = quern_hybrid_sample },
 	{ .name = "hybrid.raster",
 		.doc = "Grains to nodes.",
-		.phase = QUERN_COUPLE,
+		.phase = QUERN_EXCHANGE,
 		.uses = raster_uses,
 		.run = quern_hybrid_raster },
 	{ .name = "hybrid.couple",
 		.doc = "Exchange of momentum at the nodes.",
-		.phase = QUERN_COUPLE,
+		.phase = QUERN_EXCHANGE,
 		.uses = couple_uses,
 		.run = quern_hybrid_couple },
 	{ .name = "hybrid.back",
 		.doc = "What the coupling changed, to the grains.",
-		.phase = QUERN_COUPLE,
+		.phase = QUERN_EXCHANGE,
 		.uses = back_uses,
 		.run = quern_hybrid_back },
 	{ .name = "hybrid.audit",
 		.doc = "Asserts the ledger's invariants.",
-		.phase = QUERN_OBSERVE,
+		.phase = QUERN_END,
 		.uses = audit_uses,
 		.run = quern_hybrid_audit },
 	{ .name = NULL } };
@@ -132,29 +139,34 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 
 static uint32_t substeps(const void *self) { return (uint32_t)((const hybrid *)self)->substeps; }
 
-static void account(const void *self, const quern_step *s, quern_account *out) {
+enum { SUM_OWED, SUM_OWED_MOMENTUM, SUM_DEFECT = SUM_OWED_MOMENTUM + 3 };
+static const quern_output sums[] = {
+	{ .name = "owed", .unit = "kg", .doc = "The ledger's sum over all cells." },
+	{ .name = "owed_momentum_x", .unit = "kg m/s" }, { .name = "owed_momentum_y", .unit = "kg m/s" },
+	{ .name = "owed_momentum_z", .unit = "kg m/s" },
+	{ .name = "defect", .unit = "1", .doc = "Of the ledger's invariants so far.", .combine = QUERN_MAX },
+	{ .name = NULL }
+};
+
+static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
 	const size_t n = s->host->set(s->run, "cell").n;
 	(void)self;
-	out->owed +=
+	out[SUM_OWED] =
 		s->host->sum(s->run, n, u[U_GRAIN_OWED].real[0]) + s->host->sum(s->run, n, u[U_POINT_OWED].real[0]);
 	for (uint32_t k = 0; k < s->dim; k++)
-		out->owed_momentum[k] += s->host->sum(s->run, n, u[U_GRAIN_OWED_MOMENTUM].real[k]) +
-								 s->host->sum(s->run, n, u[U_POINT_OWED_MOMENTUM].real[k]);
+		out[SUM_OWED_MOMENTUM + k] = s->host->sum(s->run, n, u[U_GRAIN_OWED_MOMENTUM].real[k]) +
+									 s->host->sum(s->run, n, u[U_POINT_OWED_MOMENTUM].real[k]);
 	const quern_real mass = u[U_MASS_DEFECT].real[0][0], momentum = u[U_MOMENTUM_DEFECT].real[0][0];
-	const quern_real worst = mass > momentum ? mass : momentum;
-	out->defect = worst > out->defect ? worst : out->defect;
+	out[SUM_DEFECT] = mass > momentum ? mass : momentum;
 }
 
-static const quern_solver_ops ops = { .size = sizeof ops,
-	.sets = sets,
-	.slots = slots,
-	.stages = stages,
-	.ready = ready,
-	.substeps = substeps,
+static const char *const needs[] = { "grains", "continuum", NULL }, *const with[] = { "bodies", NULL };
+
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "hybrid", .needs = needs, .with = with,
+	.sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready, .substeps = substeps,
 	.account = account };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SOLVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.hybrid",

@@ -2,9 +2,13 @@
 /* mpm - the continuum solver's own parameters and its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"
+#include "../common/account.h"
 #include "../common/tools.h"
 #include "rows.h"
 #include <quern/grid.h>
+#include <quern/material.h>
+#include <quern/shape.h>
+#include <quern/transfer.h>
 
 typedef struct mpm {
 	quern_real cell, cut; /* from the scene */

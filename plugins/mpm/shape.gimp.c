@@ -2,6 +2,7 @@
 /* shape.gimp - uniform generalised interpolation: hats averaged over a particle of half-width l. At walls the nodes
  * outside are folded back, which leaves the hat and keeps completeness. docs/theory/mpm.md, section 2 */
 #include <quern/math.h>
+#include <quern/shape.h>
 
 typedef struct {
 	quern_real half_width;
@@ -67,7 +68,6 @@ static const quern_shape_ops ops = {
 	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SHAPE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.gimp",

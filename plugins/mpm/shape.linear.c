@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* shape.linear - hats: two nodes per axis. Their slopes jump at cell faces; for comparison. docs/theory/mpm.md */
 #include <quern/math.h>
+#include <quern/shape.h>
 
 typedef struct {
 	int32_t unused;
@@ -51,7 +52,6 @@ static const quern_shape_ops ops = {
 	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SHAPE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.linear",

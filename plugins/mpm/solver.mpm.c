@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
-#include "../common/cloud.h"
 #include "../common/height.h"
 #include "mpm.h"
 #include <math.h>
@@ -35,26 +34,29 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 static const quern_use uses[] = { QUERN_END_USES };
 
 static const quern_set sets[] = { { .name = "point",
+									  .plural = "points",
+									  .counted = 1,
+									  .cost = { 40e-9, 100e-9 },
 									  .doc = "Material points, sorted by grid block and cell." },
 	{ .name = "node", .doc = "What points bring to the nodes.", .rows = 8 },
 	{ .name = "motion", .doc = "How nodes move.", .rows = 8 }, { .name = NULL } };
 
 static const quern_slot slots[] = { { .name = "material",
+										.kind = &quern_material_kind,
 										.doc = "the constitutive model",
-										.kind = QUERN_MATERIAL,
 										.stage = { "mpm.gather", "mpm.fill" } },
 	{ .name = "shape",
+		.kind = &quern_shape_kind,
 		.doc = "the shape functions",
-		.kind = QUERN_SHAPE,
 		.def = "gimp",
 		.stage = { "mpm.gather" } },
 	{ .name = "transfer",
+		.kind = &quern_transfer_kind,
 		.doc = "from grid velocities to points",
-		.kind = QUERN_TRANSFER,
 		.def = "picflip",
 		.stage = { "mpm.gather" },
 		.particle = "point" },
-	{ .name = "bodies", .kind = QUERN_BODY, .list = 1, .stage = { "mpm.nodes" }, .same_as = "bodies" },
+	{ .name = "bodies", .kind = &quern_body_kind, .list = 1, .stage = { "mpm.nodes" }, .same_as = "bodies" },
 	{ .name = NULL } };
 
 static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
@@ -71,28 +73,28 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 										  .run = quern_mpm_fill },
 	{ .name = "mpm.sort",
 		.doc = "Orders points by block and cell, allocates blocks.",
-		.phase = QUERN_TO_GRID,
-		.sometimes = 1,
+		.phase = QUERN_DEPOSIT,
+		.flags = QUERN_SOMETIMES,
 		.uses = sort_uses,
 		.run = quern_mpm_sort },
 	{ .name = "mpm.scatter",
 		.doc = "Points to nodes: mass, momentum, force.",
-		.phase = QUERN_TO_GRID,
+		.phase = QUERN_DEPOSIT,
 		.uses = scatter_uses,
 		.run = quern_mpm_scatter },
 	{ .name = "mpm.nodes",
 		.doc = "Grid velocities; bodies and faces.",
-		.phase = QUERN_TO_GRID,
+		.phase = QUERN_DEPOSIT,
 		.uses = nodes_uses,
 		.run = quern_mpm_nodes },
 	{ .name = "mpm.walls",
 		.doc = "Bodies and faces again, after a coupling.",
-		.phase = QUERN_FROM_GRID,
+		.phase = QUERN_ADVANCE,
 		.uses = walls_uses,
 		.run = quern_mpm_walls },
 	{ .name = "mpm.gather",
 		.doc = "Nodes to points: velocity, position, volume, stress.",
-		.phase = QUERN_FROM_GRID,
+		.phase = QUERN_ADVANCE,
 		.uses = gather_uses,
 		.run = quern_mpm_gather },
 	{ .name = NULL } };
@@ -139,7 +141,12 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	mpm *p = self;
-	(void)n_slot, (void)err;
+	(void)n_slot;
+	if (setup->host->keeps(setup, "grains") && !setup->host->keeps(setup, "hybrid"))
+		return setup->host->fail(err, QUERN_E_PARAM, NULL,
+			"grains and continuum do not feel each other without a section hybrid; add it, or keep one of "
+			"them "
+			"with 'model: grains' or 'model: continuum'");
 	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE];
 	((const quern_material_ops *)material->ops)
 		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
@@ -169,7 +176,12 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	return 0.9 / rate;
 }
 
-static void account(const void *self, const quern_step *s, quern_account *out) {
+enum { SUM_ELASTIC = SUM_OWN };
+static const quern_output sums[] = { ACCOUNT_ROWS,
+	{ .name = "elastic", .unit = "J", .doc = "Stored in the material, where energy is observed." },
+	{ .name = NULL } };
+
+static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
 	const cloud points = { u[FILL_MASS].real[0], u[FILL_WEIGHT].real[0], NULL,
 		s->host->set(s->run, "point").n };
@@ -177,19 +189,25 @@ static void account(const void *self, const quern_step *s, quern_account *out) {
 	(void)self;
 	if (!points.n || !cloud_open(&c, s->host, s->run, &points)) return;
 	cloud_account(&c, &u[FILL_POSITION], &u[FILL_VELOCITY], s, out);
-	CLOUD_ADD(&c, i, 0.5 * cloud_square(&u[FILL_VELOCITY], i, s->dim), out->kinetic);
-	if (u[FILL_ENERGY].real[0]) CLOUD_ADD(&c, i, u[FILL_ENERGY].real[0][i], out->elastic);
+	CLOUD_ADD(&c, i, 0.5 * cloud_square(&u[FILL_VELOCITY], i, s->dim), out[SUM_KINETIC]);
+	if (u[FILL_ENERGY].real[0]) CLOUD_ADD(&c, i, u[FILL_ENERGY].real[0][i], out[SUM_ELASTIC]);
 }
 
-static const quern_solver_ops ops = { .size = sizeof ops,
-	.sets = sets,
-	.slots = slots,
-	.stages = stages,
-	.ready = ready,
-	.limit = limit,
-	.account = account };
+static quern_real cell(const void *self) { return ((const mpm *)self)->cell; }
+
+static quern_status accept(const void *self, const quern_step *s) {
+	(void)self;
+	if (quern_positions_hold(s, &s->use[FILL_POSITION], s->host->set(s->run, "point").n)) return QUERN_OK;
+	return s->host->stop(
+		s->run, QUERN_E_NUMERIC, NULL, -1, "point.position holds a position far outside of the domain");
+}
+
+static const char *const with[] = { "bodies", NULL }, *const after[] = { "grains", NULL };
+
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum", .with = with,
+	.after = after, .sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready,
+	.limit = limit, .account = account, .cell = cell, .accept = accept };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_SOLVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.mpm",

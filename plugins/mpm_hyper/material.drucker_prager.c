@@ -4,6 +4,7 @@
  * isochoric strain b, so that the yield stress is met to round-off at any pressure; b = dev b + t I follows from det
  * b = 1. */
 #include "../common/rotation.h"
+#include <quern/material.h>
 #include <quern/math.h>
 
 typedef struct {
@@ -184,7 +185,6 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.assign = { assign_2d, assign_3d },
 	.moduli = moduli };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_MATERIAL,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.drucker_prager",

@@ -2,6 +2,7 @@
 /* material.elastic - linear hypoelasticity: it carries tension, and nothing yields. docs/theory/materials.md, section
  * 2. Start here to write a material of your own. */
 #include "../common/rotation.h"
+#include <quern/material.h>
 #include <quern/math.h>
 
 typedef struct {
@@ -74,7 +75,6 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.assign = { assign_2d, assign_3d },
 	.moduli = moduli };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_MATERIAL,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.elastic",

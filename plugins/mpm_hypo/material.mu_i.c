@@ -2,6 +2,7 @@
 /* material.mu_i - hypoelastic up to a yield stress that grows with the inertial number, no tension, and no stress below
  * the critical density. docs/theory/materials.md, section 3 */
 #include "../common/rotation.h"
+#include <quern/material.h>
 #include <quern/math.h>
 
 typedef struct {
@@ -155,7 +156,6 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.assign = { assign_2d, assign_3d },
 	.moduli = moduli };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_MATERIAL,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.mu_i",

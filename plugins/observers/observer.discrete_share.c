@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* observer.discrete_share - the share of the mass that grains carry: sum of w m over all carried mass */
 #include "observers.h"
+#include <quern/observer.h>
 
 typedef struct {
 	int32_t unused;
@@ -21,9 +22,10 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	return QUERN_OK;
 }
 
-static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, .whole = whole };
+static const quern_observer_ops ops = {
+	.size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole
+};
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_OBSERVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.discrete_share",

@@ -3,6 +3,7 @@
 #include "../common/height.h"
 #include "observers.h"
 #include <math.h>
+#include <quern/observer.h>
 #include <stdlib.h>
 
 typedef struct {
@@ -114,9 +115,10 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	return QUERN_OK;
 }
 
-static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, .whole = whole };
+static const quern_observer_ops ops = {
+	.size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole
+};
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_OBSERVER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.runout",

@@ -3,6 +3,7 @@
 #pragma once
 #include "../common/cloud.h"
 #include "../common/tools.h"
+#include <quern/observer.h>
 
 /* The first rows of every observer of both clouds. */
 /* clang-format off */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* band - the hybrid zone as a band at a depth below a surface: what oracles that mark one have in common */
 #pragma once
-#include <quern/abi.h>
+#include <quern/oracle.h>
 
 typedef struct oracle_band {
 	quern_real depth, half_width, cell; /* m */

@@ -44,7 +44,6 @@ static uint32_t flags(const void *self) {
 
 static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide, .surface = flags };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_ORACLE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "oracle.packing_fraction",

@@ -57,7 +57,6 @@ static void decide(const void *self, const quern_cell_batch *b) {
 
 static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_ORACLE,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "oracle.strain_rate",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* packer.random - darts thrown at the region until too many in a row miss. docs/theory/packers.md, section 2 */
-#include <quern/abi.h>
+#include <quern/packer.h>
 
 typedef struct {
 	int32_t trials;
@@ -37,7 +37,6 @@ static void pack(const void *self, quern_pack_job *job) {
 
 static const quern_packer_ops ops = { .size = sizeof ops, .pack = { pack, pack } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_PACKER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "packer.random",

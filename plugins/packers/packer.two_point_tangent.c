@@ -2,6 +2,7 @@
 /* packer.two_point_tangent - grains that touch two others, in 3-D three; a wall counts as one.
  * docs/theory/packers.md, section 3 */
 #include <quern/math.h>
+#include <quern/packer.h>
 #include <quern/vec.h>
 
 typedef struct {
@@ -326,7 +327,6 @@ static void pack_3d(const void *self, quern_pack_job *job) { pack(self, job, add
 
 static const quern_packer_ops ops = { .size = sizeof ops, .pack = { pack_2d, pack_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_PACKER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "packer.two_point_tangent",

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* transfer.mixed - PIC along the normal of the hybrid zone, FLIP along its tangents; what this takes from one particle
  * goes back through the grid, so that momentum is kept where the normal turns. docs/theory/transfers.md */
+#include <quern/transfer.h>
 #include <quern/vec.h>
 
 typedef struct {
@@ -48,7 +49,6 @@ static void gather_3d(const void *self, const quern_transfer_batch *b) {
 
 static const quern_transfer_ops ops = { .size = sizeof ops, .passes = 1, .gather = { gather_2d, gather_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_TRANSFER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "transfer.mixed",

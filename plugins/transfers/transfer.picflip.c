@@ -2,6 +2,7 @@
 /* transfer.picflip - keeps what lies below the grid (FLIP) and lets it decay at a rate (PIC).
  * docs/theory/transfers.md */
 #include <quern/math.h>
+#include <quern/transfer.h>
 
 typedef struct {
 	quern_real rate;
@@ -34,7 +35,6 @@ static void gather_3d(const void *self, const quern_transfer_batch *b) { gather(
 
 static const quern_transfer_ops ops = { .size = sizeof ops, .gather = { gather_2d, gather_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_TRANSFER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "transfer.picflip",

@@ -319,10 +319,10 @@ def attempt(k, text, folder):
     cost = plan["estimated_core_seconds"] + plan["estimated_settling_core_seconds"]
     plain = k % 5 == 0
     words = ["run", path, "-o", out, "--quiet", "--force", "--threads", 1 + k % 2, *([] if plain else OBSERVED)]
-    status, _, said = call(*words, limit=20, stop_after=None if cost < 2 and plan["grains"] + plan["points"] < 1e5 else 2)
+    status, _, said = call(*words, limit=20, stop_after=None if cost < 2 and sum(plan["entries"].values()) < 1e5 else 2)
     check_end(words, status, said, allowed=(0, 2, 3, 4, 130))
     need(status != 2 or not out.exists() or not (out / "frames").exists(), f"exit status 2, and {out} holds frames")
-    need(status != 130 or cost >= 2 or plan["grains"] + plan["points"] >= 1e5, "interrupted before its time")
+    need(status != 130 or cost >= 2 or sum(plan["entries"].values()) >= 1e5, "interrupted before its time")
     if status == 0:
         look(out)
     return {0: "done", 130: "too long to wait for"}.get(status, f"run ends with {status}")

@@ -2,6 +2,8 @@
 /* Free flight, in which nothing may happen that no force causes: transfers keep momentum, uniform motion stays as it is to
  * round-off, a body that turns as a whole feels no stress, and what a transfer takes from a turning body is what it
  * promises. */
+#include <quern/shape.h>
+#include <quern/transfer.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -2,6 +2,7 @@
 /* The shape functions alone. Whatever the place of a point, up to the walls and into the corners, its weights sum to one
  * and reproduce positions, their slopes sum to zero and reproduce a unit gradient: without that neither momentum nor a
  * uniform strain rate survives the way to the grid and back. */
+#include <quern/shape.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

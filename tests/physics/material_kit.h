@@ -2,6 +2,7 @@
 /* material_kit - materials without a scene: points in columns, tensors in long double to check them with, and random
  * states that are the same everywhere */
 #pragma once
+#include <quern/material.h>
 #include "plugin_alone.h"
 #include "table.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The search by linked cells against the one that looks at every pair: the same pairs, and the same motion to the bit. */
+#include <quern/neighbours.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -3,6 +3,8 @@
  * The folder of the plugins is QUERN_PLUGINS_DIR, or "plugins". docs/theory/packers.md quotes the table. */
 #define _POSIX_C_SOURCE 200809L /* clock_gettime */
 
+#include <quern/body.h>
+#include <quern/packer.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -46,11 +48,10 @@ static packer open_packer(const char *id) {
 	snprintf(path, sizeof path, "%s/%s.so", folder ? folder : "plugins", id);
 	packer p = { .file = dlopen(path, RTLD_NOW | RTLD_LOCAL) };
 	if (!p.file) fail_msg("%s", dlerror());
-	const quern_library *library = dlsym(p.file, "quern_library_1");
+	const quern_library *library = dlsym(p.file, QUERN_LIBRARY_SYMBOL);
 	assert_non_null(library);
 	p.plugin = library->plugin;
 	assert_string_equal(p.plugin->id, id);
-	assert_int_equal(p.plugin->kind, QUERN_PACKER);
 	p.self = calloc(1, p.plugin->instance_size);
 	assert_non_null(p.self);
 	for (const quern_param *row = p.plugin->params; row->name; row++) set_default(p.self, row);

@@ -51,7 +51,7 @@ const quern_plugin *alone_load(const char *id) {
 	snprintf(path, sizeof path, "%s/%s%s.so", folder ? folder : "plugins", id, suffix);
 	void *object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
 	if (!object) fail_msg("%s", dlerror());
-	const quern_library *library = dlsym(object, "quern_library_1");
+	const quern_library *library = dlsym(object, "quern_library_2");
 	assert_non_null(library);
 	assert_int_equal(library->abi >> 16, QUERN_ABI_MAJOR);
 	assert_string_equal(library->plugin->id, id);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Zones of the hybrid: which cells lie near a surface, and which is the nearest hybrid one. */
+#include <quern/oracle.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* body.corner - two planes that meet, feature 0 and feature 1: what lies behind either is inside. For tests. */
+#include <quern/body.h>
 #include <math.h>
 #include <quern/vec.h>
 
@@ -52,7 +53,6 @@ static const quern_body_ops ops = {
 	.size = sizeof ops, .closest = closest, .features = features, .bounds = bounds
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_BODY,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "body.corner",

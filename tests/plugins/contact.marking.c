@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* contact.marking - a law without force that has as many rows as a plugin may have, of every kind: it counts the steps of
  * a contact and writes down who touches. For tests. */
-#include <quern/abi.h>
+#include <quern/contact.h>
 
 enum { AGE, NUMBER, STILL, FIRST_MARK, MARKS = QUERN_MOST_USES - FIRST_MARK };
 typedef struct {
@@ -58,7 +58,6 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 
 static const quern_contact_ops ops = { .size = sizeof ops, .force = { force, force }, .period = period };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_CONTACT,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "contact.marking",

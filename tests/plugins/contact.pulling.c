@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* contact.pulling - a constant pull between grains that are apart by less than a share of the effective radius. For tests. */
+#include <quern/contact.h>
 #include <quern/vec.h>
 
 typedef struct {
@@ -32,7 +33,6 @@ static const quern_contact_ops ops = {
 	.size = sizeof ops, .force = { pull_2d, pull_3d }, .period = period, .reach = reach
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_CONTACT,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "contact.pulling",

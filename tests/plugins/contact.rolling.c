@@ -79,7 +79,6 @@ static const quern_contact_ops ops = {
 	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_CONTACT,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "contact.rolling",

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* oracle.layer - a plugin in C++17: grains above a height, continuum below. The tables are constant, as in C: nothing runs
  * when the object is loaded. */
-#include <quern/abi.h>
 #include <quern/contact.h>
 #include <quern/grid.h>
 #include <quern/math.h>
+#include <quern/oracle.h>
 #include <quern/vec.h>
 
 namespace {
@@ -61,8 +61,7 @@ constexpr quern_oracle_ops ops = operations();
 constexpr quern_plugin table() {
 	quern_plugin out {};
 	out.size = sizeof out;
-	out.kind = QUERN_ORACLE;
-	out.revision = 1;
+		out.revision = 1;
 	out.dims = QUERN_2D | QUERN_3D;
 	out.id = "oracle.layer";
 	out.brief = "Grains above a height.";

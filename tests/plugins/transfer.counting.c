@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* transfer.counting - FLIP that remembers how often it was called and what it changed last. For tests. */
-#include <quern/abi.h>
+#include <quern/transfer.h>
 
 typedef struct {
 	int32_t unused;
@@ -34,7 +34,6 @@ static void gather_3d(const void *self, const quern_transfer_batch *b) { (void)s
 
 static const quern_transfer_ops ops = { .size = sizeof ops, .gather = { gather_2d, gather_3d } };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.kind = QUERN_TRANSFER,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "transfer.counting",

@@ -13,7 +13,7 @@ import workshop
 OPTIONS = [*lab.SMALL["column"], "--set=time.end=10 ms", "--set=output.every=5 ms",
            "--set=grains.fill.1.region.box.upper=[0.039, 0.08]", "--set=grains.settle.step=0.05"]
 # Stands in for the continuum: lets grains grow a little at every step, also while they settle, and shows by how much.
-SWELL = """#include <quern/abi.h>
+SWELL = """#include <quern/solver.h>
 #include <math.h>
 typedef struct { quern_real rate; } swell;
 static const quern_param params[] = { QUERN_PARAM(swell, rate, "1", "Per step.", .max = 1), QUERN_END_PARAMS };
@@ -30,12 +30,12 @@ static quern_status grow(const void *self, const quern_step *s) {
 	return QUERN_OK;
 }
 static const quern_stage stages[] = {
-	{ .name = "swell.grow", .phase = QUERN_GRAINS, .uses = rows, .run = grow }, { .name = NULL } };
+	{ .name = "swell.grow", .phase = QUERN_SUBSTEP, .flags = QUERN_SETTLES, .uses = rows, .run = grow }, { .name = NULL } };
 static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	return *hard = INFINITY; /* the other solver's is the least */
 }
-static const quern_solver_ops ops = { .size = sizeof ops, .stages = stages, .limit = limit };
-static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_SOLVER, .revision = 1,
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .stages = stages, .limit = limit };
+static const quern_plugin plugin = { .size = sizeof plugin, .revision = 1,
 	.dims = QUERN_2D | QUERN_3D, .id = "solver.swell", .brief = "Growth.", .instance_size = sizeof(swell),
 	.params = params, .uses = uses, .ops = &ops };
 QUERN_LIBRARY(plugin, "0", "MIT");

@@ -10,12 +10,13 @@ import shlex
 import subprocess
 import tempfile
 
+import frozen
 import lab
 from workshop import FLAGS, PLUGINS, QUERN, SOURCE, source
 
 BUILD = pathlib.Path(QUERN).parent
 # What plugins fill has a size or a stride; what the host fills and hands over by pointer may be longer than they know.
-LONGER = r"\} (quern_(?:param|use|plugin|library|setup|step|host|\w+_ops|\w+_batch|neighbour_job|coupling_job));"
+LONGER = r"\} (quern_(?:param|use|plugin|library|setup|step|host|kind|function|output|set|slot|stage|bound|\w+_ops|\w+_batch|neighbour_job|coupling_job));"
 
 
 def newer_headers(folder):
@@ -92,7 +93,7 @@ def check_newer_plugin(folder, include):
     (folder / "linear.c").write_text(source("dem/contact.linear.c"))
     run(["cc", *FLAGS, "-I", include, "-shared", folder / "linear.c", "-o", path, "-lm"])
     done = subprocess.run([QUERN, "describe", path], capture_output=True, text=True)
-    assert done.returncode == 2 and f"plugin {path} is built for interface 1.1, this program speaks 1.0: rebuild" in done.stderr
+    assert done.returncode == 2 and f"plugin {path} is built for interface 2.1, this program speaks 2.0: rebuild" in done.stderr
     print("this program refuses a plugin of a newer minor version")
 
 
@@ -113,4 +114,6 @@ if __name__ == "__main__":
         headers = newer_headers(place)
         check_shorter_ops(place)
         check_newer_plugin(place, headers)
-        check_older_plugins(newer_program(place, headers), place)
+        newer = newer_program(place, headers)
+        check_older_plugins(newer, place)
+        frozen.check({"this program": QUERN, "a newer one": newer}, place)

@@ -41,39 +41,39 @@ def library(rows="", uses="", ops=".force = { force, force }", more="", head="",
     """A library's table with nothing in it but what is given; `table`: C in front of the ops."""
     members = ", ".join(f".{key} = {value}" for key, value in {**MEMBERS, **changes}.items() if value)
     table = table or FORCE
-    return ("#include <quern/abi.h>\n#include <math.h>\n#include <stdlib.h>\n#include <unistd.h>\n"
+    sizes = {"solver": "QUERN_SOLVER_SIZES", "observer": ".size = sizeof ops, .output_size = sizeof(quern_output)"}
+    return (f"#include <quern/{kind}.h>\n#include <quern/contact.h>\n#include <math.h>\n#include <stdlib.h>\n#include <unistd.h>\n"
             f"{head}\nstatic const quern_param params[] = {{ {rows} QUERN_END_PARAMS }};\n"
             f"static const quern_use uses[] = {{ {uses} QUERN_END_USES }};\n{table}"
-            f"static const quern_{kind}_ops ops = {{ .size = sizeof ops, {ops} }};\n"
-            f"static const quern_plugin plugin = {{ .size = sizeof plugin, .kind = QUERN_{kind.upper()}, .dims = 3,\n"
+            f"static const quern_{kind}_ops ops = {{ {sizes.get(kind, '.size = sizeof ops')}, {ops} }};\n"
+            f"static const quern_plugin plugin = {{ .size = sizeof plugin, .dims = 3,\n"
             f'\t.id = "{kind}.bad", .instance_size = 64, .params = params, .uses = uses, .ops = &ops, {more} }};\n'
-            "QUERN_EXPORT extern const quern_library quern_library_1;\n"
-            f"const quern_library quern_library_1 = {{ {members} }};\n"
+            "QUERN_EXPORT extern const quern_library quern_library_2;\n"
+            f"const quern_library quern_library_2 = {{ {members} }};\n"
             "QUERN_EXPORT const void *used(void);\nconst void *used(void) { return &plugin; }\n")
 
 
 def check_interfaces(folder):
-    refused(library(abi="2u << 16"), "contact.bad", folder, "is built for interface 2.0, this program speaks 1.0",
+    refused(library(abi="3u << 16"), "contact.bad", folder, "is built for interface 3.0, this program speaks 2.0",
             "rebuild")
-    refused(library(abi="QUERN_ABI + 1"), "contact.bad", folder, "is built for interface 1.1, this program speaks 1.0")
+    refused(library(abi="QUERN_ABI + 1"), "contact.bad", folder, "is built for interface 2.1, this program speaks 2.0")
     refused(library(size="8"), "contact.bad", folder, "is built for interface")
     refused(library(real_size="4"), "contact.bad", folder, "is built for another number format")
     refused(library(plugin="0"), "contact.bad", folder, "describes no plugin")
-    refused("int quern_library_2 = 1; const char *name = \"x\";", "contact.bad", folder, "exports no quern_library_1",
+    refused("int quern_library_2 = 1; const char *name = \"x\";", "contact.bad", folder, "exports no quern_library_2",
             "QUERN_LIBRARY")
-    newer = "__attribute__((visibility(\"default\"))) extern const int quern_library_2; const int quern_library_2 = 1;"
-    refused(newer, "contact.bad", folder, "is built for interface 2, this program speaks 1")
-    refused(source(LINEAR, (".kind = QUERN_CONTACT", ".kind = QUERN_BODY")), "contact.linear", folder,
-            "has an id that does not begin with its kind")
-    refused(source(LINEAR, (".kind = QUERN_CONTACT", ".kind = 99")), "contact.linear", folder,
-            "has an id that does not begin with its kind")
+    newer = "__attribute__((visibility(\"default\"))) extern const int quern_library_3; const int quern_library_3 = 1;"
+    refused(newer, "contact.bad", folder, "is built for interface 3, this program speaks 2")
+    refused(newer.replace("_3", "_1"), "contact.bad", folder, "is built for interface 1, this program speaks 2")
+    refused(source(LINEAR, ('.id = "contact.linear"', '.id = "linear"')), "contact.linear", folder,
+            "has an id that is not KIND.NAME, two words")
     print("wrong interfaces, sizes, symbols and kinds are refused")
 
 
 MAP = "static void map(const void *s, const quern_observer_batch *b, quern_real *p) { (void)s, (void)b, *p = 0; }\n"
 RUN = "static quern_status go(const void *s, const quern_step *p) { return (void)s, (void)p, QUERN_OK; }\n" \
       "static const quern_set sets[] = { { .name = \"%s\", .doc = \"S.\", .slot = %s }, { .name = 0 } };\n" \
-      "static const quern_slot slots[] = { { .name = \"a\", .doc = \"S.\", .kind = QUERN_CONTACT, " \
+      "static const quern_slot slots[] = { { .name = \"a\", .doc = \"S.\", .kind = &quern_contact_kind, " \
       ".stage = { \"bad.go\" }, %s }, { .name = 0 } };\n" \
       "static const quern_stage stages[] = { { .name = \"bad.go\", .doc = \"S.\", .uses = uses, .run = go, %s }, " \
       "{ .name = 0 } };\n"
@@ -146,9 +146,9 @@ TABLES = [
     (library(more=".dims = 0"), "dims is 0, must be"), (library(more=".dims = 7"), "dims is 7, must be"),
     (library(more=".instance_size = 0"), "instance_size is 0, must be 1 to 16777216"),
     (library(more=".instance_size = 2000000000"), "instance_size is 2000000000"),
-    (library(more='.id = "contact"'), "has an id that does not begin with its kind: name it KIND.NAME"),
-    (library(more='.id = "contact."'), "has an id that does not begin with its kind"),
-    (library(more='.id = "contact.b d"'), "has an id that does not begin with its kind"),
+    (library(more='.id = "contact"'), "has an id that is not KIND.NAME, two words"),
+    (library(more='.id = "contact."'), "has an id that is not KIND.NAME"),
+    (library(more='.id = "contact.b d"'), "has an id that is not KIND.NAME"),
     (library(more='.brief = "a\\033[2J"'), "brief, doc or cite is no plain text"),
     (library(version='"1\\a"'), "name, version, license or build of the library is no plain text"),
     (observer("{ .name = 0 }"), "an observer without outputs"),
@@ -158,13 +158,21 @@ TABLES = [
     (observer(OUTPUT % "o", ""), "ops has map, with the set that it runs over, or whole"),
     (solver(set_name="a name"), "set 'a name': a word of at most 23 letters"),
     (solver(set_slot='"b"'), "set s hangs on the slot 'b', and there is none"),
-    (solver(slot='.kind = QUERN_SOLVER'), "slot a: kind 1 is unknown"),
+    (solver(slot='.kind = &quern_solver_kind'), "slot a: a solver sits in no slot"),
+    (solver(slot='.kind = 0'), "slot a: there is no kind; use QUERN_KIND"),
+    (solver(slot='.repeat = "s"'), "slot a: repeat and again are a pair of sets"),
+    (solver(stage=".flags = 99"), "stage bad.go: phase 0 or flags 99 are unknown"),
+    (solver(stage=".flags = QUERN_SETTLES"), "stage bad.go: only what runs in QUERN_SUBSTEP settles"),
+    (solver().replace("QUERN_SOLVER_SIZES", ".size = sizeof ops"), "set the sizes of ops by QUERN_SOLVER_SIZES"),
+    (solver().replace(".stages = stages", ".stages = stages, .section = \"a b\""), "the section 'a b' is no word"),
+    (solver().replace(".stages = stages", ".stages = stages, .account = (void (*)(const void *, const quern_step *, "
+                      "quern_real *))go"), "sums and account go together"),
     (solver(slot='.stage = { "bad.come" }'), "slot a: there is no stage 'bad.come'"),
     (solver(slot='.name = "l.a"'), "slot l.a: there is no such list among the parameters"),
     (solver(slot='.override = "grains"'), "slot a: it overrides 'grains', which is no SECTION.SLOT"),
     (solver(slot='.rows = params'), "slot a: rows and item_size go together"),
-    (solver(stage=".run = 0"), "stage bad.go: phase 0 is unknown, or there is no run or no uses"),
-    (solver(stage=".phase = 99"), "stage bad.go: phase 99 is unknown"),
+    (solver(stage=".run = 0"), "stage bad.go: phase 0 or flags 0 are unknown, or there is no run or no uses"),
+    (solver(stage=".phase = 99"), "stage bad.go: phase 99 or flags 0 are unknown"),
     (library(kind="solver", table=RUN % ("s", "0", "", ""), ops=".sets = sets"), "a solver without stages"),
 ]
 

@@ -57,7 +57,7 @@ def many(place):
     """As many uses as there may be and a hundred outputs, over a set or whole; a column of another set is not cut to the leaf."""
     n, uses = 100, 31
     text = """
-#include <quern/abi.h>
+#include <quern/observer.h>
 typedef struct { int32_t unused; } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
 static const quern_use uses[] = { { .field = "total.trembling", .unit = "1", .access = QUERN_READ, .shape = QUERN_INDEX }, %s, QUERN_END_USES };
@@ -75,8 +75,8 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	map(self, &one, out);
 	return QUERN_OK;
 }
-static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, %s };
-static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_OBSERVER, .revision = 1, .dims = 3,
+static const quern_observer_ops ops = { .size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, %s };
+static const quern_plugin plugin = { .size = sizeof plugin, .revision = 1, .dims = 3,
 	.id = "observer.%s", .brief = "Many numbers.", .instance_size = sizeof(observer), .params = params, .uses = uses, .ops = &ops };
 QUERN_LIBRARY(plugin, "0.1.0", "MIT");
 """
@@ -102,7 +102,7 @@ def finite(place):
     """An observer that gives a number which is not finite ends the run, and leaves it out; tests/physics/observed.c has the run's own."""
     workshop.compile("""
 #include <math.h>
-#include <quern/abi.h>
+#include <quern/observer.h>
 typedef struct { int32_t unused; } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
@@ -112,8 +112,8 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	out[0] = INFINITY;
 	return QUERN_OK;
 }
-static const quern_observer_ops ops = { .size = sizeof ops, .outputs = outputs, .whole = whole };
-static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_OBSERVER, .revision = 1, .dims = 3,
+static const quern_observer_ops ops = { .size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole };
+static const quern_plugin plugin = { .size = sizeof plugin, .revision = 1, .dims = 3,
 	.id = "observer.universe", .brief = "How large it is.", .instance_size = sizeof(observer), .params = params, .uses = uses, .ops = &ops };
 QUERN_LIBRARY(plugin, "0.1.0", "MIT");
 """, "observer.universe", place)

@@ -7,7 +7,7 @@ import subprocess
 import lab
 import workshop
 
-SOLVER = """#include <quern/abi.h>
+SOLVER = """#include <quern/solver.h>
 typedef struct { int32_t count; } chain;
 static const quern_param params[] = { QUERN_PARAM(chain, count, "1", "Beads.", .def = 9, .min = 2, .max = 99),
 	QUERN_END_PARAMS };
@@ -38,13 +38,13 @@ static quern_status move(const void *self, const quern_step *s) {
 	return QUERN_OK;
 }
 static const quern_stage stages[] = { { .name = "chain.begin", .phase = QUERN_SETUP, .uses = begin_uses, .run = begin },
-	{ .name = "chain.move", .phase = QUERN_GRAINS, .uses = move_uses, .run = move }, { .name = NULL } };
+	{ .name = "chain.move", .phase = QUERN_SUBSTEP, .uses = move_uses, .run = move }, { .name = NULL } };
 static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	(void)self, (void)s, (void)reason;
 	return *hard = 0.1;
 }
-static const quern_solver_ops ops = { .size = sizeof ops, .sets = sets, .stages = stages, .limit = limit };
-static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_SOLVER, .revision = 1,
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .sets = sets, .stages = stages, .limit = limit };
+static const quern_plugin plugin = { .size = sizeof plugin, .revision = 1,
 	.dims = QUERN_2D | QUERN_3D, .id = "solver.chain", .brief = "A chain.", .instance_size = sizeof(chain),
 	.params = params, .uses = none, .ops = &ops };
 QUERN_LIBRARY(plugin, "0", "MIT");

@@ -18,7 +18,10 @@ def loaded(name, folder, *options):
     log = folder / "linker"
     lab.run(name, folder / "run", *options, "--until=0", LD_DEBUG="files", LD_DEBUG_OUTPUT=str(log))
     text = "".join(file.read_text(errors="replace") for file in folder.glob("linker.*"))
-    files = {pathlib.Path(file) for file in re.findall(r"calling init: (\S+\.so)\b", text)}
+    # solvers are asked which section they read, and are let go again
+    asked = re.findall(r"file=(\S+\.so) \[\d+\];\s+destroying link map", text)
+    begun = re.findall(r"calling init: (\S+\.so)\b", text)
+    files = {pathlib.Path(file) for file in begun if begun.count(file) > asked.count(file)}
     files = {file for file in files if file.parent == lab.PLUGINS.resolve()}
     return {".".join(file.name.split(".")[:2]) for file in files}, files
 

@@ -25,8 +25,8 @@ plugins = sorted(PLUGINS.glob("*.so"))
 assert len(plugins) > 30
 for plugin in plugins:
     found = symbols(plugin, "-D")
-    assert found == {"quern_library_1"}, f"{plugin.name} exports {sorted(found)}"
-print(f"{len(plugins)} plugins export quern_library_1 alone")
+    assert found == {"quern_library_2"}, f"{plugin.name} exports {sorted(found)}"
+print(f"{len(plugins)} plugins export quern_library_2 alone")
 
 archives = sorted(QUERN.parent.glob("core/**/*.a")) + sorted(QUERN.parent.glob("plugins/**/*.a"))
 objects = sorted(QUERN.parent.glob("quern*.p/*.o"))

@@ -88,9 +88,9 @@ static void block_row(const block *b, double factor) {
 	double most = 0, speed = 0;
 	shake(run, b);
 	beyond_force_step(run, factor * hard_limit(run));
-	const double before = quern_run_account(run).kinetic;
+	const double before = quern_run_carries(run, "kinetic");
 	for (int64_t i = beyond_is_long() ? 20000 : 2000; i > 0 && harness_try(run, 1) == QUERN_OK; i--) {
-		most = fmax(most, quern_run_account(run).kinetic);
+		most = fmax(most, quern_run_carries(run, "kinetic"));
 		speed = fmax(speed, fastest(run, b->dim));
 	}
 	beyond_row("%s | %.3g | %.3g | %.2g | %lld | %s", b->name, factor, most / before,
@@ -127,9 +127,9 @@ static void light_nodes(void **unused) {
 		double most = 0;
 		shake(run, &shapes[k]);
 		beyond_force_step(run, 0.45 * hard_limit(run));
-		const double before = quern_run_account(run).kinetic;
+		const double before = quern_run_carries(run, "kinetic");
 		for (int64_t i = 0; i < 4000 && harness_try(run, 1) == QUERN_OK; i++)
-			most = fmax(most, quern_run_account(run).kinetic);
+			most = fmax(most, quern_run_carries(run, "kinetic"));
 		beyond_row("%s | %lld | %.3g | %s", shapes[k].name, (long long)run->clock.step, most / before,
 			beyond_message(run));
 		if (!k && (run->status != QUERN_OK || most > 1.01 * before)) fail_msg("gimp gains energy");
@@ -143,9 +143,9 @@ static void faster_than_waves(void **unused) {
 	static const block fast = { "fast", "gimp", 2, false, 1e-3, 1, INFINITY };
 	(void)unused;
 	quern_run *run = open_block(&fast, 10 * pressure_wave(2));
-	const double before = quern_run_account(run).momentum[0];
+	const double before = quern_run_carries(run, "momentum_x");
 	harness_until(run, 0.1 / (10 * pressure_wave(2)));
-	assert_true(fabs(quern_run_account(run).momentum[0] / before - 1) < 1e-12);
+	assert_true(fabs(quern_run_carries(run, "momentum_x") / before - 1) < 1e-12);
 	harness_close(run);
 }
 
@@ -163,7 +163,7 @@ static void column_row(const material *m, double factor) {
 	double most = 0;
 	beyond_force_step(run, factor * hard_limit(run));
 	for (int64_t i = beyond_is_long() ? 20000 : 2000; i > 0 && harness_try(run, 1) == QUERN_OK; i--)
-		most = fmax(most, quern_run_account(run).kinetic);
+		most = fmax(most, quern_run_carries(run, "kinetic"));
 	beyond_row("%s | %.3g | %.2g | %lld | %s", m->name, factor, most / unit, (long long)run->clock.step,
 		beyond_message(run));
 	if (factor <= 1.25 && (run->status != QUERN_OK || most > 1e-5 * unit)) fail_msg("%s moves", m->name);

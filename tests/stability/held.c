@@ -42,7 +42,7 @@ held held_open(double width, double height, int substeps, const char *packer, in
 		"  substeps: %d\n  packer: %s\n",
 		seed, width, width, width - 0.001, height, width, substeps, packer);
 	harness_settle(h.run);
-	h.weight = quern_run_account(h.run).mass * gravity;
+	h.weight = quern_run_carries(h.run, "mass") * gravity;
 	h.unit = h.weight * diameter;
 	double hard;
 	h.grain_step = step_limit(h.run, "grains", &hard);
@@ -51,7 +51,7 @@ held held_open(double width, double height, int substeps, const char *packer, in
 	return h;
 }
 
-double held_kinetic(const held *h) { return quern_run_account(h->run).kinetic / h->unit; }
+double held_kinetic(const held *h) { return quern_run_carries(h->run, "kinetic") / h->unit; }
 
 typedef struct layer {
 	double height, mass;

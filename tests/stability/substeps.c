@@ -33,7 +33,7 @@ static void row(int substeps, int seed) {
 	double most[SPANS] = { 0 };
 	const double share = h.grain_step * substeps / h.continuum_limit, top = held_top(&h);
 	watch(&h, beyond_is_long() ? 0.4 : 0.08, most);
-	const double defect = quern_run_account(h.run).defect, lifted = (held_top(&h) - top) / 2e-3;
+	const double defect = quern_run_carries(h.run, "defect"), lifted = (held_top(&h) - top) / 2e-3;
 	beyond_row("%d | %d | %.2f | %.1e | %.1e | %.1e | %.1e | %+.2f | %.0e | %s", substeps, seed, share,
 		most[0], most[1], most[2], most[3], lifted, defect, beyond_message(h.run));
 	if (share <= 0.95) {

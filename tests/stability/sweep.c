@@ -50,7 +50,7 @@ static void go_on(const held *h, double mass, book *b) {
 		b->kinetic = fmax(b->kinetic, held_kinetic(h));
 	}
 	const double push = (held_support(h) - before) / ((quern_run_time(h->run) - begin) * h->weight);
-	const double carried = quern_run_account(h->run).mass / mass - 1;
+	const double carried = quern_run_carries(h->run, "mass") / mass - 1;
 	b->lowest = fmin(b->lowest, push);
 	b->highest = fmax(b->highest, push);
 	b->carried = fabs(carried) > fabs(b->carried) ? carried : b->carried;
@@ -62,7 +62,7 @@ static void put(
 	const quern_account a = quern_run_account(h->run);
 	beyond_row("%s | %d | %s | %.1e | %.2f ... %.2f | %+.2f | %+.4f | %+.4f | %.3f | %.0e | %u, %u", packer,
 		seed, when, b->kinetic, b->lowest, b->highest, (held_top(h) - top) / diameter, b->carried,
-		a.mass / mass - 1, b->entries, a.defect, harness_count(h->run, "grain"),
+		quern_account_of(&a, "mass") / mass - 1, b->entries, quern_account_of(&a, "defect"), harness_count(h->run, "grain"),
 		harness_count(h->run, "point"));
 }
 
@@ -94,14 +94,14 @@ static void sweep(const limits *l, int seed) {
 		}
 		snprintf(when, sizeof when, "cycle %d", cycle);
 		put(&h, packer, seed, when, &b, top, mass);
-		judge(l, &b, (top - held_top(&h)) / diameter, quern_run_account(h.run).defect);
+		judge(l, &b, (top - held_top(&h)) / diameter, quern_run_carries(h.run, "defect"));
 	}
 	book last = { .lowest = INFINITY, .highest = -INFINITY };
 	for (int i = 0; i < 10 * each; i++) go_on(&h, mass, &last);
 	put(&h, packer, seed, "at rest again", &last, top, mass);
 	/* the shorter version gives it a fifth of the time */
 	if (!(last.kinetic < (beyond_is_long() ? 3e-4 : 2e-3))) fail_msg("%s: it does not come to rest", packer);
-	if (!(fabs(quern_run_account(h.run).mass / mass - 1) < l->left))
+	if (!(fabs(quern_run_carries(h.run, "mass") / mass - 1) < l->left))
 		fail_msg("%s: carried mass does not come back", packer);
 	harness_close(h.run);
 }

@@ -302,7 +302,7 @@ static int in_child(bool write) {
 				memset(store->fields[k].data[1][c], 0, MANY * sizeof(double));
 	const quern_field *radius = &store->fields[quern_store_field(store, "grain.radius")];
 	for (uint32_t i = 0; write && i < MANY; i++) ((quern_real *)radius->data[radius->now][0])[i] = 0.001;
-	run->mass_initial = quern_run_account(run).mass; /* of all of them */
+	run->mass_initial = quern_run_carries(run, "mass"); /* of all of them */
 	const double before = peak();
 	const quern_status status = write ? quern_checkpoint_write(run, 0) : read_back(run, &why);
 	const double state = (double)quern_store_bytes(store), taken = peak() - before;

@@ -102,8 +102,8 @@ static const quern_use adds[] = { U("grain.a", QUERN_ADD, .flags = 0), QUERN_END
 	}
 
 static void order(void **state) {
-	const quern_stage *const stages[] = { STAGES("late.read", QUERN_COUPLE, reads),
-		STAGES("mid.update", QUERN_COUPLE, updates), STAGES("early.write", QUERN_COUPLE, writes) };
+	const quern_stage *const stages[] = { STAGES("late.read", QUERN_EXCHANGE, reads),
+		STAGES("mid.update", QUERN_EXCHANGE, updates), STAGES("early.write", QUERN_EXCHANGE, writes) };
 	bench *b = make(3, stages, 0);
 	(void)state;
 	assert_string_equal(b->said, "");
@@ -114,8 +114,8 @@ static void order(void **state) {
 }
 
 static void phases(void **state) {
-	const quern_stage *const stages[] = { STAGES("last", QUERN_FROM_GRID, reads),
-		STAGES("first", QUERN_CONVERT, writes) };
+	const quern_stage *const stages[] = { STAGES("last", QUERN_ADVANCE, reads),
+		STAGES("first", QUERN_BEGIN, writes) };
 	bench *b = make(2, stages, 0);
 	(void)state;
 	assert_true(place(b, "first") < place(b, "last"));
@@ -123,8 +123,8 @@ static void phases(void **state) {
 }
 
 static void before_changes(void **state) {
-	const quern_stage *const stages[] = { STAGES("changes", QUERN_COUPLE, updates),
-		STAGES("wants.old", QUERN_COUPLE, reads_before), STAGES("sets.up", QUERN_SETUP, writes) };
+	const quern_stage *const stages[] = { STAGES("changes", QUERN_EXCHANGE, updates),
+		STAGES("wants.old", QUERN_EXCHANGE, reads_before), STAGES("sets.up", QUERN_SETUP, writes) };
 	bench *b = make(3, stages, 0);
 	(void)state;
 	assert_string_equal(b->said, "");
@@ -153,23 +153,23 @@ static void conflicts(void **state) {
 		QUERN_END_USES
 	};
 	static const quern_use nowhere[] = { U("rock.a", QUERN_READ, .flags = 0), QUERN_END_USES };
-	const quern_stage *w = STAGES("one.write", QUERN_COUPLE, writes);
+	const quern_stage *w = STAGES("one.write", QUERN_EXCHANGE, writes);
 	(void)state;
-	refused((const quern_stage *[]) { STAGES("one.update", QUERN_COUPLE, updates),
-				STAGES("two.update", QUERN_COUPLE, updates) },
+	refused((const quern_stage *[]) { STAGES("one.update", QUERN_EXCHANGE, updates),
+				STAGES("two.update", QUERN_EXCHANGE, updates) },
 		2, "grain.a: one.update and two.update both change it and nothing says which comes first");
-	refused((const quern_stage *[]) { w, STAGES("two.write", QUERN_COUPLE, writes) }, 2,
+	refused((const quern_stage *[]) { w, STAGES("two.write", QUERN_EXCHANGE, writes) }, 2,
 		"grain.a: two.write overwrites what one.write wrote and nobody read");
-	refused((const quern_stage *[]) { STAGES("one.ab", QUERN_COUPLE, a_then_b),
-				STAGES("two.ba", QUERN_COUPLE, b_then_a) },
-		2, "one.ab and two.ba each need the other to come first among the stages 'couple'");
-	refused((const quern_stage *[]) { STAGES("one.read", QUERN_COUPLE, reads) }, 1,
+	refused((const quern_stage *[]) { STAGES("one.ab", QUERN_EXCHANGE, a_then_b),
+				STAGES("two.ba", QUERN_EXCHANGE, b_then_a) },
+		2, "one.ab and two.ba each need the other to come first among the stages 'exchange'");
+	refused((const quern_stage *[]) { STAGES("one.read", QUERN_EXCHANGE, reads) }, 1,
 		"one.read needs grain.a, and nothing in this scene makes it");
-	refused((const quern_stage *[]) { STAGES("one.lost", QUERN_COUPLE, nowhere) }, 1,
+	refused((const quern_stage *[]) { STAGES("one.lost", QUERN_EXCHANGE, nowhere) }, 1,
 		"one.lost needs rock.a, and nothing in the scene has a set of that name");
-	refused((const quern_stage *[]) { w, STAGES("two.seconds", QUERN_COUPLE, seconds) }, 2,
+	refused((const quern_stage *[]) { w, STAGES("two.seconds", QUERN_EXCHANGE, seconds) }, 2,
 		"grain.a: two.seconds takes it in s, others in m");
-	refused((const quern_stage *[]) { w, STAGES("two.vector", QUERN_COUPLE, vectors) }, 2,
+	refused((const quern_stage *[]) { w, STAGES("two.vector", QUERN_EXCHANGE, vectors) }, 2,
 		"grain.a: two.vector takes it for a vector, one.write for a scalar");
 }
 
@@ -180,7 +180,7 @@ static void existence(void **state) {
 		U("grain.pair", QUERN_UPDATE, .with = "grain.slip"), QUERN_END_USES };
 	(void)state;
 	for (int friction = 0; friction < 2; friction++) {
-		const quern_stage *const stages[] = { STAGES("one.step", QUERN_GRAINS, rows) };
+		const quern_stage *const stages[] = { STAGES("one.step", QUERN_SUBSTEP, rows) };
 		bench *b = make(1, stages, friction);
 		assert_true((field(b, "grain.slip") != NULL) == friction);
 		assert_true((field(b, "grain.pair") != NULL) == friction);
@@ -192,7 +192,7 @@ static void existence(void **state) {
 static void kept_twice(void **state) {
 	static const quern_use rows[] = { U("grain.a", QUERN_READ, .flags = QUERN_OTHERS),
 		U("grain.a", QUERN_UPDATE, .flags = 0), QUERN_END_USES };
-	const quern_stage *const stages[] = { STAGES("one.step", QUERN_GRAINS, rows),
+	const quern_stage *const stages[] = { STAGES("one.step", QUERN_SUBSTEP, rows),
 		STAGES("set.up", QUERN_SETUP, writes) };
 	bench *b = make(2, stages, 0);
 	(void)state;
@@ -203,8 +203,8 @@ static void kept_twice(void **state) {
 }
 
 static void zeroed(void **state) {
-	const quern_stage *const stages[] = { STAGES("one.add", QUERN_TO_GRID, adds),
-		STAGES("two.add", QUERN_TO_GRID, adds), STAGES("three.read", QUERN_COUPLE, reads) };
+	const quern_stage *const stages[] = { STAGES("one.add", QUERN_DEPOSIT, adds),
+		STAGES("two.add", QUERN_DEPOSIT, adds), STAGES("three.read", QUERN_EXCHANGE, reads) };
 	bench *b = make(3, stages, 0);
 	int zeros = 0;
 	(void)state;
@@ -222,8 +222,8 @@ static void lanes_are_the_owners(void **state) {
 	static const quern_use owners[] = { U("node.mass", QUERN_ADD, .flags = 0),
 		U("node.force", QUERN_ADD, .flags = 0), QUERN_END_USES };
 	static const quern_set rows[] = { { .name = "node", .doc = "x", .rows = 8 }, { .name = NULL } };
-	const quern_stage *const stages[] = { STAGES("other.look", QUERN_FROM_GRID, backwards),
-		STAGES("owner.add", QUERN_TO_GRID, owners) };
+	const quern_stage *const stages[] = { STAGES("other.look", QUERN_ADVANCE, backwards),
+		STAGES("owner.add", QUERN_DEPOSIT, owners) };
 	const quern_set *const of[] = { NULL, rows };
 	bench *b = make_with(2, stages, of, 0);
 	(void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "render.h"
+#include <quern/oracle.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

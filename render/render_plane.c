@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "param.h"
 #include "render.h"
+#include <quern/body.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -192,7 +193,7 @@ static void gaps(const render_style *s, const quern_filling *body, int y, int be
 		.gap = gap,
 		.normal = { normal[0], normal[1], normal[2] },
 		.velocity = { velocity[0], velocity[1], velocity[2] } };
-	((const quern_body_ops *)body->instance->file->plugin.ops)->closest(body->instance->self, &batch);
+	((const quern_body_ops *)body->instance->ops)->closest(body->instance->self, &batch);
 }
 
 /* A body that is there only while grains settle is gone in every frame. */

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* render - a frame as a picture: what is read from it, how numbers become colours, and who paints what */
 #pragma once
+#include "command.h"
 #include "scene.h"
 #include "text.h"
 #include <cairo.h>
+
+extern const quern_command quern_command_render;
 
 /* ---- render_frame.c: what a picture needs of a frame ---- */
 

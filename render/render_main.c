@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* quern-render - `quern render`: pictures of frames, a program of its own since it alone needs Cairo */
-#include "command.h"
 #include "h5.h"
+#include "render.h"
 
 int main(int argc, char **argv) {
 	quern_h5_quiet();
