@@ -18,21 +18,15 @@ static const quern_param params[] = { QUERN_PARAM(hertz, young, "Pa", "Young's m
 		.from = "scene.speed", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_END_PARAMS };
 
-enum { SHEAR, SPIN };
-static const quern_use uses[] = { { .field = "contact.shear",
-									  .unit = "N",
-									  .doc = "Elastic tangential force; 2-D: along the normal turned left.",
-									  .access = QUERN_UPDATE,
-									  .shape = QUERN_AXIAL,
-									  .when = "friction" },
-	{ .field = "grain.spin",
-		.unit = "rad/s",
-		.doc = "Angular velocity; a frictional contact turns its grains.",
-		.access = QUERN_READ,
-		.shape = QUERN_AXIAL,
-		.flags = QUERN_OTHERS,
-		.when = "friction" },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(SHEAR, "contact.shear", "N", QUERN_UPDATE, QUERN_AXIAL, .when = "friction", \
+		.doc = "Elastic tangential force; 2-D: along the normal turned left.") \
+	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS, .when = "friction", \
+		.doc = "Angular velocity; a frictional contact turns its grains.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	hertz *law = self;
@@ -133,8 +127,8 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 	return contact / __builtin_sqrt(turning > 1 ? turning : 1);
 }
 
-/* sqrt 5 zeta sqrt(m k) d^(1/4) over 2 sqrt(m k_n), k_n = (3/2) k sqrt d; and 2 sqrt(5/6) zeta sqrt(k_t m) over 2 sqrt(m k_t),
- * on m/3 or m/3.5. */
+/* sqrt 5 zeta sqrt(m k) d^(1/4) over 2 sqrt(m k_n), k_n = (3/2) k sqrt d; and 2 sqrt(5/6) zeta sqrt(k_t m) over 2
+ * sqrt(m k_t), on m/3 or m/3.5. */
 static quern_real damping(const void *self, uint32_t dim) {
 	const hertz *law = self;
 	const quern_real share = 0.91287092917527686 * law->damping_ratio; /* sqrt(5/6) */
