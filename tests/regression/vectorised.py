@@ -12,7 +12,7 @@ from workshop import SOURCE
 FLAGS = ["-std=c17", "-O3", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
          "-fopenmp-simd", "-fopt-info-vec-all"]
 LEVELS = {"v3": ["-march=x86-64-v3"], "v4": ["-march=x86-64-v4", "-mprefer-vector-width=512"]}
-SCATTERS = {("v3", "forces.h")}  # AVX2 has no instruction for it
+SCATTERS = {("v3", "contacts.c")}  # AVX2 has no instruction for it
 REPORT = re.compile(r"(\S+?):(\d+):\d+: (optimized: +loop vectorized|missed: +couldn.t vectorize loop)")
 
 
