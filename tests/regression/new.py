@@ -129,4 +129,5 @@ def main():
                 print(f"{scene}, {d}-D: runs with them")
 
 
-main()
+if __name__ == "__main__":
+    main()

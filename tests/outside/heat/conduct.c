@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* conduct - a step of heat: points to nodes, flux between nodes, nodes to points. Sums are made block by block in coloured
- * order, so that they are the same for any number of threads */
+/* conduct - a step of heat: points to nodes, flux between nodes, nodes to points. Sums are made block by block in
+ * coloured order, so that they are the same for any number of threads */
 #include "heat.h"
 #include <math.h>
 #include <string.h>

@@ -8,28 +8,22 @@ typedef struct {
 static const quern_param params[] = { QUERN_END_PARAMS };
 
 enum { TEMPERATURE, MASS, WEIGHT };
-static const quern_use uses[] = {
-	{ .field = "point.temperature", .unit = "K", .access = QUERN_READ, .shape = QUERN_SCALAR },
-	{ .field = "point.mass", .unit = "kg", .access = QUERN_READ, .shape = QUERN_SCALAR },
-	{ .field = "point.weight",
-		.unit = "1",
-		.access = QUERN_READ,
-		.shape = QUERN_SCALAR,
-		.flags = QUERN_OPTIONAL },
-	QUERN_END_USES
-};
+/* optional all of them: the twin of pure grains has no points, that of pure continuum no temperature */
+#define USE(field_, unit_)                                                                                   \
+	{ .field = field_, .unit = unit_, .access = QUERN_READ, .shape = QUERN_SCALAR, .flags = QUERN_OPTIONAL }
+static const quern_use uses[] = { USE("point.temperature", "K"), USE("point.mass", "kg"),
+	USE("point.weight", "1"), QUERN_END_USES };
 
 enum { MEAN, LEAST, MOST };
-static const quern_output outputs[] = {
-	{ "mean", "K", "By mass; like the others zero where there are no points.", QUERN_SUM, 0 },
+static const quern_output outputs[] = { { "mean", "K", "By mass. All are zero where there is none.",
+											QUERN_SUM, 0 },
 	{ "min", "K", "Of the coldest point.", QUERN_MIN, 0 },
-	{ "max", "K", "Of the hottest point.", QUERN_MAX, 0 }, { .name = NULL }
-};
+	{ "max", "K", "Of the hottest point.", QUERN_MAX, 0 }, { .name = NULL } };
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
-	const uint32_t n = b->count[TEMPERATURE];
 	const quern_real *temperature = b->use[TEMPERATURE].real[0], *weight = b->use[WEIGHT].real[0];
+	const uint32_t n = temperature ? b->count[TEMPERATURE] : 0;
 	quern_real *mass = host->memory(run, n * sizeof *mass), *heat = host->memory(run, n * sizeof *heat);
 	(void)self;
 	if (!mass || !heat) return QUERN_E_MEMORY;

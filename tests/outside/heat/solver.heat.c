@@ -180,8 +180,8 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	return QUERN_OK;
 }
 
-/* m^2/s, the largest of all points. Where there are none yet, it is that of the material at rest, unless the law looks at
- * more than temperature: that is in columns that have no entries. */
+/* m^2/s, the largest of all points. Where there are none yet, it is that of the material at rest, unless the law looks
+ * at more than temperature: that is in columns that have no entries. */
 static quern_real diffusivity(const heat *p, const quern_step *s) {
 	const quern_bound *law = &s->slot[SLOT_CONDUCTIVITY][0];
 	const quern_column *u = s->use;
@@ -203,8 +203,8 @@ static quern_real diffusivity(const heat *p, const quern_step *s) {
 	return found[0] / (p->capacity * p->density);
 }
 
-/* No arrangement of points decays faster than chi alpha/h^2, with the shape's chi: it bounds the same sum of squared slopes
- * as for stress waves. Explicit steps bear twice the time of that. */
+/* No arrangement of points decays faster than chi alpha/h^2, with the shape's chi: it bounds the same sum of squared
+ * slopes as for stress waves. Explicit steps bear twice the time of that. */
 static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	const heat *p = self;
 	const quern_real cell = s->host->grid(s->run)->cell;
