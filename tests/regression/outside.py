@@ -56,6 +56,7 @@ def install(place):
         new.run(*command.split(), cwd=place / "heat", env=environment)
     objects, = place.glob("**/solver.mpm.so")
     lab.use(program, objects.parent)
+    return environment
 
 
 def quern(*words, status=0):
@@ -66,8 +67,8 @@ def tables():
     listed = quern("list")
     for id in IDS:
         assert f"{id} " in listed, f"quern list does not show {id}"
-        if not id.startswith("conductivity"):  # TODO
-            quern("check", lab.PLUGINS / f"{id}.so")
+        said = quern("check", lab.PLUGINS / f"{id}.so")
+        assert not id.startswith("conductivity") or "finite and not negative" in said, said
     assert f"{IDS[0]} 0.1.0" in quern("describe", "heat") and "J/(kg K)" in quern("describe", "heat")
     assert "W/(m K)" in quern("describe", "conductivity.linear")
     own = json.loads(quern("schema"))["properties"]["heat"]["else"]["properties"]
@@ -75,6 +76,26 @@ def tables():
     for name in ("constant", "linear"):
         assert f'"{name}"' in json.dumps(own["conductivity"]), f"the schema does not know conductivity.{name}"
     print("ok  listed, described, checked, in the schema")
+
+
+def kind(place, environment):
+    """What comes with a kind of one's own: `quern new` and `quern check` know it like any other."""
+    new.make("conductivity", lab.QUERN, place, environment)
+    source = place / "conductivity.mine/conductivity.mine.c"
+    text = source.read_text()
+    assert text.count("p.value * p.reference") == 1
+    source.write_text(text.replace("p.value * p.reference", "(p.value - 1) * p.reference"))
+    new.run("ninja", "-C", "build", cwd=source.parent, env=environment)
+    said = quern("check", source.parent / "build/conductivity.mine.so", status=2)
+    assert "FAILED  finite and not negative" in said, said
+    source.write_text(text)
+    new.run("ninja", "-C", "build", cwd=source.parent, env=environment)
+    os.environ["QUERN_PLUGIN_PATH"] = str(source.parent / "build")
+    options = [*lab.SMALL["column"], "--set=heat.conductivity=mine", "--set=time.end=5 ms"]
+    lab.run(str(place / "column"), place / "mine", *options)
+    assert "conductivity.mine" in {plugin["id"] for plugin in lab.summary(place / "mine")["provenance"]["plugins"]}
+    del os.environ["QUERN_PLUGIN_PATH"]
+    print("ok  conductivity.mine: made, built, checked, found wanting once it is wrong, and run")
 
 
 # ---- in the column ----
@@ -102,7 +123,9 @@ def planned(scene, options):
     assert {"thermal.capacity", "thermal.heat", "thermal.rate"} <= set(fields)
     assert plan["entries"]["sensors"] == 3 and not plan["skipped"]
     assert set(IDS) - {plugin["id"] for plugin in plan["plugins"]} == {"conductivity.linear"}
-    print("ok  the plan names stages, sets, fields and plugins")
+    said = quern("check", lab.PLUGINS / "solver.heat.so", "--scene", f"{scene}.yaml", *options)
+    assert "FAILED" not in said, said
+    print("ok  the plan names stages, sets, fields and plugins; the solver passes its checks in the scene")
 
 
 def results(folder):
@@ -223,9 +246,10 @@ def physics(place):
 if __name__ == "__main__":
     with lab.workplace() as name:
         place = pathlib.Path(name)
-        install(place / "installed")
+        environment = install(place / "installed")
         tables()
         write(place)
+        kind(place, environment)
         column(place, "column")
         column(place, "column_3d", sensors=False)
         models(place)
