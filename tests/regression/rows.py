@@ -19,7 +19,8 @@ static const quern_use mark_uses[] = { F("spot.mark", QUERN_WRITE, QUERN_SCALAR)
 static const quern_use one_uses[] = { F("spot.one", QUERN_ADD, QUERN_VECTOR), QUERN_END_USES };
 static const quern_use two_uses[] = { F("spot.two", QUERN_ADD, QUERN_SCALAR), QUERN_END_USES };
 static const quern_use look_uses[] = { F("spot.mark", QUERN_READ, QUERN_SCALAR),
-	F("spot.one", QUERN_READ, QUERN_VECTOR), F("spot.two", QUERN_READ, QUERN_SCALAR), F("total.looks", QUERN_UPDATE, QUERN_SCALAR), QUERN_END_USES };
+	F("spot.one", QUERN_READ, QUERN_VECTOR), F("spot.two", QUERN_READ, QUERN_SCALAR),
+	F("total.looks", QUERN_UPDATE, QUERN_SCALAR), QUERN_END_USES };
 static quern_status begin(const void *self, const quern_step *s) {
 	const int32_t block[1][3] = { { 0 } };
 	(void)self;
