@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import tempfile
 
+import frozen
 import lab
 from workshop import FLAGS, PLUGINS, QUERN, SOURCE, source
 
@@ -113,4 +114,6 @@ if __name__ == "__main__":
         headers = newer_headers(place)
         check_shorter_ops(place)
         check_newer_plugin(place, headers)
-        check_older_plugins(newer_program(place, headers), place)
+        newer = newer_program(place, headers)
+        check_older_plugins(newer, place)
+        frozen.check({"this program": QUERN, "a newer one": newer}, place)
