@@ -231,30 +231,27 @@ static int32_t same_field(const check_kernel *k, const quern_use *row, const int
 	return -1;
 }
 
-static void add_row(check_kernel *k, uint32_t r, uint32_t side) {
+static void add_use(quern_check_kernel *open, uint32_t r, bool second) {
 	static const uint32_t roles[] = { QUERN_CHECK_IN, QUERN_CHECK_IN, QUERN_CHECK_OUT, QUERN_CHECK_CHANGED,
 		QUERN_CHECK_CHANGED };
-	const quern_use *row = &rows_of(&k->open)[r];
-	int32_t *use = side ? k->use_second : k->use;
+	check_kernel *k = own(open);
+	const quern_use *row = &rows_of(open)[r];
+	int32_t *use = second ? k->use_second : k->use;
+	if (row->shape == QUERN_ID || !quern_check_counts(open->check, open->instance, row)) return;
 	use[r] = same_field(k, row, use);
 	if (use[r] >= 0) return;
-	use[r] = (int32_t)k->open.n_columns;
-	for (uint32_t c = 0; c < components(row->shape, k->open.dim); c++)
+	use[r] = (int32_t)open->n_columns;
+	for (uint32_t c = 0; c < components(row->shape, open->dim); c++)
 		add_column(k, row->field, roles[row->access], row->shape == QUERN_INDEX);
-	fill_row(k, row, use[r], 1000 + r * 2 + side);
+	fill_row(k, row, use[r], 1000 + r * 2 + second);
 }
 
-static void add_uses(quern_check_kernel *open, uint32_t hook, bool optional, bool second) {
-	const quern_use *rows = rows_of(open);
-	open->hook = hook;
+static void add_uses(quern_check_kernel *k, uint32_t hook, bool optional) {
+	const quern_use *rows = rows_of(k);
+	k->hook = hook;
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++) {
-		const quern_use *row = &rows[r];
-		if (row->hook != hook || row->shape == QUERN_ID) continue;
-		if (!strcmp(row->field, "contact.couple")) continue; /* a batch brings it, beside the force */
-		if ((row->with || row->flags & (QUERN_OPTIONAL | QUERN_WANTED)) && !optional) continue;
-		if (!quern_check_counts(open->check, open->instance, row)) continue;
-		const bool history = !strncmp(row->field, "contact.", 8); /* the pair's, of neither side */
-		for (uint32_t side = 0; side <= (second && !history); side++) add_row(own(open), r, side);
+		const bool hangs = rows[r].with || rows[r].flags & (QUERN_OPTIONAL | QUERN_WANTED);
+		if (rows[r].hook == hook && (optional || !hangs)) add_use(k, r, false);
 	}
 }
 
@@ -443,6 +440,7 @@ const quern_check_host quern_check_services = {
 	.add = add,
 	.add_integers = add_integers,
 	.add_uses = add_uses,
+	.add_use = add_use,
 	.column = column,
 	.fill = fill,
 	.run = quern_check_run,

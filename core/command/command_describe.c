@@ -28,17 +28,26 @@ static const quern_plugin_file *load(quern_loader *loader, const char *id, quern
 	kind[strcspn(kind, ".")] = 0;
 	const quern_plugin_file *f = NULL;
 	if (name) f = quern_loader_find(loader, kind, name, report, (quern_mark) { 0 });
-	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id such as contact.linear", id);
+	else quern_report_add(report, (quern_mark) { 0 }, "'%s' is no plugin id: KIND.NAME", id);
 	free(kind);
 	return looked_at(loader, f, report);
 }
 
 /* ---- list ---- */
 
+static json_t *line_json(const quern_plugin_file *f) {
+	return json_pack("{s:s, s:s, s:s, s:s}", "id", f->plugin.id, "brief",
+		f->plugin.brief ? f->plugin.brief : "", "version", f->library->version, "file", f->path);
+}
+
+/* What no scene can name is left out unless it is asked for. */
 static int list_plugins(int argc, char **argv) {
-	bool json = false;
+	bool json = false, all = false;
 	quern_words words = { 0 };
-	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
+	const quern_option options[] = {
+		QUERN_FLAG(&all, "all", "also conformance tests, which `quern check` calls and no scene names"),
+		QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS
+	};
 	int status = quern_options_read(&quern_command_list, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
@@ -48,13 +57,10 @@ static int list_plugins(int argc, char **argv) {
 	json_t *list = json_array();
 	quern_loader_report_strays(loader, report);
 	for (size_t i = 0; ids[i]; i++) {
+		if (!all && quern_id_is_of(ids[i], quern_check_kind.name)) continue;
 		const quern_plugin_file *f = load(loader, ids[i], report);
-		if (!f) continue;
-		if (json)
-			json_array_append_new(list,
-				json_pack("{s:s, s:s, s:s, s:s}", "id", f->plugin.id, "brief",
-					f->plugin.brief ? f->plugin.brief : "", "version", f->library->version, "file", f->path));
-		else printf("%-32s %s\n", f->plugin.id, f->plugin.brief ? f->plugin.brief : "");
+		if (f && json) json_array_append_new(list, line_json(f));
+		else if (f) printf("%-32s %s\n", f->plugin.id, f->plugin.brief ? f->plugin.brief : "");
 	}
 	if (json) json_dumpf(list, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 	json_decref(list);
@@ -151,7 +157,21 @@ static void print_uses(const quern_use *row) {
 	}
 }
 
+static void print_sections(const char *what, const char *const *names) {
+	if (!names) return;
+	printf("%-10s", what);
+	for (; *names; names++) printf(" %s", *names);
+	puts("");
+}
+
 static void print_solver(const quern_solver_ops *ops) {
+	printf("\nsection    %s\n", ops->section ? ops->section : "whichever names it by `solver:`");
+	print_sections("needs", ops->needs);
+	print_sections("with", ops->with);
+	print_sections("after", ops->after);
+	puts("\nsets");
+	for (const quern_set *s = ops->sets; s->name; s++)
+		printf("  %-16s %s%s\n", s->name, s->doc ? s->doc : "", s->counted ? " Counted." : "");
 	puts("\nslots");
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		if (s->same_as) continue;
@@ -218,12 +238,45 @@ static json_t *slots_json(const quern_solver_ops *ops) {
 	return slots;
 }
 
-static json_t *outputs_json(const quern_observer_ops *ops) {
+static json_t *outputs_json(const quern_output *o) {
 	json_t *outputs = json_array();
-	for (const quern_output *o = ops->outputs; o && o->name; o++)
+	for (; o && o->name; o++)
 		json_array_append_new(outputs, json_pack("{s:s, s:s, s:s}", "name", o->name, "unit",
 										   o->unit ? o->unit : "1", "doc", o->doc ? o->doc : ""));
 	return outputs;
+}
+
+static json_t *uses_json(const quern_use *row) {
+	json_t *uses = json_array();
+	for (; row->field; row++)
+		json_array_append_new(uses, json_pack("{s:s, s:s, s:s}", "field", row->field, "access",
+										access_names[row->access], "unit", row->unit ? row->unit : "1"));
+	return uses;
+}
+
+static json_t *sets_json(const quern_solver_ops *ops) {
+	json_t *sets = json_array();
+	for (const quern_set *s = ops->sets; s->name; s++)
+		json_array_append_new(sets,
+			json_pack("{s:s, s:s, s:s, s:b}", "name", s->name, "plural", s->plural ? s->plural : s->name,
+				"doc", s->doc ? s->doc : "", "counted", (int)s->counted));
+	return sets;
+}
+
+static json_t *stages_json(const quern_solver_ops *ops) {
+	json_t *stages = json_array();
+	for (const quern_stage *s = ops->stages; s->name; s++)
+		json_array_append_new(stages, json_pack("{s:s, s:s, s:o}", "name", s->name, "doc",
+										  s->doc ? s->doc : "", "uses", uses_json(s->uses)));
+	return stages;
+}
+
+static void put_solver(json_t *all, const quern_solver_ops *ops) {
+	json_object_set_new(all, "section", ops->section ? json_string(ops->section) : json_null());
+	json_object_set_new(all, "slots", slots_json(ops));
+	json_object_set_new(all, "sets", sets_json(ops));
+	json_object_set_new(all, "stages", stages_json(ops));
+	json_object_set_new(all, "sums", outputs_json(ops->sums));
 }
 
 static json_t *scene_json(quern_loader *loader) {
@@ -241,17 +294,14 @@ static json_t *scene_json(quern_loader *loader) {
 
 static json_t *plugin_json(const quern_plugin_file *f) {
 	const quern_plugin *p = &f->plugin;
-	json_t *params = params_json(p->params), *uses = json_array();
-	for (const quern_use *row = p->uses; row->field; row++)
-		json_array_append_new(uses, json_pack("{s:s, s:s, s:s}", "field", row->field, "access",
-										access_names[row->access], "unit", row->unit ? row->unit : "1"));
+	json_t *params = params_json(p->params), *uses = uses_json(p->uses);
 	json_t *all = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s, s:s, s:i, s:o, s:o}", "id", p->id, "brief",
 		p->brief ? p->brief : "", "doc", p->doc ? p->doc : "", "cite", p->cite ? p->cite : "", "version",
 		f->library->version, "license", f->library->license, "file", f->path, "dims", (int)p->dims, "params",
 		params, "uses", uses);
-	if (quern_id_is_of(p->id, quern_solver_kind.name)) json_object_set_new(all, "slots", slots_json(p->ops));
+	if (quern_id_is_of(p->id, quern_solver_kind.name)) put_solver(all, p->ops);
 	if (quern_id_is_of(p->id, quern_observer_kind.name))
-		json_object_set_new(all, "outputs", outputs_json(p->ops));
+		json_object_set_new(all, "outputs", outputs_json(((const quern_observer_ops *)p->ops)->outputs));
 	return all;
 }
 
@@ -276,7 +326,8 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 	size_t n = 0;
 	quern_text all = { 0 };
 	for (size_t i = 0; ids[i]; i++)
-		if (!strcmp(quern_id_name(ids[i]), name)) quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
+		if (!quern_id_is_of(ids[i], quern_check_kind.name) && !strcmp(quern_id_name(ids[i]), name))
+			quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
 	if (n == 1) found = load(loader, quern_text_string(&all), report);
 	else if (n)
 		quern_report_add(
@@ -314,7 +365,7 @@ static int describe_one(int argc, char **argv) {
 	return f || scene ? QUERN_EXIT_DONE : QUERN_EXIT_SCENE;
 }
 
-const quern_command quern_command_list = { "list", "[--json]", "installed plugins", list_plugins };
+const quern_command quern_command_list = { "list", "[--all] [--json]", "installed plugins", list_plugins };
 
 const quern_command quern_command_describe = { "describe", "NAME [--json]",
-	"keys, units, ranges, sources of a plugin, a section (grains), or `scene`", describe_one };
+	"keys, units, ranges, sources of a plugin, a section, or `scene`", describe_one };

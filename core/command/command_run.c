@@ -70,8 +70,7 @@ static int parse(options *o, int argc, char **argv) {
 		QUERN_FLAG(&o->resume, "resume", "go on from the checkpoint"),
 		QUERN_FLAG(&o->force, "force", "replace the run in the folder; with --resume, take other plugins"),
 		QUERN_TEXT(&o->until, 0, "until", "TIME", "stop at the first step at or after this time"),
-		QUERN_FLAG(
-			&o->no_cache, "no-cache", "let grains settle even if a state of the same beginning is kept"),
+		QUERN_FLAG(&o->no_cache, "no-cache", "settle even if a state of the same beginning is kept"),
 		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"), QUERN_END_OPTIONS };
 	const int status = quern_options_read(&quern_command_run, known, &words, argc, argv);
 	o->scene = words.at[0];
@@ -268,7 +267,7 @@ static quern_status begin_anew(session *s, const options *o) {
 	if (o->resume) quern_log_add(run->log, 1, "no checkpoint yet: starting from the beginning");
 	quern_run_identity(run); /* of the files as they are now */
 	if (quern_run_setup(run) != QUERN_OK) return run->status;
-	/* what goes on from a checkpoint may have begun with other plugins, or another file of grains */
+	/* what goes on from a checkpoint may have begun with other plugins, or another file to read */
 	if (!o->no_cache) s->alike = quern_settled_key(run);
 	quern_run_folder_clear(&s->folder, run->scene);
 	return take_over(s, false);

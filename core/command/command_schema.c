@@ -237,8 +237,8 @@ static json_t *scene_schema(const context *c) {
 			"minItems", 2, "maxItems", 3),
 		false);
 	put(scene, "output.fields",
-		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out, such as grain.velocity.",
-			"type", "array", "items", "type", "string"),
+		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out: SET.NAME.", "type", "array",
+			"items", "type", "string"),
 		false);
 	size_t n;
 	const quern_section_of *known = quern_loader_sections(c->loader, &n);

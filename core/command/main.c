@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* quern - simulates granular material with grains where grains matter and a continuum everywhere else */
+/* quern - the program: its commands, and what it says of itself */
 #include "command.h"
+#include "commit.h"
 #include "config.h"
 #include "h5.h"
 #include "text.h"
@@ -65,7 +66,8 @@ static int run(int argc, char **argv) {
 		return QUERN_EXIT_USAGE;
 	}
 	if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help")) return help(stdout);
-	if (!strcmp(argv[1], "--version")) return puts("quern " QUERN_VERSION), QUERN_EXIT_DONE;
+	if (!strcmp(argv[1], "--version"))
+		return puts("quern " QUERN_VERSION " (" QUERN_COMMIT ")"), QUERN_EXIT_DONE;
 	for (size_t i = 0; i < N_COMMANDS; i++)
 		if (!strcmp(commands[i]->name, argv[1])) return commands[i]->run(argc - 1, argv + 1);
 	char *path = quern_program_find(argv[1]);

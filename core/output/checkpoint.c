@@ -252,7 +252,7 @@ static bool read_scene(quern_run *run, quern_h5 *h, quern_text *said, quern_text
 	return !why->length;
 }
 
-/* "contact.linear was 0.1.0, revision 1, and is 0.2.0, revision 2": nothing if it is the one that wrote the file. */
+/* "PLUGIN was 0.1.0, revision 1, and is 0.2.0, revision 2": nothing if it is the one that wrote the file. */
 static void compare_plugin(hid_t group, const quern_plugin_file *f, uint64_t is, quern_text *out) {
 	char version[64] = "not there";
 	int64_t revision = 0, was = 0;

@@ -104,7 +104,7 @@ static int64_t view_of(const char *name) {
 	return rest && rest > name ? number_in(rest + 1, ".hdf") : -1;
 }
 
-/* "0123456789abcdef-grains.txt": the name begins with the hash of what is in it. */
+/* "0123456789abcdef-table.txt": the name begins with the hash of what is in it. */
 static bool is_copy_name(const char *name) {
 	return strspn(name, "0123456789abcdef") >= 16 && name[16] == '-';
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* settled - states in which grains have come to rest, kept for the next run that would settle alike. docs/decisions/0020 */
+/* settled - states in which all has come to rest, kept for the next run that would settle alike. docs/decisions/0020 */
 #pragma once
 #include "run.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "summary.h"
+#include "commit.h"
 #include "config.h"
 #include "identity.h"
 #include <jansson.h>
@@ -71,7 +72,7 @@ static json_t *observers(const quern_run *run, const quern_series *s) {
 	return all;
 }
 
-/* The share of the mass that single bodies carry: the mean of what an observer of it saw, or as it is now. */
+/* The share of the mass that is carried by single ones: the mean of what an observer of it saw, or as it is now. */
 static double discrete_share(const quern_run *run, const quern_series *s, const quern_account *a) {
 	const double mass = quern_account_of(a, "mass");
 	for (size_t c = 0; c < s->n; c++) {
@@ -124,6 +125,7 @@ static json_t *replaced(const quern_run *run) {
 static json_t *provenance(quern_run *run) {
 	json_t *p = json_object();
 	json_object_set_new(p, "program", json_string("quern " QUERN_VERSION));
+	json_object_set_new(p, "commit", json_string(QUERN_COMMIT));
 	json_object_set_new(p, "compiler", json_string(QUERN_COMPILER));
 	json_object_set_new(p, "flags", json_string(QUERN_FLAGS));
 	json_object_set_new(p, "scene_hash", hash(quern_run_scene_hash(run)));

@@ -384,7 +384,7 @@ static int by_name(const void *a, const void *b) {
 	return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* "contact.linear" of "contact.linear.v3.so", or NULL if that is no object whose name begins with a word. */
+/* KIND.NAME of "KIND.NAME.v3.so", or NULL if that is no object whose name begins with a word. */
 static char *id_of_object(const char *name) {
 	const size_t length = strlen(name), n = strcspn(name, ".");
 	if (length < 4 || strcmp(name + length - 3, ".so") != 0) return NULL;

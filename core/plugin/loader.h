@@ -82,7 +82,7 @@ char **quern_loader_ids(const quern_loader *);
 void quern_loader_report_strays(quern_loader *, quern_report *);
 void quern_loader_free_ids(char **);
 
-/* "linear" of "contact.linear"; NULL if it is no id */
+/* NAME of KIND.NAME; NULL if it is no id */
 const char *quern_id_name(const char *id);
 bool quern_id_is_of(const char *id, const char *kind);
 /* "an axial vector"; NULL if there is no such shape */

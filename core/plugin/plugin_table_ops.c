@@ -128,17 +128,17 @@ static bool functions(quern_table_reader *r, quern_kind *kind) {
 	return true;
 }
 
-/* `what` names its place: "slot contact: its". */
+/* `what` names its place: "slot contact". */
 static bool kind(quern_table_reader *r, const char *what, const quern_kind **at) {
 	uint32_t size = 0;
 	if (*at) memcpy(&size, *at, sizeof size);
 	if (size < offsetof(quern_kind, functions) + sizeof(void *) || size > LARGEST_ENTRY)
-		return quern_table_refuse(r, "%s kind is not there; use QUERN_KIND", what);
+		return quern_table_refuse(r, "%s: there is no kind; use QUERN_KIND", what);
 	quern_kind *own = quern_table_keep(r, sizeof *own);
 	memcpy(own, *at, size < sizeof *own ? size : sizeof *own);
 	if (!own->name || !is_short_name(own->name) || !quern_table_text(own->doc, 1 << 16) ||
 		own->ops_size < 8 || own->ops_size > LARGEST_OPS || own->ops_size % 8)
-		return quern_table_refuse(r, "%s kind has no name, or ops of %u bytes", what, own->ops_size);
+		return quern_table_refuse(r, "%s: its kind has no name, or ops of %u bytes", what, own->ops_size);
 	*at = own;
 	return functions(r, own);
 }
@@ -146,7 +146,7 @@ static bool kind(quern_table_reader *r, const char *what, const quern_kind **at)
 /* ---- conformance tests ---- */
 
 static bool conformance(quern_table_reader *r, quern_check_ops *ops) {
-	if (!kind(r, "ops: the", &ops->kind)) return false;
+	if (!kind(r, "ops", &ops->kind)) return false;
 	const char *id = r->table->plugin.id, *name = ops->kind->name;
 	if (!strcmp(name, quern_solver_kind.name) || !strcmp(name, quern_check_kind.name))
 		return quern_table_refuse(r, "a %s has no conformance test of its kind", name);
@@ -198,8 +198,8 @@ static bool slot(quern_table_reader *r, const quern_solver_ops *ops, quern_slot 
 		!quern_table_text(s->def, 1 << 16) || !is_label(s->same_as) || !is_label(s->repeat) ||
 		!is_label(s->again) || !is_label(s->particle) || !is_label(s->override))
 		return quern_table_refuse(r, "slot '%.60s': one of its texts is no plain text", s->name);
-	char what[QUERN_LONGEST_NAME + 16];
-	snprintf(what, sizeof what, "slot %s: its", s->name);
+	char what[QUERN_LONGEST_NAME + 8];
+	snprintf(what, sizeof what, "slot %s", s->name);
 	if (!kind(r, what, &s->kind)) return false;
 	if (!strcmp(s->kind->name, quern_solver_kind.name) || !strcmp(s->kind->name, quern_check_kind.name))
 		return quern_table_refuse(r, "slot %s: a %s sits in no slot", s->name, s->kind->name);

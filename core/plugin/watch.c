@@ -74,7 +74,7 @@ static const char *function_at(const quern_plugin_file *f, uintptr_t address) {
 	return name;
 }
 
-/* "quern: error: contact.linear crashed in force, called by dem.forces, at FILE+0x1234; out/x keeps ..." */
+/* "quern: error: PLUGIN crashed in FUNCTION, called by STAGE, at FILE+0x1234; out/x keeps ..." */
 static void say(const char *what, uintptr_t address) {
 	const quern_plugin_file *f = plugin_at(address);
 	const bool other =

@@ -29,7 +29,7 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 		.max = 1e9),
 	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED, .max = 1e12),
 	ROW(step_text, "time.step", "s",
-		"The long step, or auto; grains alone: their step. Taken a little shorter, so that a whole number of "
+		"The long step, or auto. Taken a little shorter, so that a whole number of "
 		"equal steps leads to the next frame.",
 		.text = "auto"),
 	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit."),
@@ -42,7 +42,7 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 	ROW(checkpoint, "checkpoint.every", "s",
 		"Time on the clock between checkpoints; 0: only at the release and at the end.", .def = 300,
 		.max = 1e9),
-	ROW(batch, "run.batch", "1", "Most contacts in a batch; results do not depend on it.", .def = 256,
+	ROW(batch, "run.batch", "1", "Most entities in a batch; results do not depend on it.", .def = 256,
 		.min = 8, .max = 512, .flags = QUERN_ADVANCED),
 	ROW(instructions, "run.instructions", "1",
 		"Highest instruction set to use, x86-64-v1 to v4; results do not depend on it.",
@@ -52,7 +52,8 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 const quern_general_list quern_general_lists[] = {
 	{ "domain.periodic", "true or false",
 		"Directions in which the domain repeats itself, one per dimension; default: none." },
-	{ "output.fields", "text", "Fields to write out beside those that frames always have: grain.velocity." },
+	{ "output.fields", "text",
+		"Fields to write out beside those that frames always have: SET.NAME, as `quern plan` lists them." },
 	{ NULL, NULL, NULL }
 };
 
@@ -79,7 +80,7 @@ void quern_scene_publish(const quern_setup *setup, const char *name, const char 
 	quern_scene *s = setup->scene;
 	for (size_t i = 0; i < s->n_published; i++)
 		if (!strcmp(s->published[i].name, name))
-			return; /* the first to know is right: grains before points */
+			return; /* the first to know is right: in the order of reading */
 	s->published = quern_grow(s->published, s->n_published, &s->published_capacity, sizeof(quern_published));
 	s->published[s->n_published++] = (quern_published) { name, unit, value };
 }
@@ -161,7 +162,7 @@ static void read_fields(quern_scene *s, const quern_node *output) {
 		const quern_node *value = node->entries[k].value;
 		if (value->kind != QUERN_NODE_SCALAR || !strchr(value->text, '.')) {
 			quern_report_add(s->report, value->mark,
-				"scene: output.fields: %s is no field name such as grain.velocity",
+				"scene: output.fields: %s is no field: SET.NAME, as quern plan lists them",
 				quern_node_say(value, say));
 			continue;
 		}

@@ -11,7 +11,7 @@ typedef struct quern_instance {
 	const void *ops;       /* as whoever calls it knows them */
 	const quern_node *map; /* its parameters as the scene gives them, or NULL */
 	quern_mark mark;
-	char *path; /* "grains.contact" */
+	char *path; /* SECTION.SLOT */
 	void *self;
 	bool ready; /* init has succeeded: finish is owed */
 } quern_instance;
@@ -26,14 +26,14 @@ typedef struct quern_filling {
 
 typedef struct quern_slot_use {
 	const quern_slot *slot;
-	char *path;             /* "grains.contact" */
+	char *path;             /* SECTION.SLOT */
 	quern_filling *filling; /* same_as: those of that slot */
 	size_t n, capacity;
 	bool borrowed;
 } quern_slot_use;
 
 typedef struct quern_section {
-	const char *name; /* "grains" */
+	const char *name;
 	quern_node *node;
 	quern_mark mark;
 	quern_instance *solver;

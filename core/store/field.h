@@ -7,7 +7,7 @@
 #include <quern/solver.h>
 
 typedef struct quern_field {
-	char name[56]; /* "grain.velocity" */
+	char name[56]; /* SET.NAME */
 	const char *unit, *doc;
 	int set, target; /* indices of sets; target -1 unless INDEX into one */
 	uint8_t shape, n_components;
@@ -47,7 +47,7 @@ typedef struct quern_store {
 uint8_t quern_components(uint8_t shape, uint32_t dim);
 size_t quern_field_bytes(const quern_field *); /* of one component of one entry */
 
-/* A set as people call it: "grains". */
+/* A set as people call it: its plural. */
 const char *quern_set_plural(const quern_set_store *);
 bool quern_set_is_counted(const quern_set_store *);
 

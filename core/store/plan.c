@@ -205,7 +205,7 @@ static quern_field *add_field(quern_plan *p, const quern_plan_use *u) {
 	return field;
 }
 
-/* A field of a section that this scene goes without, as its twins of pure grains or pure continuum do. */
+/* A field of a section that this scene goes without, as one does that keeps one model alone. */
 static bool section_left_out(const quern_plan *p, const char *field) {
 	size_t n;
 	const quern_section_of *known = quern_loader_sections(p->scene->loader, &n);
@@ -302,7 +302,7 @@ static void make_fields(quern_plan *p) {
 		if (quern_store_field(&p->store, p->scene->fields[k]) < 0) miss_asked(p, k);
 }
 
-/* Who else takes a field, and how: "solver.dem: an index". The first one has made it. */
+/* Who else takes a field, and how: "SOLVER: an index". The first one has made it. */
 static const quern_plan_use *first_use_of(const quern_plan *p, const char *field) {
 	for (size_t i = 0; i < p->n_uses; i++)
 		if (quern_plan_demands(&p->uses[i]) && !strcmp(p->uses[i].field, field)) return &p->uses[i];

@@ -7,7 +7,7 @@
 typedef struct quern_plan_use {
 	const quern_use *row;
 	char field[56];    /* "particle." and repeated sets resolved */
-	const char *owner; /* "dem.forces", "contact.linear" */
+	const char *owner; /* a stage, or a plugin in its slot */
 	quern_mark mark;
 	int stage;  /* -1: called by nobody here */
 	int target; /* index of its field in the store; -1: the row does not count */

@@ -143,9 +143,11 @@ typedef struct quern_check_host {
 	/* Adds `count` columns of numbers, zero so far, or one of integers, known by `name`. */
 	void (*add)(quern_check_kernel *, int name, const char *text, quern_check_role, uint32_t count);
 	void (*add_integers)(quern_check_kernel *, int name, const char *text, quern_check_role);
-	/* Adds the rows of this hook that count, filled with values of ordinary size or as new; `optional` also those that
-	 * hang on others. `second`: on both sides, for kernels of pairs. */
-	void (*add_uses)(quern_check_kernel *, uint32_t hook, bool optional, bool second);
+	/* Adds the rows of `uses` of this hook that count, filled with values of ordinary size, or as new where they are
+	 * changed; `optional`: also those that hang on other fields. */
+	void (*add_uses)(quern_check_kernel *, uint32_t hook, bool optional);
+	/* The same for one row, if it counts. `second`: among `use_second`, for kernels of pairs. */
+	void (*add_use)(quern_check_kernel *, uint32_t row, bool second);
 	/* Column by its number. */
 	const quern_check_column *(*column)(const quern_check_kernel *, int32_t number);
 	/* What is given to the columns of this name: uniform in [low, high). */

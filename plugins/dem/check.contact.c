@@ -105,6 +105,17 @@ static void fill_spins(const quern_check_kernel *k, uint64_t key) {
 
 enum { WITH_SPIN = 1, WITH_ENERGY = 2, VARIANTS = 4 };
 
+/* Fields of grains stand on both sides, histories of the pair once, and the couple comes with the batch, beside the force. */
+static void add_uses(quern_check_kernel *k, bool optional) {
+	const quern_use *rows = k->check->uses;
+	for (uint32_t r = 0; rows[r].field && r < QUERN_MOST_USES; r++) {
+		const bool hangs = rows[r].with || rows[r].flags & (QUERN_OPTIONAL | QUERN_WANTED);
+		if (!strcmp(rows[r].field, "contact.couple") || (hangs && !optional)) continue;
+		k->host->add_use(k, r, false);
+		if (strncmp(rows[r].field, "contact.", 8) != 0) k->host->add_use(k, r, true);
+	}
+}
+
 static quern_check_kernel *create(
 	const quern_check *c, const quern_check_instance *it, uint32_t variant, const char *name, uint32_t n) {
 	quern_check_kernel *k = c->host->kernel_create(c, it, name, n);
@@ -116,7 +127,7 @@ static quern_check_kernel *create(
 	c->host->add(k, RADIUS, "radius", QUERN_CHECK_IN, 1);
 	c->host->add(k, MASS, "mass", QUERN_CHECK_IN, 1);
 	c->host->add(k, FORCE, "force", QUERN_CHECK_CHANGED, dim);
-	c->host->add_uses(k, 0, variant & WITH_SPIN, true);
+	add_uses(k, variant & WITH_SPIN);
 	if (variant & WITH_SPIN || uses_field(c, it, "grain.spin")) {
 		c->host->add(k, SPIN, "spin", QUERN_CHECK_IN, turns);
 		if (dim == 3) c->host->add(k, TURN, "turn", QUERN_CHECK_IN, 3);

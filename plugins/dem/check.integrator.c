@@ -64,7 +64,7 @@ static quern_check_kernel *create(
 	if (spin) c->host->add(k, NEW_SPIN, "new_spin", QUERN_CHECK_OUT, turns);
 	if (!open && variant & WITH_MEAN) c->host->add(k, MEAN_SPEED, "mean_velocity", QUERN_CHECK_OUT, dim);
 	if (!open && spin && variant & WITH_MEAN) c->host->add(k, MEAN_SPIN, "mean_spin", QUERN_CHECK_OUT, turns);
-	c->host->add_uses(k, open ? QUERN_INTEGRATOR_OPEN : QUERN_INTEGRATOR_CLOSE, spin, false);
+	c->host->add_uses(k, open ? QUERN_INTEGRATOR_OPEN : QUERN_INTEGRATOR_CLOSE, spin);
 	for (uint32_t i = 0; i < n && !open; i++) {
 		quern_check_given(k, MASS, 0)[i] = c->host->uniform(120, i, 0.5, 2);
 		quern_check_given(k, INERTIA, 0)[i] = c->host->uniform(121, i, 0.1, 1);

@@ -51,7 +51,7 @@ static quern_check_kernel *create(
 		c->host->add(k, WAVE, "wave_speed", QUERN_CHECK_OUT, 1);
 		c->host->add(k, ENERGY, "energy", QUERN_CHECK_OUT, 1);
 	}
-	c->host->add_uses(k, hook, outputs, false);
+	c->host->add_uses(k, hook, outputs);
 	const quern_real density = moduli_of(k).density;
 	for (uint32_t i = 0; i < n; i++) {
 		quern_check_given(k, DENSITY, 0)[i] = density;

@@ -25,7 +25,7 @@ static void nothing(const quern_check_kernel *k, const quern_check_batch *b) { (
 static quern_check_kernel *create(const quern_check *c, const quern_check_instance *it, bool optional) {
 	quern_check_kernel *k = c->host->kernel_create(c, it, "map", ENTRIES);
 	k->call = nothing;
-	k->host->add_uses(k, 0, optional, false);
+	k->host->add_uses(k, 0, optional);
 	return k;
 }
 

@@ -33,8 +33,8 @@ static quern_check_kernel *make(
 	int32_t *zone = c->host->column(k, k->at[ZONE])->given;
 	for (uint32_t i = 0; i < n; i++) zone[i] = (int32_t)c->host->uniform(111, i, 0, 2.999);
 	/* rows are the cells' fields in both calls, whatever their hook */
-	c->host->add_uses(k, 0, true, false);
-	c->host->add_uses(k, 1, true, false);
+	c->host->add_uses(k, 0, true);
+	c->host->add_uses(k, 1, true);
 	if (variant == MARKS) {
 		c->host->add(k, LEVEL, "level", QUERN_CHECK_OUT, 1);
 		return k;

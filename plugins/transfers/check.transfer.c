@@ -35,7 +35,7 @@ static quern_check_kernel *create(
 	if (pass) c->host->add(k, ECHO, "echo", QUERN_CHECK_IN, k->dim);
 	if (!last) c->host->add(k, SEND, "send", QUERN_CHECK_OUT, k->dim);
 	c->host->add(k, VELOCITY, "velocity", last ? QUERN_CHECK_CHANGED : QUERN_CHECK_IN, k->dim);
-	c->host->add_uses(k, 0, true, false);
+	c->host->add_uses(k, 0, true);
 	return k;
 }
 

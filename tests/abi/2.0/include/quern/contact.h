@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: MIT */
+/* quern/contact.h - the kind `contact`: a law for pairs of grains, and what such laws share: restitution, first touch, the Coulomb cone.
+ * docs/theory/contacts.md. One law, one pair of materials, one dimension per batch. */
+#pragma once
+#include <quern/math.h>
+#include <quern/vec.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The first of a pair is the grain of lower id, for ever; against a body it is the grain. Open pairs may be in a
+ * batch (overlap <= 0): a law without reach gives them exactly zero force and sets its history to `initial`, by
+ * select. Weights, levers and torques b x f are the solver's; hence a law is homogeneous of degree 1 in
+ * (stiffness, mass). */
+typedef struct quern_contact_batch {
+	uint32_t n, cap;
+	quern_real dt;
+	const quern_real *overlap;      /* m, r1 + r2 - distance */
+	const quern_real *normal[3];    /* unit, from second to first */
+	const quern_real *velocity[3];  /* m/s, of first relative to second at the contact, spin included */
+	const quern_real *spin[3];      /* rad/s, first minus second; NULL unless grain.spin exists */
+	const quern_real *turn[3];      /* rad/s, mean of first and second; 3-D with spin, else NULL */
+	const quern_real *radius;       /* m, r1 r2/(r1 + r2) */
+	const quern_real *mass;         /* kg, m1 m2/(m1 + m2), unweighted */
+	const quern_column *use;        /* by row: contact.*: this batch's; grain.* READ: the first's */
+	const quern_column *use_second; /* grain.* READ: the second's (against a body: the first's) */
+	quern_real *force[3];           /* N on first; laws of a list ADD to it */
+	/* N m on first, minus that on second; laws ADD to it. NULL unless a law of the list has a use of "contact.couple"
+	 * (N m, QUERN_ADD, QUERN_AXIAL), which says that there are couples and no more. */
+	quern_real *couple[3];
+	/* NULL unless energy is observed: */
+	quern_real *dashpot[3]; /* N on first, ADDed: the part of `force` that damps or clamps */
+	quern_real *stored;     /* J, ADDed: in the normal spring */
+	quern_real *sheared;    /* J, ADDed: in the tangential spring */
+	quern_real *rubbed;     /* J, ADDed: lost to sliding in this step */
+	quern_real
+		*drag_couple[3]; /* N m on first, ADDed: the part of `couple` that damps; NULL without couples too */
+} quern_contact_batch;
+
+typedef struct quern_contact_ops {
+	uint32_t size, pad;
+	void (*force[2])(const void *self, const quern_contact_batch *); /* [batch] [0] 2-D, [1] 3-D */
+	/* [setup] s, half the shortest undamped period of a contact over all its modes: pi/omega */
+	quern_real (*period)(const void *self, uint32_t dim, quern_real mass, quern_real radius);
+	/* [setup] N/m, tangent normal stiffness at a normal force of `force` N */
+	quern_real (*stiffness)(const void *self, uint32_t dim, quern_real radius, quern_real force);
+	quern_real (*reach)(const void *self, quern_real radius); /* [setup] m beyond touching; NULL: 0 */
+	/* [setup] damping ratio gamma/(2 sqrt(k m)) of the mode that is damped most, at the stiffness that `period` is of: an
+	 * explicit dashpot has a limit of its own; NULL: 0 */
+	quern_real (*damping)(const void *self, uint32_t dim);
+} quern_contact_ops;
+
+QUERN_KIND(contact, quern_contact_ops, "A force between two grains in contact.",
+	QUERN_EACH(quern_contact_ops, force), QUERN_OPTIONALLY(quern_contact_ops, period),
+	QUERN_OPTIONALLY(quern_contact_ops, stiffness), QUERN_OPTIONALLY(quern_contact_ops, reach),
+	QUERN_OPTIONALLY(quern_contact_ops, damping));
+
+#ifdef __cplusplus
+}
+#endif
+
+/* ==== what laws share ==== */
+
+/* Damping ratio zeta of a linear contact m x'' + 2 zeta w m x' + w^2 m x = 0 whose force is never attractive and which
+ * rebounds with restitution e in (0, 1]: -ln e = 2 zeta F(zeta), F(zeta) = R_C(zeta^2, 1) (Schwager & Poeschel 2007,
+ * in Carlson's form). The same zeta holds exactly for Hertz's force with a dashpot ~ overlap^(1/4). [setup] */
+QUERN_INLINE quern_real quern_damping_ratio(quern_real e) {
+	const quern_real wanted = -quern_log(e);
+	quern_real low = 0, high = 64;
+	for (int k = 0; k < 200 && wanted > 0; k++) { /* monotone: bisection down to neighbouring numbers */
+		const quern_real z = 0.5 * (low + high);
+		if (2 * z * quern_carlson_rc(z * z, 1) < wanted) low = z;
+		else high = z;
+	}
+	return wanted > 0 ? 0.5 * (low + high) : 0;
+}
+
+/* A dashpot jumps at first touch, which would make any scheme first order. In the first evaluation of a contact, when
+ * the pair was still apart one step ago, it acts for the time since touching alone. */
+typedef struct quern_onset {
+	quern_real time; /* s, that the pair has touched within this step: dt, or less in the first evaluation */
+	quern_real weight; /* of the dashpot */
+} quern_onset;
+
+/* `approach` is the rate at which the overlap grows; `power` p of a dashpot ~ overlap^p: 0 linear, 1/4 Hertz. */
+QUERN_INLINE quern_onset quern_first_touch(
+	quern_real overlap, quern_real approach, quern_real dt, quern_real power) {
+	const bool first = (overlap > 0) & (overlap < approach * dt); /* a pair that is apart has not touched */
+	const quern_real time = first ? overlap / (approach > 0 ? approach : 1) : dt;
+	return QUERN_VALUE(quern_onset, time, first ? 0.5 + time / ((1 + power) * dt) : 1);
+}
+
+/* What the Coulomb cone leaves of an elastic force a and a dashpot's b: spring a + damper b, of size cap at most. */
+typedef struct quern_cone {
+	quern_real spring, damper; /* shares in [0, 1] */
+} quern_cone;
+
+/* Inside the cone both stay. Outside, the spring shrinks until |s a + b| = cap: to the largest such s, so that the total
+ * keeps its side and changes smoothly. Where no s in [0, 1] brings it into the cone, the spring shrinks to where the total
+ * is least, and both are clipped. The root is written without cancellation. */
+QUERN_INLINE quern_cone quern_cone_shares(quern_vec a, quern_vec b, quern_real cap) {
+	const quern_vec sum = quern_vec_add(a, b);
+	const quern_real ab = quern_vec_dot(a, b, 3), aa = quern_vec_dot(a, a, 3), cc = cap * cap;
+	const quern_real q = cc - quern_vec_dot(b, b, 3), inner = ab * ab + aa * q;
+	const quern_real root = __builtin_sqrt(inner > 0 ? inner : 0), up = ab + root;
+	const quern_real one_over = 1 / (aa > 0 ? aa : 1);
+	const quern_real share = ab > 0 ? q / (up > 0 ? up : 1) : (root - ab) * one_over;
+	const quern_real part =
+		ab < 0 ? (-ab < aa ? -ab * one_over : 1) : 0; /* of the spring, for the least total */
+	const quern_vec least = quern_vec_axpy(part, a, b);
+	const quern_real least2 = quern_vec_dot(least, least, 3);
+	const bool slides = quern_vec_dot(sum, sum, 3) > cc, beyond = least2 >= cc;
+	const quern_real clip = cap / __builtin_sqrt(least2 > 0 ? least2 : 1);
+	const quern_real kept = share < 1 ? (share > part ? share : part) : 1;
+	return QUERN_VALUE(quern_cone, slides ? (beyond ? part * clip : kept) : 1, (slides & beyond) ? clip : 1);
+}
+
+/* The same along one line, a and b of either sign; returns what is left of a + b, and of a alone in *spring. */
+QUERN_INLINE quern_real quern_cone_planar(quern_real a, quern_real b, quern_real cap, quern_real *spring) {
+	const quern_real sum = a + b, up = sum > cap ? cap : sum, total = up < -cap ? -cap : up;
+	const quern_real size = sum < 0 ? -sum : sum;
+	const bool slides = sum != total, against = a * b < 0;
+	const quern_real least = against ? a * a : cap * cap; /* what b must exceed for no spring to do */
+	const quern_real clipped = against ? a * (cap / (size > 0 ? size : 1)) : 0;
+	*spring = slides ? (b * b >= least ? clipped : total - b) : a;
+	return total;
+}
+
+/* A tangential vector of the last step laid into the present tangent plane at its old length, after turning with the
+ * pair by `angle` about n. */
+QUERN_INLINE quern_vec quern_into_plane(quern_vec t, quern_vec n, quern_real angle) {
+	const quern_vec turned = quern_vec_axpy(angle, quern_vec_cross(n, t), t);
+	const quern_vec flat = quern_vec_axpy(-quern_vec_dot(turned, n, 3), n, turned);
+	const quern_real was = quern_vec_dot(t, t, 3), is = quern_vec_dot(flat, flat, 3);
+	return quern_vec_scale(is > 0 ? __builtin_sqrt(was / (is > 0 ? is : 1)) : 0, flat);
+}

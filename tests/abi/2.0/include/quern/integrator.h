@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* quern/integrator.h - the kind `integrator`: grains of one block; `close` runs fused with the sums, `open` (optional) before the forces */
+#pragma once
+#include <quern/abi.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { QUERN_INTEGRATOR_CLOSE, QUERN_INTEGRATOR_OPEN };
+
+typedef struct quern_integrator_batch {
+	uint32_t n, cap;
+	quern_real dt, gravity[3];
+	const quern_real *force[3],
+		*torque[3];                   /* N, N m, weighted; torque NULL without spin; both NULL in `open` */
+	const quern_real *mass, *inertia; /* kg, kg m^2, weighted like the force */
+	const quern_real *position[3], *velocity[3], *spin[3];
+	quern_real *new_position[3], *new_velocity[3], *new_spin[3];
+	quern_real *mean_velocity[3],
+		*mean_spin[3]; /* over the kick, so that force . mean * dt is the change of kinetic
+	                                                energy; NULL unless energy is observed, and in `open` */
+	const quern_column *use;
+} quern_integrator_batch;
+
+typedef struct quern_integrator_ops {
+	uint32_t size;
+	uint32_t damps; /* 1: takes energy away on purpose, for settling; what it takes stands in no budget */
+	void (*close[2])(const void *self, const quern_integrator_batch *); /* [batch] */
+	void (*open[2])(const void *self, const quern_integrator_batch *);  /* [batch] may be NULL */
+} quern_integrator_ops;
+
+QUERN_KIND(integrator, quern_integrator_ops, "Grains moved on by forces.",
+	QUERN_EACH(quern_integrator_ops, close), QUERN_EITHER(quern_integrator_ops, open));
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: MIT */
+/* quern/material.h - the kind `material`: points in place, once a step, after the grid's velocity; stress is state, also of a
+ * hyperelastic law */
+#pragma once
+#include <quern/abi.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { QUERN_MATERIAL_UPDATE, QUERN_MATERIAL_ASSIGN };
+
+typedef struct quern_material_batch {
+	uint32_t n, cap;
+	quern_real dt;
+	const quern_real *gradient[9];  /* 1/s, L row-major dim x dim */
+	const quern_real *grid_density; /* kg/m^3, of the mixture at the point, unweighted */
+	quern_real *density;    /* kg/m^3, in: true m/V after V *= det(1 + dt L); out: what the point has from now
+	                                    on, so that a point that is open can follow grid_density */
+	quern_real *stress[6];  /* Pa, Cauchy, tension positive; in and out */
+	quern_real *wave_speed; /* m/s, out; NULL if not wanted */
+	quern_real *energy;     /* J/kg stored, out; NULL if not wanted */
+	const quern_column *use;
+} quern_material_batch;
+
+typedef struct quern_material_ops {
+	uint32_t size, pad;
+	void (*update[2])(const void *self, const quern_material_batch *); /* [batch] hook 0 */
+	/* [batch] hook 1: history from stress. Tension is clipped, the stress returned to the yield surface; density comes
+	 * out as that of the point under this stress. gradient and grid_density are NULL, dt is 0. */
+	void (*assign[2])(const void *self, const quern_material_batch *);
+	/* [setup] moduli for step limits (Pa) and the density without stress (kg/m^3) */
+	void (*moduli)(const void *self, uint32_t dim, quern_real *bulk, quern_real *shear, quern_real *density);
+} quern_material_ops;
+
+QUERN_KIND(material, quern_material_ops, "The stress of a continuum.", QUERN_EACH(quern_material_ops, update),
+	QUERN_EACH(quern_material_ops, assign), QUERN_ONE(quern_material_ops, moduli));
+
+#ifdef __cplusplus
+}
+#endif
