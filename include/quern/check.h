@@ -89,7 +89,7 @@ typedef struct quern_check_kernel {
 	void (*call)(const struct quern_check_kernel *, const quern_check_batch *); /* calls the function */
 	const void *more;                                                           /* anything, for `call` */
 	quern_real dt;                                                              /* s; 1e-5 to begin with */
-	uint32_t pass, later;                                                       /* any number, for `call` */
+	uint32_t pass, pad;                                                         /* any number, for `call` */
 } quern_check_kernel;
 
 /* ==== services; the table grows at the end ==== */
