@@ -24,7 +24,7 @@ static quern_check_kernel *make(
 	k->call = call;
 	c->host->add(k, TEMPERATURE, "temperature", QUERN_CHECK_IN, 1);
 	c->host->add(k, CONDUCTIVITY, "conductivity", QUERN_CHECK_OUT, 1);
-	c->host->add_uses(k, 0, true, false);
+	c->host->add_uses(k, 0, true);
 	c->host->fill(k, TEMPERATURE, 1, 1, 200, 600);
 	return k;
 }
