@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* check - the services that conformance tests get: places, random numbers, tallies, and kernels called in batches with guards
- * around every column */
+/* check - the services that conformance tests get: places, random numbers, tallies, and kernels called in batches with
+ * guards around every column */
 #include "check.h"
 #include "random.h"
 #include "text.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* check - the program's part of conformance tests: instances, kernels called in batches, tallies, and what holds for all kinds.
- * What a test of one kind sees of it is quern/check.h */
+/* check - the program's part of conformance tests: instances, kernels called in batches, tallies, and what holds for
+ * all kinds. What a test of one kind sees of it is quern/check.h */
 #pragma once
 #include "environment.h"
 #include "loader.h"
@@ -54,7 +54,8 @@ typedef struct check {
 extern const quern_check_host quern_check_services;
 
 __attribute__((format(printf, 2, 3))) void quern_check_place(const quern_check *, const char *fmt, ...);
-/* Looks at all of the environment, puts it back, and notes what had changed: after calls that may do more than compute. */
+/* Looks at all of the environment, puts it back, and notes what had changed: after calls that may do more than
+ * compute. */
 void quern_check_environment(const check *);
 __attribute__((format(printf, 3, 4))) void quern_check_expect(
 	quern_check_tally *, bool good, const char *fmt, ...);
@@ -117,7 +118,8 @@ void quern_check_table(const check *);
 void quern_check_solver(const check *);
 void quern_check_parameters(const check *);
 void quern_check_batches(const check *);
-/* A solver in a short run of a scene: the run itself, the same with other threads and batches, and from its checkpoints. */
+/* A solver in a short run of a scene: the run itself, the same with other threads and batches, and from its
+ * checkpoints. */
 void quern_check_scene(const check *);
 void quern_check_scene_threads(const check *);
 void quern_check_scene_batches(const check *);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_batches - what every kernel promises: results that depend neither on how entities are cut nor on threads, no byte
- * outside its columns, sensible numbers for any parameters */
+/* quern_check_batches - what every kernel promises: results that depend neither on how entities are cut nor on
+ * threads, no byte outside its columns, sensible numbers for any parameters */
 #include "check.h"
 #include "text.h"
 #include "tree.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_plugin - groups of tests, each in a process of its own that loads the plugin for itself: a crash, an endless loop,
- * an exit() is one sentence, and the other groups go on */
+/* quern_check_plugin - groups of tests, each in a process of its own that loads the plugin for itself: a crash, an
+ * endless loop, an exit() is one sentence, and the other groups go on */
 #include "check.h"
 #include "child.h"
 #include "exit.h"
@@ -92,7 +92,7 @@ static void in_child(void *arg) {
 		(e->group ? e->group : look)(&c);
 		quern_check_environment(&c);
 		quern_pool_destroy(c.pool);
-	}
+	} else if (e->group) e->shared->properties++, e->shared->failed++; /* it is another one than before */
 	quern_report_print(report, stderr);
 	free((void *)(uintptr_t)c.open.uses);
 	quern_units_destroy(c.units);

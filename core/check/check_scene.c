@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_scene - a solver at work: the first steps of a scene, and the same bits with other threads, other batches, and from
- * checkpoints on the way
+/* quern_check_scene - a solver at work: the first steps of a scene, and the same bits with other threads, other
+ * batches, and from checkpoints on the way
  *
- * The first run, on one thread, notes its state at the end and leaves checkpoints. Each comparison is made in a process of its
- * own, so that what a plugin keeps outside of its fields is not there. */
+ * The first run, on one thread, notes its state at the end and leaves checkpoints. Each comparison is made in a
+ * process of its own, so that what a plugin keeps outside of its fields is not there. */
 #include "check.h"
 #include "checkpoint.h"
 #include "log.h"
@@ -88,8 +88,8 @@ static quern_run *create_run(const check *c, uint32_t threads, const char *more,
 		run->log = quern_log_create(true);
 		return run;
 	}
-	quern_text_add(
-		why, "%s cannot be used: %zu faults", c->task->scene, quern_report_print(scene->report, stderr));
+	const size_t faults = quern_report_print(scene->report, stderr);
+	quern_text_add(why, "%s cannot be used: %zu fault%s", c->task->scene, faults, faults == 1 ? "" : "s");
 	if (run) quern_run_destroy(run);
 	else quern_scene_destroy(scene);
 	return NULL;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_solver - a solver's sets, slots and stages: names that exist, units that parse, defaults that can be read */
+/* quern_check_solver - a solver's sets, slots and stages: names that exist, units that parse, defaults that can be
+ * read */
 #include "check.h"
 #include "check_table.h"
 #include "text.h"

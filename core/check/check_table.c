@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_table - what a plugin's tables say of it beyond what the loader asks: docs, units, ranges, one meaning each */
+/* quern_check_table - what a plugin's tables say of it beyond what the loader asks: docs, units, ranges, one meaning
+ * each */
 #include "check_table.h"
 #include "check.h"
 #include "text.h"

@@ -560,8 +560,8 @@ static void note_section(quern_loader *loader, const quern_library *lib) {
 			loader->sections = quern_grow(
 				loader->sections, loader->n_sections, &loader->sections_capacity, sizeof *loader->sections);
 			quern_section_of *s = &loader->sections[loader->n_sections++];
-			*s = (quern_section_of) { quern_copy(ops->section), quern_copy(quern_id_name(table.plugin.id)),
-				NULL, 0, false };
+			*s = (quern_section_of) { .section = quern_copy(ops->section),
+				.solver = quern_copy(quern_id_name(table.plugin.id)) };
 			s->sets = names_of(ops->sets, &s->n_sets);
 			s->steps = quern_solver_steps(ops);
 		}

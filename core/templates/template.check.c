@@ -1,8 +1,9 @@
 /* check.my_name - the conformance test of a kind of one's own, called by `quern check my_name.ANYTHING.so`.
  *
- * A kind is a name and a table of functions. They stand in a header that the solver, the plugins and this test include; here
- * the header's part is the first paragraph, for a kind whose plugins give a value at a place. Whoever brings a kind also
- * brings template.my_name.c, from which `quern new my_name NAME` makes a plugin: both are found wherever plugins are. */
+ * A kind is a name and a table of functions. They stand in a header that the solver, the plugins and this test
+ * include; here the header's part is the first paragraph, for a kind whose plugins give a value at a place. Whoever
+ * brings a kind also brings template.my_name.c, from which `quern new my_name NAME` makes a plugin: both are found
+ * wherever plugins are. */
 #include <math.h>
 #include <quern/check.h>
 

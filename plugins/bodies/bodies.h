@@ -19,8 +19,8 @@ QUERN_INLINE bool quern_body_is_there(const quern_bound *body, bool settling) {
 	return when == BODY_ALWAYS || (when == BODY_SETTLING) == settling;
 }
 
-/* Gap of one sphere to a body that stands where the scene put it, or to one of its features, and the normal there (may be
- * NULL). */
+/* Gap of one sphere to a body that stands where the scene put it, or to one of its features, and the normal there
+ * (may be NULL). */
 static inline quern_real quern_body_gap_of(const quern_bound *body, const int32_t *feature, uint32_t dim,
 	const quern_real x[3], quern_real radius, quern_real normal[3]) {
 	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.bodies - walls and bodies: who is there, and what impulse each has given to the material */
-#include "../common/tools.h"
 #include "bodies.h"
 
 typedef struct {
@@ -35,9 +34,12 @@ static const quern_slot slots[] = { { .name = "",
 										.item_size = sizeof(body_item) },
 	{ .name = NULL } };
 
-static const quern_use place_uses[] = { F("body.impulse", "N s", QUERN_WRITE, QUERN_VECTOR,
-											.flags = QUERN_OPTIONAL,
-											.doc = "Given to the material since the release."),
+static const quern_use place_uses[] = { { .field = "body.impulse",
+											.unit = "N s",
+											.doc = "Given to the material since the release.",
+											.access = QUERN_WRITE,
+											.shape = QUERN_VECTOR,
+											.flags = QUERN_OPTIONAL },
 	QUERN_END_USES };
 
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,

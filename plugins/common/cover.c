@@ -4,17 +4,6 @@
 #include "tools.h"
 #include <string.h>
 
-/* Points on a wall belong to the cell inside; one that is farther out than round-off has left. */
-static int32_t clamp_cell(const quern_grid_view *g, uint32_t axis, quern_real x) {
-	int32_t c = quern_grid_cell(g, axis, x);
-	if (g->periodic[axis]) {
-		c %= g->cells[axis];
-		return c < 0 ? c + g->cells[axis] : c;
-	}
-	c = c < 0 ? 0 : c;
-	return c < g->cells[axis] ? c : g->cells[axis] - 1;
-}
-
 static quern_status bring_back(const quern_step *s, const quern_grid_view *g, const cover *c, uint32_t n) {
 	for (uint32_t k = 0; k < s->dim; k++) {
 		quern_real *x = c->point.real[k];
@@ -30,13 +19,17 @@ static quern_status bring_back(const quern_step *s, const quern_grid_view *g, co
 	return QUERN_OK;
 }
 
+/* Points on a wall belong to the cell inside; one that is farther out than round-off has left. */
 static uint64_t block_key(const quern_grid_view *g, quern_real *const x[3], uint32_t i, uint32_t *place) {
+	quern_real at[3];
+	int32_t cell[3];
 	uint64_t key = 0;
 	*place = 0;
+	quern_grid_position(g, x, i, at);
+	quern_grid_cell_inside(g, at, cell);
 	for (uint32_t k = g->dim; k-- > 0;) {
-		const uint32_t c = (uint32_t)clamp_cell(g, k, x[k][i]);
-		key = key << 20 | c / g->edge;
-		*place = *place * g->edge + c % g->edge;
+		key = key << 20 | (uint32_t)cell[k] / g->edge;
+		*place = *place * g->edge + (uint32_t)cell[k] % g->edge;
 	}
 	return key;
 }

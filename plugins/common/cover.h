@@ -7,7 +7,8 @@
 typedef struct cover {
 	quern_column point, grain; /* positions; grain.real[0] NULL: points alone count */
 	uint32_t n_grains;
-	/* Blocks that were asked for before stay if this says so (their cells hold state); NULL: they go with the material. */
+	/* Blocks that were asked for before stay if this says so (their cells hold state); NULL: they go with the
+	 * material. */
 	bool (*holds)(const void *arg, uint32_t block);
 	const void *arg;
 } cover;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* height - how high the material lies at the start: the extent of all loose fills together along the axis on which gravity
- * is strongest. One definition for whoever needs it. */
+/* height - how high the material lies at the start: the extent of all loose fills together along the axis on which
+ * gravity is strongest. One definition for whoever needs it. */
 #pragma once
 #include <math.h>
 #include <quern/solver.h>

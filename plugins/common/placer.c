@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "placer.h"
 #include "../bodies/bodies.h"
+#include "tools.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,15 +14,17 @@ quern_status quern_placer_init(placer *p, uint32_t dim, const quern_real lower[3
 	const bool periodic[3], quern_real most) {
 	*p = (placer) { .dim = dim, .n_heads = 1024 };
 	for (uint32_t k = 0; k < 3; k++) {
-		p->cell[k] = 2 * most;
+		p->inverse[k] = 1 / (2 * most);
+		p->half[k] = INFINITY;
 		if (k >= dim) continue;
 		p->lower[k] = lower[k];
 		p->length[k] = upper[k] - lower[k];
 		p->periodic[k] = periodic[k];
 		if (!periodic[k]) continue;
-		const quern_real cells = floor(p->length[k] / p->cell[k]);
+		const quern_real cells = floor(p->length[k] / (2 * most));
+		p->half[k] = 0.5 * p->length[k];
 		p->wrap[k] = cells < 1 ? 1 : (int32_t)cells;
-		p->cell[k] = p->length[k] / p->wrap[k];
+		p->inverse[k] = p->wrap[k] / p->length[k];
 	}
 	p->head = malloc(p->n_heads * sizeof(int32_t));
 	if (!p->head) return QUERN_E_MEMORY;
@@ -40,14 +43,20 @@ void quern_placer_finish(placer *p) {
 /* Cell of a place, and a cell brought back through a periodic face. Neighbours are counted in cells: a place that is a
  * cell's width away may round into the cell beyond. */
 static int32_t cell_at(const placer *p, uint32_t k, quern_real x) {
-	return (int32_t)floor((x - p->lower[k]) / p->cell[k]);
+	return quern_cell_along(x, p->lower[k], p->inverse[k]);
 }
 static int32_t wrapped(const placer *p, uint32_t k, int32_t c) {
-	if (!p->periodic[k]) return c;
-	const int32_t m = c % p->wrap[k];
-	return m < 0 ? m + p->wrap[k] : m;
+	return p->periodic[k] ? quern_cell_wrapped(c, p->wrap[k]) : c;
 }
 static int32_t cell_of(const placer *p, uint32_t k, quern_real x) { return wrapped(p, k, cell_at(p, k, x)); }
+
+/* Whoever places a grain may have gone round a periodic domain. */
+static quern_spot at_home(const placer *p, const quern_spot *s) {
+	quern_spot home = *s;
+	for (uint32_t k = 0; k < p->dim; k++)
+		if (p->periodic[k]) home.x[k] = quern_brought_back(s->x[k], p->lower[k], p->lower[k] + p->length[k]);
+	return home;
+}
 
 static void link_spot(placer *p, uint32_t i) {
 	int32_t c[3] = { 0 };
@@ -76,33 +85,29 @@ static void grow(placer *p) {
 void quern_placer_add(placer *p, const quern_spot *s) {
 	if (p->n == p->cap) grow(p);
 	if (p->failed) return;
-	p->spot[p->n] = *s;
+	p->spot[p->n] = at_home(p, s);
 	link_spot(p, p->n++);
 }
 
-static quern_real nearest_image(const placer *p, uint32_t k, quern_real d) {
-	if (!p->periodic[k]) return d;
-	return d - p->length[k] * floor(d / p->length[k] + 0.5);
+/* Between centres, of nearest images. */
+static quern_real distance2(const placer *p, const quern_spot *a, const quern_spot *b) {
+	quern_real d2 = 0;
+	for (uint32_t k = 0; k < p->dim; k++) {
+		const quern_real d = quern_image(a->x[k] - b->x[k], p->half[k], p->length[k]);
+		d2 += d * d;
+	}
+	return d2;
 }
 
 static bool overlaps(const placer *p, const quern_spot *a, const quern_spot *b) {
-	quern_real d2 = 0;
-	for (uint32_t k = 0; k < p->dim; k++) {
-		const quern_real d = nearest_image(p, k, a->x[k] - b->x[k]);
-		d2 += d * d;
-	}
 	const quern_real reach = (a->radius + b->radius) - 1e-9 * a->radius;
-	return d2 < reach * reach;
+	return distance2(p, a, b) < reach * reach;
 }
 
 /* Over the smaller radius. */
 static quern_real overlap_of(const placer *p, const quern_spot *a, const quern_spot *b) {
-	quern_real d2 = 0;
-	for (uint32_t k = 0; k < p->dim; k++) {
-		const quern_real d = nearest_image(p, k, a->x[k] - b->x[k]);
-		d2 += d * d;
-	}
-	return (a->radius + b->radius - sqrt(d2)) / (a->radius < b->radius ? a->radius : b->radius);
+	return (a->radius + b->radius - sqrt(distance2(p, a, b))) /
+		   (a->radius < b->radius ? a->radius : b->radius);
 }
 
 static bool meets_body(const placer *p, const quern_spot *s) {
@@ -115,8 +120,9 @@ static bool meets_body(const placer *p, const quern_spot *s) {
  * axis two offsets may name the same cell; looking twice does no harm. */
 bool quern_placer_free(const placer *p, const quern_spot *s) {
 	const int depth = p->dim == 3 ? 1 : 0;
+	const quern_spot home = at_home(p, s);
 	int32_t middle[3] = { 0 };
-	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, s->x[k]);
+	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, home.x[k]);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
@@ -124,7 +130,7 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 				int32_t c[3] = { 0 };
 				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i])
-					if (overlaps(p, s, &p->spot[i])) return false;
+					if (overlaps(p, &home, &p->spot[i])) return false;
 			}
 	return !meets_body(p, s);
 }
@@ -132,9 +138,10 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real share,
 	bool (*counts)(const void *arg, int32_t), const void *arg, quern_real *by) {
 	const int depth = p->dim == 3 ? 1 : 0;
+	const quern_spot home = at_home(p, s);
 	int32_t middle[3] = { 0 }, worst = -1;
 	*by = share;
-	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, s->x[k]);
+	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, home.x[k]);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
@@ -142,7 +149,7 @@ int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real shar
 				int32_t c[3] = { 0 };
 				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i]) {
-					const quern_real overlap = overlap_of(p, s, &p->spot[i]);
+					const quern_real overlap = overlap_of(p, &home, &p->spot[i]);
 					if (overlap > *by && (!counts || counts(arg, i))) *by = overlap, worst = i;
 				}
 			}
@@ -170,7 +177,7 @@ uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const que
 					for (uint32_t k = 0; k < p->dim; k++) {
 						if (cell_of(p, k, s.x[k]) != c[k]) near = false; /* another cell of the same hash */
 						const quern_real middle = 0.5 * (lower[k] + upper[k]);
-						s.x[k] = middle + nearest_image(p, k, s.x[k] - middle);
+						s.x[k] = middle + quern_image(s.x[k] - middle, p->half[k], p->length[k]);
 						near = near && s.x[k] >= lower[k] - reach && s.x[k] <= upper[k] + reach;
 					}
 					if (!near) continue;

@@ -3,12 +3,14 @@
 #pragma once
 #include <quern/packer.h>
 #include <quern/solver.h>
+#include <quern/space.h>
 
 typedef struct placer {
 	uint32_t dim;
 	bool periodic[3];
-	quern_real lower[3], length[3]; /* of the domain; length matters along periodic axes */
-	quern_real cell[3];             /* m, at least the largest diameter */
+	quern_real lower[3], length[3]; /* of the domain */
+	quern_real half[3];             /* of the length along periodic axes, infinite elsewhere */
+	quern_real inverse[3];          /* 1/m, of a cell, at least as wide as the largest diameter */
 	int32_t wrap[3];                /* cells along a periodic axis */
 	quern_spot *spot;
 	int32_t *next;
@@ -27,8 +29,8 @@ void quern_placer_finish(placer *);
 void quern_placer_add(placer *, const quern_spot *);
 /* No overlap with grains or bodies above 1e-9 of the spot's radius. */
 bool quern_placer_free(const placer *, const quern_spot *);
-/* The grain that a spot overlaps most, of those that `counts` is true of (NULL: all), by more than `share` of the smaller radius,
- * and by what share; -1: none. Grains are numbered as they were added. */
+/* The grain that a spot overlaps most, of those that `counts` is true of (NULL: all), by more than `share` of the
+ * smaller radius, and by what share; -1: none. Grains are numbered as they were added. */
 int32_t quern_placer_worst(const placer *, const quern_spot *, quern_real share,
 	bool (*counts)(const void *arg, int32_t), const void *arg, quern_real *by);
 /* Appends to `out` (capacity `cap`) the grains whose centre is within `reach` of the box; along periodic axes as the

@@ -9,6 +9,9 @@ QUERN_INLINE quern_real quern_radius_mass(quern_real radius, quern_real density,
 	return density * (dim == 2 ? area : 4.0 / 3 * area * radius);
 }
 
+/* Moment of inertia over mass times radius squared. */
+QUERN_INLINE quern_real quern_radius_inertia(uint32_t dim) { return dim == 2 ? 0.5 : 0.4; }
+
 enum { RADIUS_NORMAL, RADIUS_UNIFORM };
 
 typedef struct radius_law {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* rotation - what is done with symmetric tensors, and a stress carried along with the material: what the materials share.
- * `dim` is a constant in every caller. docs/theory/materials.md, 1 and 2 */
+/* rotation - what is done with symmetric tensors, and a stress carried along with the material: what the materials
+ * share. `dim` is a constant in every caller. docs/theory/materials.md, 1 and 2 */
 #pragma once
 #include "symmetric.h"
 #include <quern/material.h>
@@ -61,8 +61,8 @@ QUERN_INLINE symmetric pushed(int dim, symmetric s, symmetric whole, tensor e) {
 		s.xz + ((m.xz + m.zx) + (m.xx * e.zx + m.xy * e.zy + m.xz * e.zz)) };
 }
 
-/* R s R^T with R = (1 - dt W/2)^-1 (1 + dt W/2), W = (L - L^T)/2: orthogonal for any step. By way of R - 1, so that what
- * rounding does to a small turn is small too, and no turn leaves the bits alone. */
+/* R s R^T with R = (1 - dt W/2)^-1 (1 + dt W/2), W = (L - L^T)/2: orthogonal for any step. By way of R - 1, so that
+ * what rounding does to a small turn is small too, and no turn leaves the bits alone. */
 QUERN_INLINE symmetric rotated(int dim, symmetric s, tensor l, quern_real dt) {
 	const quern_real quarter = 0.25 * dt, az = quarter * (l.yx - l.xy);
 	if (dim == 2) { /* by twice the angle: xx and yy change by opposite amounts */

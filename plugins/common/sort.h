@@ -1,42 +1,42 @@
 /* SPDX-License-Identifier: MIT */
-/* sort - a stable sort of keys, as the order that remap() takes */
+/* sort - a counting sort, and on it a stable sort of keys, as the order that remap() takes */
 #pragma once
 #include <stddef.h>
 #include <stdint.h>
 
-/* from[i] becomes the index of the i-th smallest key, ties in the old order; `work` holds 2 n keys and n indices.
- * Radix by bytes, and only over those bytes in which keys differ. */
-static inline void quern_sort_order(uint32_t n, const uint64_t *key, int32_t *from, uint64_t *work) {
-	uint64_t *a = work, *b = work + n, all_and = ~(uint64_t)0, all_or = 0;
-	int32_t *x = from, *y = (int32_t *)(void *)(work + 2 * (size_t)n);
-	for (uint32_t i = 0; i < n; i++) {
-		a[i] = key[i];
-		x[i] = (int32_t)i;
-		all_and &= key[i];
-		all_or |= key[i];
-	}
-	for (int shift = 0; shift < 64; shift += 11) {
-		uint32_t count[2049] = { 0 };
-		if (!((all_and ^ all_or) >> shift & 2047)) continue;
-		for (uint32_t i = 0; i < n; i++) count[(a[i] >> shift & 2047) + 1]++;
-		for (int k = 0; k < 2048; k++) count[k + 1] += count[k];
-		for (uint32_t i = 0; i < n; i++) {
-			const uint32_t to = count[a[i] >> shift & 2047]++;
-			b[to] = a[i];
-			y[to] = x[i];
-		}
-		uint64_t *swap = a;
-		a = b;
-		b = swap;
-		int32_t *turn = x;
-		x = y;
-		y = turn;
-	}
-	if (x != from)
-		for (uint32_t i = 0; i < n; i++) from[i] = x[i];
+/* Lists 0 .. n - 1 by bucket, in their own order within each. Those of bucket b stand in `list` from begin[b] to
+ * begin[b + 1]; whoever has a negative bucket is in none. `begin` holds n_buckets + 2 zeros at first. */
+static inline void quern_bucket(
+	uint32_t n, const int32_t *bucket, uint32_t n_buckets, uint32_t *begin, int32_t *list) {
+	for (uint32_t i = 0; i < n; i++)
+		if (bucket[i] >= 0) begin[bucket[i] + 2]++;
+	for (uint32_t b = 0; b < n_buckets; b++) begin[b + 2] += begin[b + 1];
+	for (uint32_t i = 0; i < n; i++)
+		if (bucket[i] >= 0) list[begin[bucket[i] + 1]++] = (int32_t)i;
 }
 
+enum { SORT_BITS = 11, SORT_DIGITS = 1 << SORT_BITS };
+
 /* Bytes of `work` for n keys. */
-static inline size_t quern_sort_bytes(uint32_t n) {
-	return ((size_t)n + 1) * (2 * sizeof(uint64_t) + sizeof(int32_t));
+static inline size_t quern_sort_bytes(uint32_t n) { return 3 * (size_t)n * sizeof(int32_t); }
+
+/* from[i] becomes the index of the i-th smallest key, ties in the old order. Radix by digits of 11 bits from the lowest
+ * on, and only by those in which keys differ. */
+static inline void quern_sort_order(uint32_t n, const uint64_t *key, int32_t *from, void *work) {
+	int32_t *digit = work, *list = digit + n, *before = list + n;
+	uint64_t differ = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		from[i] = (int32_t)i;
+		differ |= key[i] ^ key[0];
+	}
+	for (int shift = 0; shift < 64; shift += SORT_BITS) {
+		if (!(differ >> shift & (SORT_DIGITS - 1))) continue;
+		for (uint32_t i = 0; i < n; i++) {
+			before[i] = from[i];
+			digit[i] = (int32_t)(key[from[i]] >> shift & (SORT_DIGITS - 1));
+		}
+		uint32_t begin[SORT_DIGITS + 2] = { 0 };
+		quern_bucket(n, digit, SORT_DIGITS, begin, list);
+		for (uint32_t i = 0; i < n; i++) from[i] = before[list[i]];
+	}
 }

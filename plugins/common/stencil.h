@@ -15,18 +15,16 @@ typedef struct stencil {
 	int32_t node[STENCIL]; /* of the lowest node, in the tile */
 } stencil;
 
-/* Grains come back through a periodic face when their list is made, not before: here each is taken as the image that lies
- * in its block, wherever round-off puts the block's faces. */
+/* Grains come back through a periodic face when their list is made, not before: here each is taken as the image that
+ * lies in its block, wherever round-off puts the block's faces. */
 QUERN_INLINE void stencil_place(const quern_grid_view *g, uint32_t block, uint32_t axis, const quern_real *x,
 	const int32_t *index, uint32_t n, quern_real *restrict position) {
 	const int32_t edge = (int32_t)g->edge, begin = g->at[block][axis] * edge, rest = g->cells[axis] - begin;
-	const quern_real length = g->periodic[axis] ? g->cells[axis] * g->cell : INFINITY;
+	const quern_images images = quern_grid_images(g);
 	const quern_real middle = (begin + 0.5 * (rest < edge ? rest : edge)) * g->cell;
-	for (uint32_t i = 0; i < n; i++) {
-		const quern_real d = x[index[i]] - g->lower[axis];
-		const quern_real low = d - middle > 0.5 * length ? d - length : d;
-		position[i] = low - middle < -0.5 * length ? low + length : low;
-	}
+	for (uint32_t i = 0; i < n; i++)
+		position[i] =
+			quern_image_at(x[index[i]] - g->lower[axis], middle, images.half[axis], images.length[axis]);
 }
 
 /* x: whole columns; the particles are entries begin .. begin + n, or those that `index` names. */
@@ -122,4 +120,27 @@ QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *
 	}
 	out[0] = sum;
 	if (slopes) out[1] = sx, out[2] = sy, out[3] = sz;
+}
+
+/* ---- all blocks, where they add to nodes ---- */
+
+typedef struct stencil_blocks {
+	void (*body)(void *arg, uint32_t block, uint32_t worker);
+	void *arg;
+	const uint32_t *list; /* of one colour */
+} stencil_blocks;
+
+static inline void stencil_one_block(void *arg, uint32_t i, uint32_t worker) {
+	const stencil_blocks *all = arg;
+	all->body(all->arg, all->list[i], worker);
+}
+
+/* Colour by colour, so that no two blocks whose tiles share a node run at once, and each node sums in a fixed order. */
+static inline void stencil_by_colour(const quern_step *s, const quern_grid_view *g,
+	void (*body)(void *arg, uint32_t block, uint32_t worker), void *arg) {
+	stencil_blocks all = { body, arg, NULL };
+	for (uint32_t c = 0; c < g->n_colours; c++) {
+		all.list = g->by_colour + g->colour[c];
+		s->host->parallel(s->run, g->colour[c + 1] - g->colour[c], stencil_one_block, &all);
+	}
 }

@@ -3,10 +3,6 @@
 #pragma once
 #include <quern/solver.h>
 
-/* A row of a use table: field, unit, access, shape, and then designated members as wanted. */
-#define F(field_, unit_, access_, ...)                                                                       \
-	{ .field = field_, .unit = unit_, .access = access_, .shape = __VA_ARGS__ }
-
 /* Columns of a batch that begins at entry `first` of the whole set. */
 QUERN_INLINE quern_column quern_column_from(quern_column c, uint8_t shape, uint32_t first) {
 	if (shape == QUERN_INDEX) {
@@ -24,7 +20,8 @@ QUERN_INLINE uint32_t quern_shape_size(uint8_t shape, uint32_t dim) {
 	return (dim == 2 ? planar : spatial)[shape];
 }
 
-/* Faster than light by v, or by v times a length: what such a number stands for is not known, but its energy is none. */
+/* Faster than light by v, or by v times a length: what such a number stands for is not known, but its energy is
+ * none. */
 static inline bool quern_too_fast(const quern_real v[3], quern_real times) {
 	const quern_real light = 299792458;
 	quern_real sum = 0;
@@ -32,7 +29,15 @@ static inline bool quern_too_fast(const quern_real v[3], quern_real times) {
 	return !(sum < 1);
 }
 
-/* Brought back through a periodic face, and inside: what is less than half an ulp below `lower` would round to `upper`. */
+/* m/s^2 */
+static inline quern_real quern_gravity_size(uint32_t dim, const quern_real gravity[3]) {
+	quern_real sum = 0;
+	for (uint32_t k = 0; k < dim; k++) sum += gravity[k] * gravity[k];
+	return __builtin_sqrt(sum);
+}
+
+/* Brought back through a periodic face, and inside: what is less than half an ulp below `lower` would round to
+ * `upper`. */
 static inline quern_real quern_brought_back(quern_real x, quern_real lower, quern_real upper) {
 	x = x >= upper ? x - (upper - lower) : x;
 	x = x < lower ? x + (upper - lower) : x;

@@ -105,7 +105,8 @@ static void fill_spins(const quern_check_kernel *k, uint64_t key) {
 
 enum { WITH_SPIN = 1, WITH_ENERGY = 2, VARIANTS = 4 };
 
-/* Fields of grains stand on both sides, histories of the pair once, and the couple comes with the batch, beside the force. */
+/* Fields of grains stand on both sides, histories of the pair once, and the couple comes with the batch, beside the
+ * force. */
 static void add_uses(quern_check_kernel *k, bool optional) {
 	const quern_use *rows = k->check->uses;
 	for (uint32_t r = 0; rows[r].field && r < QUERN_MOST_USES; r++) {

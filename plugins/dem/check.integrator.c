@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* check.integrator - steps in time: free flight is exact, a constant force gives its momentum, a spring keeps its energy */
+/* check.integrator - steps in time: free flight is exact, a constant force gives its momentum, a spring keeps its
+ * energy */
 #include <math.h>
 #include <quern/check.h>
 #include <quern/integrator.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* checks - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains out of the
- * domain. docs/decisions/0015-too-deep.md */
+/* checks - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains
+ * out of the domain. docs/decisions/0015-too-deep.md */
 #include "forces.h"
 #include <math.h>
 #include <stdio.h>
@@ -44,11 +44,11 @@ static bool is_worse(const deep_contact *a, const deep_contact *b) {
 	return a->first != b->first ? a->first < b->first : a->second < b->second;
 }
 
-void quern_dem_check_contacts(
-	const forces_shared *sh, const forces_work *w, uint32_t b, int32_t body, uint32_t n) {
+void quern_dem_check_contacts(const forces_shared *sh, const forces_work *w, const contact_chunk *chunk) {
+	const uint32_t b = chunk->block;
 	const quern_real *radius = sh->use[FORCE_RADIUS].real[0];
 	const int64_t *id = sh->use[FORCE_ID].id;
-	for (uint32_t q = 0; q < n; q++) {
+	for (uint32_t q = 0; q < chunk->n; q++) {
 		const quern_real r = radius[w->first[q]], other = radius[w->second[q]], small = r < other ? r : other;
 		if (!(w->overlap[q] > sh->d->overlap_most * small)) continue;
 		quern_real f2 = 0;
@@ -57,7 +57,7 @@ void quern_dem_check_contacts(
 			.force = sqrt(f2),
 			.period = INFINITY,
 			.first = id[w->first[q]],
-			.second = body < 0 ? id[w->second[q]] : -1 - body };
+			.second = chunk->body < 0 ? id[w->second[q]] : -1 - chunk->body };
 		ask_laws(sh, &c, w->mass[q], w->radius[q]);
 		if (is_worse(&c, &sh->worst[b])) sh->worst[b] = c;
 		if (!sh->looks && is_watched(sh, &c)) sh->watched[b] = c;
@@ -103,9 +103,10 @@ static quern_status stop_deep(const forces_shared *sh, const deep_contact *c, co
 		partner, c->by, how, c->force, remedy, sh->d->overlap_most);
 }
 
-/* An impact may go deep for a while, and one contact after another may: so one is watched, the deepest at first, until it is
- * no longer deep. One that is watched for several of its own durations lasts; a centre behind a surface is enough at once.
- * What falls into place while settling bears the shock of all that falls behind it, which is over by the release. */
+/* An impact may go deep for a while, and one contact after another may: so one is watched, the deepest at first,
+ * until it is no longer deep. One that is watched for several of its own durations lasts; a centre behind a surface
+ * is enough at once. What falls into place while settling bears the shock of all that falls behind it, which is over
+ * by the release. */
 quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_column *u = sh->use;
 	deep_contact worst = { .by = 0 }, watched = { .by = 0 };

@@ -18,21 +18,15 @@ static const quern_param params[] = { QUERN_PARAM(hertz, young, "Pa", "Young's m
 		.from = "scene.speed", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_END_PARAMS };
 
-enum { SHEAR, SPIN };
-static const quern_use uses[] = { { .field = "contact.shear",
-									  .unit = "N",
-									  .doc = "Elastic tangential force; 2-D: along the normal turned left.",
-									  .access = QUERN_UPDATE,
-									  .shape = QUERN_AXIAL,
-									  .when = "friction" },
-	{ .field = "grain.spin",
-		.unit = "rad/s",
-		.doc = "Angular velocity; a frictional contact turns its grains.",
-		.access = QUERN_READ,
-		.shape = QUERN_AXIAL,
-		.flags = QUERN_OTHERS,
-		.when = "friction" },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(SHEAR, "contact.shear", "N", QUERN_UPDATE, QUERN_AXIAL, .when = "friction", \
+		.doc = "Elastic tangential force; 2-D: along the normal turned left.") \
+	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS, .when = "friction", \
+		.doc = "Angular velocity; a frictional contact turns its grains.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	hertz *law = self;
@@ -46,6 +40,14 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
+/* The kept force, laid into the tangent plane of now; in 2-D its part along the tangent (-n_y, n_x) is kept. */
+QUERN_INLINE quern_vec force_before(const int dim, const quern_contact_batch *b, quern_real *const *history,
+	uint32_t i, quern_vec n, quern_real dt) {
+	if (dim == 2) return QUERN_VALUE(quern_vec, -n.y * history[0][i], n.x * history[0][i], 0);
+	const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { history[0][i], history[1][i], history[2][i] };
+	return quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
+}
+
 QUERN_INLINE void kernel(
 	const int dim, const bool rough, const bool energy, const hertz *self, const quern_contact_batch *b) {
 	const hertz law = *self;
@@ -57,8 +59,7 @@ QUERN_INLINE void kernel(
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim);
 		const quern_real vn = quern_vec_dot(v, n, dim);
-		const bool touching = overlap[i] > 0;
-		const quern_real d = touching ? overlap[i] : 0, root = __builtin_sqrt(d);
+		const quern_real d = overlap[i] > 0 ? overlap[i] : 0, root = __builtin_sqrt(d);
 		const quern_real r = __builtin_sqrt(radius[i]), k = 4.0 / 3 * law.modulus * r, elastic = k * d * root;
 		const quern_onset onset = quern_first_touch(overlap[i], -vn, dt, 0.25);
 		/* f_n = max(0, k d^(3/2) - sqrt 5 zeta sqrt(m k) d^(1/4) v_n) */
@@ -76,17 +77,12 @@ QUERN_INLINE void kernel(
 			const quern_real shrink = kt < kt_before ? kt / (kt_before > 0 ? kt_before : 1) : 1;
 			const quern_real stiffness = 0.5 * (kt + kt_before);
 			const quern_real loss = tangential_loss * __builtin_sqrt(kt * mass[i]) * onset.weight;
-			quern_vec was, now, drag;
-			if (dim == 3) {
-				const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3),
-								old = { history[0][i], history[1][i], history[2][i] };
-				was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
-			} else was = (quern_vec) { -n.y * history[0][i], n.x * history[0][i], 0 };
+			const quern_vec was = force_before(dim, b, history, i, n, dt);
 			const quern_vec trial = quern_vec_axpy(onset.time * stiffness, vt, quern_vec_scale(shrink, was));
 			const quern_vec g = quern_vec_scale(loss, vt);
 			const quern_cone cone = quern_cone_shares(trial, g, law.friction * fn);
-			now = quern_vec_scale(touching ? cone.spring : 0, trial);
-			drag = quern_vec_scale(touching ? cone.damper : 0, g);
+			const quern_vec now = quern_vec_scale(d > 0 ? cone.spring : 0, trial);
+			const quern_vec drag = quern_vec_scale(d > 0 ? cone.damper : 0, g);
 			if (dim == 3) QUERN_VEC_PUT(history, i, now, 3);
 			else history[0][i] = n.x * now.y - n.y * now.x;
 			f = quern_vec_sub(f, quern_vec_add(now, drag));
@@ -95,7 +91,7 @@ QUERN_INLINE void kernel(
 			const quern_real held =
 				0.5 * quern_vec_dot(was, was, 3) * (kt_before > 0 ? 1 / (kt_before > 0 ? kt_before : 1) : 0);
 			const quern_real work = 0.5 * onset.time * quern_vec_dot(quern_vec_add(was, now), vt, 3);
-			rubbed = touching ? work + held - sheared : 0;
+			rubbed = d > 0 ? work + held - sheared : 0;
 		}
 		b->force[0][i] += f.x;
 		b->force[1][i] += f.y;
@@ -131,8 +127,8 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 	return contact / __builtin_sqrt(turning > 1 ? turning : 1);
 }
 
-/* sqrt 5 zeta sqrt(m k) d^(1/4) over 2 sqrt(m k_n), k_n = (3/2) k sqrt d; and 2 sqrt(5/6) zeta sqrt(k_t m) over 2 sqrt(m k_t),
- * on m/3 or m/3.5. */
+/* sqrt 5 zeta sqrt(m k) d^(1/4) over 2 sqrt(m k_n), k_n = (3/2) k sqrt d; and 2 sqrt(5/6) zeta sqrt(k_t m) over 2
+ * sqrt(m k_t), on m/3 or m/3.5. */
 static quern_real damping(const void *self, uint32_t dim) {
 	const hertz *law = self;
 	const quern_real share = 0.91287092917527686 * law->damping_ratio; /* sqrt(5/6) */

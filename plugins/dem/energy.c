@@ -1,19 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* energy - what dashpots and sliding take in every step, and what there is when somebody looks. docs/theory/contacts.md,
- * section 5.
- *
- * Forces of dashpots are added up beside all forces, since a dashpot's work is its force times the mean velocity of the
- * kick, which is known only after the sum. What sliding takes goes to the first grain of a pair, in a lane of its row. */
+/* energy - what dashpots and sliding take in every step, and what there is when somebody looks.
+ * docs/theory/contacts.md, section 5. Forces of dashpots are added up beside all forces, since a dashpot's work is
+ * its force times the mean velocity of the kick, which is known only after the sum. What sliding takes goes to the
+ * first grain of a pair, in a lane of its row. */
 #include "forces.h"
 
 /* ---- contacts ---- */
 
-void quern_dem_look(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t n,
-	uint32_t begin, uint32_t end, quern_real *sums) {
-	for (uint32_t q = 0; q < n; q++) {
+void quern_dem_look(const forces_shared *sh, const forces_work *w, const contact_chunk *c, quern_real *sums) {
+	const uint32_t begin = sh->grain[c->block], end = sh->grain[c->block + 1];
+	for (uint32_t q = 0; q < c->n; q++) {
 		const uint32_t i = (uint32_t)w->first[q];
 		const quern_real share = sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1;
-		if (held) held[w->slot[q]] = w->overlap[q] > 0 ? share * w->sheared[q] : 0;
+		if (c->held) c->held[w->slot[q]] = w->overlap[q] > 0 ? share * w->sheared[q] : 0;
 		if (i < begin || i >= end) continue;
 		sums[E_STORED] += share * w->stored[q];
 		sums[E_SHEARED] += share * w->sheared[q];
@@ -26,8 +25,8 @@ static bool is_fixed(const forces_shared *sh, uint32_t i) {
 	return sh->use[FORCE_FIXED].index && sh->use[FORCE_FIXED].index[i];
 }
 
-/* -sum F.v of the dashpots in the lanes of forces and torques, and what sliding took in its own. Four sums go side by side,
- * so that none waits for the one before. */
+/* -sum F.v of the dashpots in the lanes of forces and torques, and what sliding took in its own. Four sums go side by
+ * side, so that none waits for the one before. */
 QUERN_INLINE void lose(const forces_work *w, const int32_t *fixed, uint32_t row, uint32_t n, const int dim,
 	const bool spin, lanes8 *out) {
 	const quern_real(*restrict drag)[8] =

@@ -291,7 +291,8 @@ static quern_status refuse_two_steps(const quern_step *s) {
 		"%s acts in two steps, and the books of a hybrid take one: use symplectic_euler", integrator->id);
 }
 
-/* Grains stand for stiff ones: where their weight alone presses them into each other, the bed is too dense and too low. */
+/* Grains stand for stiff ones: where their weight alone presses them into each other, the bed is too dense and too
+ * low. */
 static void warn_of_softness(const dem *d, const quern_step *s) {
 	bool loose = false;
 	for (uint32_t i = 0; i < d->fill.n; i++) loose = loose || !((const dem_fill *)d->fill.items)[i].fixed;
@@ -321,8 +322,7 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
  * the time to fall by a diameter. */
 bool quern_dem_settled(const void *self, const quern_step *s) {
 	const dem *d = self;
-	const quern_set_view grains = s->host->set(s->run, "grain");
-	quern_real g2 = 0;
+	const cloud grains = dem_cloud(s, NULL);
 	if (!d->settles || !grains.n) return true;
 	if (s->substep % 200) return false;
 	if (s->substep >= d->settle_most) {
@@ -330,32 +330,22 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 			s->run, 2, "settling was cut off after %d steps: the grains are not at rest", d->settle_most);
 		return true;
 	}
-	for (uint32_t k = 0; k < d->dim; k++) g2 += s->gravity[k] * s->gravity[k];
-	const quern_real diameter = 2 * d->radii.mean, g = sqrt(g2), fall = 2 * sqrt(2 * diameter / g);
+	const quern_real diameter = 2 * d->radii.mean, g = quern_gravity_size(d->dim, s->gravity);
+	const quern_real fall = 2 * sqrt(2 * diameter / g);
 	if ((quern_real)s->substep * s->dt < fall) return false;
-	const quern_real *mass = s->use[FILL_MASS].real[0];
-	const int32_t *fixed = s->use[FILL_FIXED].index;
-	quern_real *energy = s->host->memory(s->run, ((size_t)grains.n + 1) * sizeof(quern_real));
-	quern_real moving = 0;
-	if (!energy) return false;
-	for (uint32_t i = 0; i < grains.n; i++) {
-		quern_real v2 = 0;
-		if (fixed && fixed[i]) continue;
-		moving += mass[i];
-		for (uint32_t k = 0; k < d->dim; k++)
-			v2 += s->use[FILL_VELOCITY].real[k][i] * s->use[FILL_VELOCITY].real[k][i];
-		energy[i] = 0.5 * mass[i] * v2;
-	}
-	const quern_real mean = s->host->sum(s->run, grains.n, energy);
-	return mean <= d->rest * moving * g * diameter;
+	cloud_sums c;
+	quern_real moving = 0, energy = 0;
+	if (!cloud_open(&c, s->host, s->run, &grains)) return false;
+	for (uint32_t i = 0; i < grains.n; i++) moving += c.mass[i];
+	CLOUD_ADD(&c, i, 0.5 * cloud_square(&s->use[FILL_VELOCITY], i, s->dim), energy);
+	return energy <= d->rest * moving * g * diameter;
 }
 
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */
 quern_real quern_dem_settling(const void *self, const quern_step *s) {
 	const dem *d = self;
-	quern_real g2 = 0;
-	for (uint32_t k = 0; k < d->dim; k++) g2 += s->gravity[k] * s->gravity[k];
-	if (!d->settles || !(g2 > 0) || !(s->dt > 0)) return 0;
-	const quern_real steps = 4 * sqrt((d->height + 2 * d->radii.mean) / sqrt(g2)) / s->dt;
+	const quern_real g = quern_gravity_size(d->dim, s->gravity);
+	if (!d->settles || !(g > 0) || !(s->dt > 0)) return 0;
+	const quern_real steps = 4 * sqrt((d->height + 2 * d->radii.mean) / g) / s->dt;
 	return steps < d->settle_most ? steps : d->settle_most;
 }

@@ -131,11 +131,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 		const uint32_t n = grains.block[b + 1] - grains.block[b];
 		sh->most_grains = n > sh->most_grains ? n : sh->most_grains;
 	}
-	for (uint32_t k = 0; k < 3; k++) {
-		const bool periodic = k < s->dim && s->periodic[k];
-		sh->length[k] = periodic ? s->upper[k] - s->lower[k] : 0;
-		sh->half[k] = periodic ? 0.5 * sh->length[k] : INFINITY;
-	}
+	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
 	sh->impulse =
 		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * 3 * sizeof(quern_real));
 	sh->sums = s->host->memory(s->run, (size_t)grains.n_blocks * N_ENERGIES * sizeof(quern_real));
@@ -179,8 +175,7 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 static quern_status lost(const forces_shared *sh, int32_t i) {
 	const quern_column *u = sh->use;
 	const quern_step *s = sh->s;
-	quern_real v2 = 0;
-	for (uint32_t k = 0; k < s->dim; k++) v2 += u[FORCE_VELOCITY].real[k][i] * u[FORCE_VELOCITY].real[k][i];
+	const quern_real v2 = cloud_square(&u[FORCE_VELOCITY], (uint32_t)i, s->dim);
 	const char *law = sh->n_laws ? s->slot[SLOT_CONTACT][0].id : "gravity";
 	quern_real turn2 = 0;
 	for (uint32_t k = 0; k < (s->dim == 3 ? 3u : 1u) && sh->spin; k++)

@@ -2,25 +2,25 @@
 /* forces - what the parts of the force stage share: pairs of grains, grains on bodies, integration */
 #pragma once
 #include "dem.h"
-#include <quern/vec.h>
+#include <quern/space.h>
 
 enum { GRAINS = 128 }; /* integrated at once */
-enum { N_GRAIN_COLUMNS = 34 };
+/* what is kept of each: up to three columns from here on */
 enum {
 	G_FORCE,
 	G_TORQUE = 3,
 	G_MASS = 6,
 	G_INERTIA,
-	G_POSITION,
-	G_MEAN = 17,
-	G_MEAN_SPIN = 20,
-	G_WAY = 23,
-	G_NEW_POSITION = 25,
-	G_NEW_VELOCITY = 28,
-	G_NEW_SPIN = 31
+	G_MEAN,
+	G_MEAN_SPIN = 11,
+	G_WAY = 14,
+	G_NEW_POSITION = 16,
+	G_NEW_VELOCITY = 19,
+	G_NEW_SPIN = 22,
+	N_GRAIN_COLUMNS = 25
 };
-/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in 3-D
- * have a row of their own. */
+/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in
+ * 3-D have a row of their own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
@@ -45,8 +45,7 @@ typedef struct forces_shared {
 	bool books;    /* losses of this step are booked */
 	bool looks;    /* nothing moves: forces and energies of the state as it is */
 	bool starts;   /* losses will be booked from now on: what springs hold is noted */
-	quern_real half[3],
-		length[3]; /* periodic: half the domain's length and the length; infinite and 0 otherwise */
+	quern_images images;
 	const uint32_t *grain, *contact, *touch; /* partitions */
 	quern_real *impulse;  /* [block][body + 1][dim]: on the material, by bodies and by fixed grains */
 	quern_real *sums;     /* [block][N_ENERGIES] */
@@ -75,73 +74,41 @@ typedef struct forces_work {
 	quern_real *own[QUERN_MOST_USES][9]; /* of the integrator, while nothing moves */
 } forces_work;
 
+/* A chunk of the list of contacts, or of that of touches on one body. */
+typedef struct contact_chunk {
+	uint32_t block;
+	int32_t body;               /* the one touched, or -1 */
+	uint32_t begin, n_slots, n; /* entries begin .. begin + n_slots of the list, of which n are looked at */
+	quern_real *held;           /* by slot: what springs held in the last step; NULL: nobody asks */
+} contact_chunk;
+
 /* Adds what the contacts of block b do to its rows, and to its energies. */
 void quern_dem_pairs(const forces_shared *, forces_work *, uint32_t b, quern_real *sums);
 void quern_dem_touches(const forces_shared *, forces_work *, uint32_t b, quern_real *sums);
 /* Moves the grains of block b. */
 void quern_dem_integrate(const forces_shared *, forces_work *, uint32_t b, quern_real *sums);
 
-/* ---- laws.c: shared by pairs and touches ---- */
+/* ---- contacts.c ---- */
+/* Of a chunk whose geometry and motion are known. */
+void quern_dem_act(const forces_shared *, forces_work *, const contact_chunk *, quern_real *sums);
+/* What springs hold, by entry of the list from `begin` on, if anybody asks. */
+quern_real *quern_dem_held(const forces_shared *, int row, uint32_t begin);
+/* ---- laws.c ---- */
 bool quern_dem_is_history(const quern_use *);
-/* Calls all laws for n contacts, whose slots are places from `begin` on in the list; `body`: the one touched, or -1. What
- * was left out of the n_slots forgets, what was kept remembers. */
-void quern_dem_call_laws(
-	const forces_shared *, forces_work *, int32_t body, uint32_t begin, uint32_t n_slots, uint32_t n);
-/* Adds couples to the rows of the grains first .. last, from `lane` on; a partner outside goes to the spare row. */
-void quern_dem_add_couples(const forces_shared *, const forces_work *, quern_real (*row)[8], uint32_t lane,
-	quern_real *const couple[3], int32_t body, uint32_t first, uint32_t last, uint32_t n);
-/* Stores what the pairs kept were given, such as their force; the others get zero. */
-void quern_dem_keep(const forces_work *, quern_real *const given[3], quern_column out, uint32_t components,
-	uint32_t begin, uint32_t n_slots, uint32_t n);
+/* Calls all laws; contacts that were left out forget, those that were kept remember. */
+void quern_dem_call_laws(const forces_shared *, forces_work *, const contact_chunk *);
 /* ---- checks.c ---- */
 void quern_dem_decide_checks(forces_shared *);
-void quern_dem_check_contacts(
-	const forces_shared *, const forces_work *, uint32_t b, int32_t body, uint32_t n);
+void quern_dem_check_contacts(const forces_shared *, const forces_work *, const contact_chunk *);
 void quern_dem_check_grains(const forces_shared *, uint32_t b);
 quern_status quern_dem_judge_contacts(const forces_shared *, uint32_t n_blocks);
 quern_status quern_dem_judge_grains(const forces_shared *, uint32_t n_blocks);
 
-/* ---- energy.c: `begin` and `end` are the block's grains; of a pair across blocks the first grain's block keeps the books ---- */
-/* What n contacts hold; by slot in `held`, if that is not NULL. */
-void quern_dem_look(const forces_shared *, const forces_work *, quern_real *held, uint32_t n, uint32_t begin,
-	uint32_t end, quern_real *sums);
+/* ---- energy.c ---- */
+/* What contacts hold; of a pair across blocks the first grain's block keeps the books. */
+void quern_dem_look(const forces_shared *, const forces_work *, const contact_chunk *, quern_real *sums);
 /* What dashpots and sliding have taken from n grains. */
 void quern_dem_lose(
 	const forces_shared *, const forces_work *, uint32_t begin, uint32_t row, uint32_t n, quern_real *sums);
 /* What n grains have. */
 void quern_dem_have(const forces_shared *, const forces_work *, uint32_t begin, uint32_t n, quern_real *sums);
-
-/* What sliding takes of n contacts, with their weights, and what springs give up that have opened since the last step: no
- * law sees that. The springs' energy is kept in `held`, by slot, which may be NULL. */
-QUERN_INLINE void dem_rub(const forces_work *w, const quern_real *weight, quern_real *held, uint32_t n) {
-	const quern_real *restrict overlap = w->overlap, *restrict sheared = w->sheared;
-	const int32_t *restrict slot = w->slot;
-	quern_real *restrict rubbed = w->rubbed, *restrict kept = held;
-	for (uint32_t q = 0; q < n && weight; q++) rubbed[q] *= weight[q];
-	if (!held) return;
-	QUERN_SIMD
-	for (uint32_t q = 0; q < n; q++) {
-		const quern_real before = kept[slot[q]], now = weight ? weight[q] * sheared[q] : sheared[q];
-		rubbed[q] += overlap[q] > 0 ? 0 : before;
-		kept[slot[q]] = overlap[q] > 0 ? now : 0;
-	}
-}
-
-/* Torque over lever: -(n x f), for the first and the second alike. */
-QUERN_INLINE void dem_torques(
-	const forces_work *w, quern_real *const force[3], quern_real *const out[3], uint32_t n, const int dim) {
-	const quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
-	const quern_real *restrict fx = force[0], *restrict fy = force[1], *restrict fz = force[2];
-	quern_real *restrict tx = out[0], *restrict ty = out[1], *restrict tz = out[2];
-	if (dim == 2) {
-		QUERN_SIMD
-		for (uint32_t q = 0; q < n; q++) tx[q] = ny[q] * fx[q] - nx[q] * fy[q];
-	} else {
-		QUERN_SIMD
-		for (uint32_t q = 0; q < n; q++) {
-			tx[q] = nz[q] * fy[q] - ny[q] * fz[q];
-			ty[q] = nx[q] * fz[q] - nz[q] * fx[q];
-			tz[q] = ny[q] * fx[q] - nx[q] * fy[q];
-		}
-	}
-}

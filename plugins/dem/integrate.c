@@ -25,7 +25,7 @@ static void check_grains(
 	const quern_column *u = sh->use;
 	const quern_real *restrict radius = u[FORCE_RADIUS].real[0] + begin;
 	const quern_real dt = sh->s->dt;
-	quern_real farthest = sh->farthest[b], worst = 0;
+	quern_real farthest = sh->farthest[b];
 	quern_real *restrict way = w->grains[G_WAY], *restrict fast = w->grains[G_WAY + 1];
 	memset(way, 0, n * sizeof(quern_real));
 	memset(fast, 0, n * sizeof(quern_real));
@@ -41,11 +41,11 @@ static void check_grains(
 			fast[i] += v[i] * v[i];
 		}
 	}
-	/* an unordered comparison is what finds a NaN; it then stays in `worst` */
+	/* an unordered comparison finds a NaN too */
 	for (uint32_t i = 0; i < n; i++) {
 		const quern_real step = fast[i] * dt * dt, most = radius[i] * radius[i];
 		farthest = way[i] > farthest ? way[i] : farthest;
-		if (!(step <= most) && !(worst > 0)) worst = 1, sh->bad[b] = (int32_t)(begin + i);
+		if (!(step <= most) && sh->bad[b] < 0) sh->bad[b] = (int32_t)(begin + i);
 	}
 	sh->farthest[b] = farthest;
 }
@@ -54,7 +54,7 @@ static void load_grains(
 	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t row, uint32_t n) {
 	const quern_column *u = sh->use;
 	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
-	const quern_real *weight = u[FORCE_WEIGHT].real[0], turning = dem_inertia(dim);
+	const quern_real *weight = u[FORCE_WEIGHT].real[0], turning = quern_radius_inertia(dim);
 	for (uint32_t i = 0; i < n; i++) {
 		const quern_real m = (weight ? weight[begin + i] : 1) * u[FORCE_MASS].real[0][begin + i];
 		const quern_real r = u[FORCE_RADIUS].real[0][begin + i];

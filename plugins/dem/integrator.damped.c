@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* integrator.damped - for coming to rest: symplectic Euler with a drag and a local damping. docs/theory/grains.md, section 6 */
+/* integrator.damped - for coming to rest: symplectic Euler with a drag and a local damping. docs/theory/grains.md,
+ * section 6 */
 #include <quern/integrator.h>
 
 typedef struct {

@@ -8,34 +8,20 @@ typedef struct {
 } verlet;
 static const quern_param params[] = { QUERN_END_PARAMS };
 
-enum { ACCELERATION, SPIN_ACCELERATION, OPEN_ACCELERATION, OPEN_SPIN_ACCELERATION };
 /* Of a new grain no acceleration is known: NaN. Its first step moves it with its velocity and kicks it once, which
  * costs an error of second order, once. */
-static const quern_use uses[] = { { .field = "grain.acceleration",
-									  .unit = "m/s^2",
-									  .doc = "Of the last step, gravity included; NaN: not known yet.",
-									  .access = QUERN_UPDATE,
-									  .shape = QUERN_VECTOR,
-									  .initial = __builtin_nan("") },
-	{ .field = "grain.spin_acceleration",
-		.unit = "rad/s^2",
-		.doc = "Of the last step; NaN: not known yet.",
-		.access = QUERN_UPDATE,
-		.shape = QUERN_AXIAL,
-		.with = "grain.spin",
-		.initial = __builtin_nan("") },
-	{ .field = "grain.acceleration",
-		.unit = "m/s^2",
-		.access = QUERN_READ,
-		.shape = QUERN_VECTOR,
-		.hook = QUERN_INTEGRATOR_OPEN },
-	{ .field = "grain.spin_acceleration",
-		.unit = "rad/s^2",
-		.access = QUERN_READ,
-		.shape = QUERN_AXIAL,
-		.with = "grain.spin",
-		.hook = QUERN_INTEGRATOR_OPEN },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(ACCELERATION, "grain.acceleration", "m/s^2", QUERN_UPDATE, QUERN_VECTOR, .initial = __builtin_nan(""), \
+		.doc = "Of the last step, gravity included; NaN: not known yet.") \
+	X(SPIN_ACCELERATION, "grain.spin_acceleration", "rad/s^2", QUERN_UPDATE, QUERN_AXIAL, .with = "grain.spin", \
+		.initial = __builtin_nan(""), .doc = "Of the last step; NaN: not known yet.") \
+	X(OPEN_ACCELERATION, "grain.acceleration", "m/s^2", QUERN_READ, QUERN_VECTOR, .hook = QUERN_INTEGRATOR_OPEN) \
+	X(OPEN_SPIN_ACCELERATION, "grain.spin_acceleration", "rad/s^2", QUERN_READ, QUERN_AXIAL, .with = "grain.spin", \
+		.hook = QUERN_INTEGRATOR_OPEN)
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 /* x += dt v + dt^2 a / 2; v becomes the prediction v + dt a. */
 QUERN_INLINE void open(const int dim, const quern_integrator_batch *b) {

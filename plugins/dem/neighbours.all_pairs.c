@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* neighbours.all_pairs - every pair is looked at: the reference that faster searches are held against */
 #include <quern/neighbours.h>
+#include <quern/space.h>
 
 typedef struct {
 	int32_t unused;
@@ -17,6 +18,7 @@ static size_t keys(const void *self, const quern_neighbour_job *job, uint64_t *k
 static uint32_t pairs(
 	const void *self, const quern_neighbour_job *job, uint32_t b, uint32_t cap, quern_pair *out) {
 	const uint32_t begin = job->block[b], end = job->block[b + 1];
+	const quern_images images = quern_images_of(job->dim, job->lower, job->upper, job->periodic);
 	uint32_t n = 0;
 	(void)self;
 	for (uint32_t i = begin; i < end; i++)
@@ -24,9 +26,8 @@ static uint32_t pairs(
 			quern_real d2 = 0;
 			if (k >= begin && k <= i) continue; /* inside the block each pair comes once */
 			for (uint32_t a = 0; a < job->dim; a++) {
-				const quern_real length = job->upper[a] - job->lower[a];
-				quern_real d = job->position[a][i] - job->position[a][k];
-				if (job->periodic[a]) d = d > 0.5 * length ? d - length : d < -0.5 * length ? d + length : d;
+				const quern_real d =
+					quern_image(job->position[a][i] - job->position[a][k], images.half[a], images.length[a]);
 				d2 += d * d;
 			}
 			const quern_real reach = job->radius[i] + job->radius[k] + job->reach;

@@ -81,8 +81,8 @@ static quern_status sort_grains(listing *l) {
 
 /* ---- pairs ---- */
 
-/* One of the two passes of a sort by two numbers: by the id of the second grains, then, keeping that order among equals,
- * of the first. */
+/* One of the two passes of a sort by two numbers: by the id of the second grains, then, keeping that order among
+ * equals, of the first. */
 static void sort_by_id(const listing *l, quern_pair *pair, uint32_t n, bool second, uint64_t *memory) {
 	uint64_t *key = memory, *work = key + n;
 	int32_t *from = (int32_t *)(void *)(work + quern_sort_bytes(n) / sizeof *work + 1);
@@ -93,8 +93,8 @@ static void sort_by_id(const listing *l, quern_pair *pair, uint32_t n, bool seco
 	for (uint32_t i = 0; i < n; i++) pair[i] = copy[from[i]];
 }
 
-/* The first of a pair is the one of lower id, for ever. In the order of ids, every grain adds up its forces in the order
- * of its partners' ids: sums have the same bits for any search, in whatever order it keeps the grains. */
+/* The first of a pair is the one of lower id, for ever. In the order of ids, every grain adds up its forces in the
+ * order of its partners' ids: sums have the same bits for any search, in whatever order it keeps the grains. */
 static bool sort_pairs(const listing *l, quern_pair *pair, uint32_t n, uint32_t worker) {
 	const size_t bytes = quern_sort_bytes(n) + (n + 2) * (sizeof(uint64_t) + sizeof(int32_t) + sizeof *pair);
 	uint64_t *memory = l->s->host->scratch(l->s->run, worker, bytes);
@@ -130,9 +130,7 @@ static quern_status index_old(listing *l, const char *set, const int32_t *first,
 	uint32_t *bucket = s->host->memory(s->run, ((size_t)n_grains + 2) * sizeof(uint32_t));
 	int32_t *entry = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
 	if (!bucket || !entry) return QUERN_E_MEMORY;
-	for (uint32_t k = 0; k < n; k++) bucket[first[k] + 2]++;
-	for (uint32_t i = 0; i < n_grains; i++) bucket[i + 2] += bucket[i + 1];
-	for (uint32_t k = 0; k < n; k++) entry[bucket[first[k] + 1]++] = (int32_t)k;
+	quern_bucket(n, first, n_grains, bucket, entry);
 	l->bucket = bucket;
 	l->entry = entry;
 	l->old_first = first;
@@ -233,7 +231,8 @@ static uint32_t find_features(const listing *l, const quern_bound *body, uint32_
 	return ops->features(body->self, &still, x, l->job.radius[i] + l->job.reach, MOST_FEATURES, w->feature);
 }
 
-/* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too many. */
+/* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too
+ * many. */
 static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, const uint32_t *to) {
 	const quern_step *s = l->s;
 	uint32_t n = 0;

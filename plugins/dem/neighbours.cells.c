@@ -3,6 +3,7 @@
  * docs/theory/grains.md, section 4 */
 #include <math.h>
 #include <quern/neighbours.h>
+#include <quern/space.h>
 
 typedef struct {
 	int32_t unused;
@@ -49,9 +50,8 @@ static layout layout_of(const quern_neighbour_job *job) {
 }
 
 static uint32_t cell_along(const layout *l, const quern_neighbour_job *job, uint32_t a, uint32_t i) {
-	const quern_real t = (job->position[a][i] - l->lower[a]) * l->inverse[a];
-	const uint32_t c = t > 0 ? (uint32_t)t : 0;
-	return c < l->count[a] ? c : l->count[a] - 1;
+	const int32_t c = quern_cell_along(job->position[a][i], l->lower[a], l->inverse[a]);
+	return (uint32_t)quern_cell_held(c, (int32_t)l->count[a]);
 }
 
 static size_t keys(const void *self, const quern_neighbour_job *job, uint64_t *key) {
@@ -108,11 +108,9 @@ static uint32_t pairs(
 	const layout *l = job->memory;
 	const uint32_t(*range)[2] = (const uint32_t(*)[2])(const void *)(l + 1);
 	const uint32_t begin = job->block[b], end = job->block[b + 1];
-	quern_real length[3] = { 0 };
+	const quern_images images = quern_images_of(job->dim, job->lower, job->upper, job->periodic);
 	uint32_t n = 0;
 	(void)self;
-	for (uint32_t a = 0; a < job->dim; a++)
-		length[a] = job->periodic[a] ? job->upper[a] - job->lower[a] : INFINITY;
 	for (uint32_t i = begin; i < end; i++) {
 		uint32_t near[3][3], count[3];
 		for (uint32_t a = 0; a < 3; a++)
@@ -126,9 +124,8 @@ static uint32_t pairs(
 						if (k >= begin && k <= i) continue;
 						quern_real d2 = 0;
 						for (uint32_t a = 0; a < job->dim; a++) {
-							quern_real d = job->position[a][i] - job->position[a][k];
-							d = d > 0.5 * length[a] ? d - length[a] : d;
-							d = d < -0.5 * length[a] ? d + length[a] : d;
+							const quern_real d = quern_image(
+								job->position[a][i] - job->position[a][k], images.half[a], images.length[a]);
 							d2 += d * d;
 						}
 						const quern_real reach = job->radius[i] + job->radius[k] + job->reach;

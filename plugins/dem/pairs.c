@@ -1,29 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* pairs - contacts between grains of one block: distance test, laws, sums in list order */
+/* pairs - contacts between grains of one block: the distance test, geometry and motion */
 #include "forces.h"
 
-/* Half a periodic domain's length and the length; infinity and zero where it is not periodic. */
-typedef struct {
-	quern_vec half, length;
-} period;
-
-static period period_of(const forces_shared *sh) {
-	return (period) { { sh->half[0], sh->half[1], sh->half[2] },
-		{ sh->length[0], sh->length[1], sh->length[2] } };
-}
-
-QUERN_INLINE quern_real image(quern_real d, quern_real half, quern_real length) {
-	d = d > half ? d - length : d;
-	return d < -half ? d + length : d;
-}
-
-QUERN_INLINE quern_vec nearest(quern_vec d, period p, const int dim) {
-	return (quern_vec) { image(d.x, p.half.x, p.length.x), image(d.y, p.half.y, p.length.y),
-		dim == 3 ? image(d.z, p.half.z, p.length.z) : 0 };
-}
-
-/* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what it
- * held is booked. */
+/* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what
+ * it held is booked. */
 QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n,
 	const quern_real *held, const int dim) {
 	const quern_column at = sh->use[FORCE_OLD_POSITION];
@@ -33,14 +13,14 @@ QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t 
 																			sh->use[FORCE_SECOND].index +
 																			begin;
 	const quern_real reach = sh->d->reach;
-	const period p = period_of(sh);
+	const quern_images p = sh->images;
 	int32_t *restrict near = w->slot;
 	uint32_t kept = 0;
 	QUERN_SIMD
 	for (uint32_t k = 0; k < n; k++) {
 		const int32_t i = first[k], j = second[k];
 		const quern_vec d =
-			nearest((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
+			quern_vec_image((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
 		const quern_real most = radius[i] + radius[j] + reach;
 		near[k] = (quern_vec_dot(d, d, dim) < most * most);
 	}
@@ -63,7 +43,7 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	const quern_real *restrict x = at.real[0], *restrict y = at.real[1], *restrict z = at.real[2];
 	const quern_real *restrict radius = sh->use[FORCE_RADIUS].real[0];
 	const int32_t *restrict first = w->first, *restrict second = w->second;
-	const period p = period_of(sh);
+	const quern_images p = sh->images;
 	quern_real *restrict overlap = w->overlap, *restrict effective = w->radius;
 	quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
 	quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
@@ -71,7 +51,7 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	for (uint32_t q = 0; q < n; q++) {
 		const int32_t i = first[q], j = second[q];
 		const quern_vec d =
-			nearest((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
+			quern_vec_image((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
 		const quern_real ri = radius[i], rj = radius[j];
 		const quern_real length = __builtin_sqrt(quern_vec_dot(d, d, dim)),
 						 one_over = length > 0 ? 1 / length : 0;
@@ -148,108 +128,19 @@ static void masses(const forces_shared *sh, const forces_work *w, uint32_t n) {
 		}
 }
 
-/* ---- sums ---- */
-/* The row of a grain of the block; a partner outside has the spare row. */
-QUERN_INLINE uint32_t row_of(int32_t grain, uint32_t begin, uint32_t end) {
-	const uint32_t i = (uint32_t)grain - begin;
-	return i < end - begin ? i : end - begin;
-}
-
-QUERN_INLINE void add_2d(
-	const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin, const bool weighted) {
-	for (uint32_t q = 0; q < n; q++) {
-		quern_real *i = w->row[row_of(w->first[q], begin, end)],
-				   *j = w->row[row_of(w->second[q], begin, end)];
-		const quern_real share = weighted ? w->weight[q] : 1;
-		const quern_real x = share * w->force[0][q], y = share * w->force[1][q],
-						 t = spin ? share * w->torque[0][q] : 0;
-		i[0] += x, i[1] += y;
-		j[0] -= x, j[1] -= y;
-		if (spin) i[2] += w->arm[0][q] * t, j[2] += w->arm[1][q] * t;
-	}
-}
-
-/* The same, with what dashpots give in the lanes behind, and what sliding takes, which has its weight already. */
-QUERN_INLINE void add_books_2d(
-	const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin, const bool weighted) {
-	static const lanes8 lever = { 0, 0, 1, 0, 0, 1, 0, 0 }, plain = { 1, 1, 0, 1, 1, 0, 1, 0 },
-						against = { -1, -1, 0, -1, -1, 0, 0, 0 }, all = { 1, 1, 1, 1, 1, 1, 0, 0 },
-						own = { 0, 0, 0, 0, 0, 0, 1, 0 };
-	for (uint32_t q = 0; q < n; q++) {
-		quern_real *i = w->row[row_of(w->first[q], begin, end)],
-				   *j = w->row[row_of(w->second[q], begin, end)];
-		const lanes8 f = { w->force[0][q], w->force[1][q], spin ? w->torque[0][q] : 0, w->dashpot[0][q],
-			w->dashpot[1][q], spin ? w->drag_torque[0][q] : 0, w->rubbed[q], 0 };
-		const lanes8 given = weighted ? (w->weight[q] * all + own) * f : f;
-		*(lanes8 *)(void *)i += (plain + w->arm[0][q] * lever) * given;
-		*(lanes8 *)(void *)j += (against + w->arm[1][q] * lever) * given;
-	}
-}
-
-QUERN_INLINE void add_3d(const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin,
-	const bool weighted, const bool books) {
-	static const lanes8 lever = { 0, 0, 0, 1, 1, 1, 0, 0 }, plain = { 1, 1, 1, 0, 0, 0, 0, 0 },
-						own = { 0, 0, 0, 0, 0, 0, 1, 0 };
-	for (uint32_t q = 0; q < n; q++) {
-		const uint32_t i = row_of(w->first[q], begin, end), j = row_of(w->second[q], begin, end);
-		const quern_real share = weighted ? w->weight[q] : 1;
-		const lanes8 to_first = share * (plain + w->arm[0][q] * lever),
-					 to_second = share * (w->arm[1][q] * lever - plain);
-		const lanes8 f = { w->force[0][q], w->force[1][q], w->force[2][q], spin ? w->torque[0][q] : 0,
-			spin ? w->torque[1][q] : 0, spin ? w->torque[2][q] : 0, 0, 0 };
-		*(lanes8 *)(void *)w->row[i] += to_first * f;
-		*(lanes8 *)(void *)w->row[j] += to_second * f;
-		if (!books) continue;
-		const lanes8 d = { w->dashpot[0][q], w->dashpot[1][q], w->dashpot[2][q],
-			spin ? w->drag_torque[0][q] : 0, spin ? w->drag_torque[1][q] : 0, spin ? w->drag_torque[2][q] : 0,
-			w->rubbed[q], 0 };
-		*(lanes8 *)(void *)w->drag_row[i] += (to_first + own) * d;
-		*(lanes8 *)(void *)w->drag_row[j] += to_second * d;
-	}
-}
-
-QUERN_INLINE void add_pairs(const forces_work *w, uint32_t first, uint32_t last, uint32_t n, const int dim,
-	const bool spin, const bool weighted, const bool books) {
-	if (dim == 3) add_3d(w, first, last, n, spin, weighted, books);
-	else if (books) add_books_2d(w, first, last, n, spin, weighted);
-	else add_2d(w, first, last, n, spin, weighted);
-}
-
-/* Forces and torques to the grains of a block, and with them, if they are booked, losses. */
-QUERN_INLINE void add_all(const forces_shared *sh, const forces_work *w, quern_real *held, uint32_t first,
-	uint32_t last, uint32_t n, const int dim, const bool spin) {
-	const quern_real *weight = sh->use[FORCE_WEIGHT].real[0] ? w->weight : NULL;
-	if (spin) dem_torques(w, w->force, w->torque, n, dim);
-	if (sh->books && spin) dem_torques(w, w->dashpot, w->drag_torque, n, dim);
-	if (sh->books) dem_rub(w, weight, held, n);
-	if (sh->books && weight) add_pairs(w, first, last, n, dim, spin, true, true);
-	else if (sh->books) add_pairs(w, first, last, n, dim, spin, false, true);
-	else if (weight) add_pairs(w, first, last, n, dim, spin, true, false);
-	else add_pairs(w, first, last, n, dim, spin, false, false);
-	if (!spin || !sh->couple) return;
-	quern_dem_add_couples(sh, w, w->row, (uint32_t)dim, w->couple, -1, first, last, n);
-	if (sh->books)
-		quern_dem_add_couples(sh, w, dim == 2 ? w->row : w->drag_row, dim == 2 ? LANE_DRAG + 2 : 3,
-			w->drag_couple, -1, first, last, n);
-}
-
 QUERN_INLINE void block(
 	const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums, const int dim, const bool spin) {
-	const uint32_t first = sh->grain[b], last = sh->grain[b + 1];
 	for (uint32_t begin = sh->contact[b], end = sh->contact[b + 1]; begin < end; begin += sh->cap) {
-		const uint32_t n_slots = end - begin < sh->cap ? end - begin : sh->cap;
-		quern_real *held = sh->use[FORCE_CONTACT_SHEARED].real[0];
-		held = held && (sh->books || sh->starts) ? held + begin : NULL;
-		const uint32_t n = compact(sh, w, begin, n_slots, held, dim);
-		geometry(sh, w, n, dim);
-		motion(sh, w, n, dim, spin);
-		masses(sh, w, n);
-		quern_dem_call_laws(sh, w, -1, begin, n_slots, n);
-		if (sh->deep) quern_dem_check_contacts(sh, w, b, -1, n);
-		add_all(sh, w, held, first, last, n, dim, spin);
-		quern_dem_keep(w, w->force, sh->use[FORCE_CONTACT], (uint32_t)dim, begin, n_slots, n);
-		quern_dem_keep(w, w->couple, sh->use[FORCE_CONTACT_COUPLE], dim == 3 ? 3 : 1, begin, n_slots, n);
-		if (sh->looks) quern_dem_look(sh, w, held, n, first, last, sums);
+		contact_chunk c = { .block = b,
+			.body = -1,
+			.begin = begin,
+			.n_slots = end - begin < sh->cap ? end - begin : sh->cap,
+			.held = quern_dem_held(sh, FORCE_CONTACT_SHEARED, begin) };
+		c.n = compact(sh, w, begin, c.n_slots, c.held, dim);
+		geometry(sh, w, c.n, dim);
+		motion(sh, w, c.n, dim, spin);
+		masses(sh, w, c.n);
+		quern_dem_act(sh, w, &c, sums);
 	}
 }
 

@@ -110,93 +110,11 @@ static const quern_slot slots[] = {
 	{ .name = NULL }
 };
 
-#define DISPLACEMENT                                                                                         \
-	F("total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY,                            \
-		.doc = "Farthest way of a grain since the last list; infinite: the list is stale.")
-#define FIXED(access)                                                                                        \
-	F("grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed",                        \
-		.doc = "1: it does not move.")
-
-static const quern_use fill_uses[] = { F("grain.position", "m", QUERN_WRITE, QUERN_VECTOR,
-										   .flags = QUERN_SHOWN, .doc = "Centre."),
-	F("grain.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."),
-	F("grain.radius", "m", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, .doc = "Radius."),
-	F("grain.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted."),
-	F("grain.spin", "rad/s", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL, .doc = "Angular velocity."),
-	F("grain.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1,
-		.doc = "Share of its mass that the grain carries."),
-	FIXED(QUERN_WRITE),
-	F("grain.id", "1", QUERN_WRITE, QUERN_ID, .flags = QUERN_SHOWN, .doc = "Number of the grain, for ever."),
-	DISPLACEMENT, QUERN_END_USES };
-static const quern_use open_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL),
-	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), FIXED(QUERN_READ), DISPLACEMENT, QUERN_END_USES };
-/* positions are brought back through periodic faces in place, all of them before anybody looks at others */
-static const quern_use near_uses[] = { F("grain.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),
-	F("grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS), FIXED(QUERN_READ), DISPLACEMENT,
-	F("grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made."),
-	F("contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of lower id."),
-	F("contact.second", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain of higher id."),
-	F("touch.grain", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain."),
-	F("touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body."),
-	F("touch.feature", "1", QUERN_WRITE, QUERN_INDEX, .when = "features",
-		.doc = "The body's face, edge or vertex."),
-	QUERN_END_USES };
-#define ENERGY(name, access, text)                                                                           \
-	F("total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, .doc = text)
-/* What a look at the forces takes too, without moving anything. */
-#define FORCE_USES(moves, gives)                                                                             \
-	F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                               \
-		F("grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS),                         \
-		F("grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL),           \
-		F("grain.position", "m", moves, QUERN_VECTOR), F("grain.velocity", "m/s", moves, QUERN_VECTOR),      \
-		F("grain.spin", "rad/s", moves, QUERN_AXIAL, .flags = QUERN_OPTIONAL),                               \
-		F("grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                             \
-		F("grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS),                              \
-		F("grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL),            \
-		FIXED(QUERN_READ), F("contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),              \
-		F("contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                \
-		F("touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain"),                                   \
-		F("touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body"),                                     \
-		F("touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features"),                                \
-		F("contact.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                \
-			.doc = "On the first, unweighted."),                                                             \
-		F("touch.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
-			.doc = "On the grain, unweighted."),                                                             \
-		F("contact.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                              \
-			.doc = "On the first, unweighted."),                                                             \
-		F("touch.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL,                                \
-			.doc = "On the grain, unweighted."),                                                             \
-		F("grain.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                                  \
-			.doc = "Of all contacts, weighted; without gravity."),                                           \
-		F("contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED,                       \
-			.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step."),         \
-		F("touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, .with = "total.rubbed", \
-			.doc = "In the tangential spring, weighted, at the last step."),                                 \
-		F("grain.id", "1", QUERN_READ, QUERN_ID)
-static const quern_use force_uses[] = { FORCE_USES(QUERN_UPDATE, QUERN_WRITE),
-	F("grain.anchor", "m", QUERN_READ, QUERN_VECTOR), DISPLACEMENT,
-	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED),
-	F("total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED,
-		.doc = "Impulse that fixed grains have given to moving ones."),
-	ENERGY("damped", QUERN_UPDATE, "Lost in dashpots so far."),
-	ENERGY("rubbed", QUERN_UPDATE, "Lost to sliding so far."),
-	F("total.trembling", "1", QUERN_UPDATE, QUERN_INDEX,
-		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0."),
-	F("total.deep_first", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", .initial = -1,
-		.doc = "Id of the grain whose deep contact is watched; -1: none is."),
-	F("total.deep_second", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
-		.doc = "Id of its partner; -1 - k for body k."),
-	F("total.deep_time", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most",
-		.doc = "For how long the contact has been deep."),
-	QUERN_END_USES };
-static const quern_use observe_uses[] = { FORCE_USES(QUERN_READ, QUERN_UPDATE),
-	ENERGY("kinetic", QUERN_WRITE, "Of the grains, with the velocity in the middle of a kick."),
-	ENERGY("potential", QUERN_WRITE, "Of the grains, -m g x."),
-	ENERGY("stored", QUERN_WRITE, "In normal springs."),
-	ENERGY("sheared", QUERN_WRITE, "In tangential springs."), QUERN_END_USES };
+static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
+static const quern_use open_uses[] = QUERN_USE_ROWS(OPEN_USES);
+static const quern_use near_uses[] = QUERN_USE_ROWS(NEAR_USES);
+static const quern_use force_uses[] = QUERN_USE_ROWS(FORCE_USES);
+static const quern_use observe_uses[] = QUERN_USE_ROWS(OBSERVE_USES);
 
 static const quern_stage stages[] = { { .name = "dem.fill",
 										  .doc = "Places the first grains.",
@@ -245,7 +163,6 @@ static quern_status refuse_settling(const dem *d, const quern_setup *setup, quer
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	dem *d = self;
-	quern_real g2 = 0;
 	fill_height loose = fill_height_of(setup);
 	d->dim = setup->dim;
 	d->radii.stream = setup->stream;
@@ -274,10 +191,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (!d->fill.n && !d->place.n && !d->file)
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
 	if (d->file) d->fixed = true; /* its header may say so */
-	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
-	if (d->settles && !(g2 > 0))
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = 2 * d->radii.mean;
+	if (d->settles && !(gravity > 0))
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
-	const quern_real gravity = sqrt(g2), diameter = 2 * d->radii.mean;
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
 	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
@@ -322,15 +238,15 @@ static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	dem *d = self;
-	quern_real kn = 0, most = 0, g2 = 0;
+	quern_real kn = 0, most = 0;
 	if (d->settles && !n_slot[SLOT_CONTACT])
 		return refuse_settling(d, setup, err, "without a contact law grains fall for ever: give contact one");
 	d->features = false;
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
-	for (uint32_t k = 0; k < setup->dim; k++) g2 += setup->gravity[k] * setup->gravity[k];
-	const quern_real pressure = packing * d->density * sqrt(g2) * d->height;
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
+	const quern_real pressure = packing * d->density * gravity * d->height;
 	const quern_real force = pressure * diameter * (d->dim == 3 ? diameter : 1);
 	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
 		const quern_bound *law = &slot[SLOT_CONTACT][l];
@@ -362,8 +278,8 @@ typedef struct {
 	uint32_t others; /* laws beside that one */
 } contact_limit;
 
-/* The fastest mode of a packing: a grain has several contacts. omega_max^2 = 6 k/m of a triangular lattice and 8 k/m of a
- * face-centred one are 3 and 4 times that of a pair. */
+/* The fastest mode of a packing: a grain has several contacts. omega_max^2 = 6 k/m of a triangular lattice and 8 k/m
+ * of a face-centred one are 3 and 4 times that of a pair. */
 static quern_real crowding(uint32_t dim) { return dim == 2 ? 1.7320508075688772 : 2; }
 
 /* All laws together: stiffnesses add up, and so do the squares of frequencies; damping coefficients too. */
@@ -412,29 +328,44 @@ static void say_limit(
 		by_period ? " / 50" : "", damped);
 }
 
+typedef struct {
+	quern_real mass[2],
+		radius; /* of the two lightest, the second infinite if there is one alone; of the lightest */
+} lightest;
+
+/* Before there are grains, what the distribution may bring. */
+static lightest lightest_grains(const dem *d, const quern_step *s) {
+	const uint32_t n = s->host->set(s->run, "grain").n;
+	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
+	const int32_t *fixed = s->use[FILL_FIXED].index;
+	lightest l = { { INFINITY, INFINITY }, INFINITY };
+	for (uint32_t i = 0; i < n; i++) {
+		if (fixed && fixed[i]) continue;
+		if (mass[i] < l.mass[0]) l.mass[1] = l.mass[0], l.mass[0] = mass[i], l.radius = radius[i];
+		else if (mass[i] < l.mass[1]) l.mass[1] = mass[i];
+	}
+	if (isfinite(l.mass[0])) return l;
+	l.radius = quern_radius_least(&d->radii);
+	l.mass[0] = l.mass[1] = quern_radius_mass(l.radius, d->density, d->dim);
+	return l;
+}
+
+static contact_limit limit_of_pair(const quern_step *s, const lightest *l) {
+	const bool two = isfinite(l->mass[1]);
+	const quern_real pair = two ? l->mass[0] * l->mass[1] / (l->mass[0] + l->mass[1]) : l->mass[0];
+	contact_limit c = limit_of(s, pair, 0.5 * l->radius, -1);
+	c.where = two ? "between the two lightest grains" : "on the lightest grain";
+	return c;
+}
+
 /* The stiffest contact is that of the two lightest grains, or of the lightest against a body. */
 static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	const dem *d = self;
-	const quern_set_view grains = s->host->set(s->run, "grain");
-	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
-	const int32_t *fixed = s->use[FILL_FIXED].index;
-	quern_real least[2] = { INFINITY, INFINITY }, small = INFINITY;
-	for (uint32_t i = 0; i < grains.n; i++) {
-		if (fixed && fixed[i]) continue;
-		if (mass[i] < least[0]) least[1] = least[0], least[0] = mass[i], small = radius[i];
-		else if (mass[i] < least[1]) least[1] = mass[i];
-	}
-	if (!isfinite(least[0])) { /* none yet: what the distribution may bring */
-		small = quern_radius_least(&d->radii);
-		least[0] = least[1] = quern_radius_mass(small, d->density, d->dim);
-	}
-	const bool two = isfinite(least[1]);
-	const quern_real pair = two ? least[0] * least[1] / (least[0] + least[1]) : least[0];
-	contact_limit fast = limit_of(s, pair, 0.5 * small, -1);
-	fast.where = two ? "between the two lightest grains" : "on the lightest grain";
-	contact_limit first = fast; /* to fail when the step grows */
+	const lightest l = lightest_grains(d, s);
+	contact_limit fast = limit_of_pair(s, &l),
+				  first = fast; /* the shortest; the first to fail when the step grows */
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
-		const contact_limit c = limit_of(s, least[0], small, (int32_t)b);
+		const contact_limit c = limit_of(s, l.mass[0], l.radius, (int32_t)b);
 		if (c.period < fast.period) fast = c;
 		if (c.hard < first.hard) first = c;
 	}
@@ -451,35 +382,19 @@ static const quern_output sums[] = { ACCOUNT_ROWS,
 	{ .name = "discrete", .unit = "kg", .doc = "Carried by grains." }, { .name = NULL } };
 
 static void account(const void *self, const quern_step *s, quern_real *out) {
-	const dem *d = self;
-	const quern_set_view grains = s->host->set(s->run, "grain");
 	const quern_column *use = s->use;
-	const quern_real *mass = use[FILL_MASS].real[0], *weight = use[FILL_WEIGHT].real[0],
-					 *radius = use[FILL_RADIUS].real[0];
-	const int32_t *fixed = use[FILL_FIXED].index;
-	const uint32_t n_spin = d->dim == 3 ? 3 : 1;
-	quern_real *sum = s->host->memory(s->run, ((size_t)grains.n + 1) * 6 * sizeof(quern_real));
-	if (!sum || !grains.n) return;
-	const size_t n = grains.n;
-	for (size_t i = 0; i < n; i++) {
-		const quern_real m = (fixed && fixed[i] ? 0 : 1) * (weight ? weight[i] : 1) * mass[i];
-		quern_real v2 = 0, w2 = 0, height = 0;
-		for (uint32_t k = 0; k < d->dim; k++) {
-			const quern_real v = use[FILL_VELOCITY].real[k][i];
-			v2 += v * v;
-			height -= s->gravity[k] * use[FILL_POSITION].real[k][i];
-			sum[(1 + k) * n + i] = m * v;
-		}
-		for (uint32_t k = 0; use[FILL_SPIN].real[0] && k < n_spin; k++)
-			w2 += use[FILL_SPIN].real[k][i] * use[FILL_SPIN].real[k][i];
-		sum[i] = m;
-		sum[4 * n + i] = 0.5 * m * (v2 + dem_inertia(d->dim) * radius[i] * radius[i] * w2);
-		sum[5 * n + i] = m * height;
-	}
-	out[SUM_MASS] = out[SUM_DISCRETE] = s->host->sum(s->run, n, sum);
-	for (uint32_t k = 0; k < d->dim; k++) out[SUM_MOMENTUM + k] = s->host->sum(s->run, n, sum + (1 + k) * n);
-	out[SUM_KINETIC] = s->host->sum(s->run, n, sum + 4 * n);
-	out[SUM_POTENTIAL] = s->host->sum(s->run, n, sum + 5 * n);
+	const cloud grains = dem_cloud(s, use[FILL_WEIGHT].real[0]);
+	const quern_real *radius = use[FILL_RADIUS].real[0], turning = quern_radius_inertia(s->dim);
+	const uint32_t n_spin = !use[FILL_SPIN].real[0] ? 0 : s->dim == 3 ? 3 : 1;
+	cloud_sums c;
+	(void)self;
+	if (!grains.n || !cloud_open(&c, s->host, s->run, &grains)) return;
+	cloud_account(&c, &use[FILL_POSITION], &use[FILL_VELOCITY], s, out);
+	out[SUM_DISCRETE] += cloud_total(&c);
+	CLOUD_ADD(&c, i,
+		0.5 * (cloud_square(&use[FILL_VELOCITY], i, s->dim) +
+				  turning * radius[i] * radius[i] * cloud_square(&use[FILL_SPIN], i, n_spin)),
+		out[SUM_KINETIC]);
 }
 
 /* Radii become numbers of cells too. A fixed grain may be a floor as wide as the domain, and rounder. */

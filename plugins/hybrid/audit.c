@@ -10,33 +10,18 @@ typedef struct {
 	quern_real speed, kinetic; /* sums of w m |v| and w m v^2/2 */
 } sums;
 
-typedef struct {
-	const quern_column *velocity, *mass, *weight;
-	const int32_t *fixed;
-	uint32_t n;
-} cloud;
-
-static bool add_cloud(const quern_step *s, const cloud *c, sums *out) {
-	const uint32_t dim = s->dim;
-	const size_t n = c->n;
-	quern_real *work = s->host->memory(s->run, (n + 1) * 6 * sizeof(quern_real));
-	if (!work) return false;
-	for (size_t i = 0; i < n; i++) {
-		const quern_real m = (c->fixed && c->fixed[i] ? 0 : 1) * c->weight->real[0][i] * c->mass->real[0][i];
-		quern_real v2 = 0;
-		for (uint32_t k = 0; k < dim; k++) {
-			const quern_real v = c->velocity->real[k][i];
-			work[(1 + k) * n + i] = m * v;
-			v2 += v * v;
-		}
-		work[i] = m;
-		work[4 * n + i] = m * sqrt(v2);
-		work[5 * n + i] = 0.5 * m * v2;
+static bool add_cloud(const quern_step *s, const cloud *of, const quern_column *velocity, sums *out) {
+	quern_real *square = s->host->memory(s->run, ((size_t)of->n + 1) * sizeof(quern_real));
+	cloud_sums c;
+	if (!square || !cloud_open(&c, s->host, s->run, of)) return false;
+	out->carried += cloud_total(&c);
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real *v = velocity->real[k];
+		CLOUD_ADD(&c, i, v[i], out->momentum[k]);
 	}
-	out->carried += s->host->sum(s->run, n, work);
-	for (uint32_t k = 0; k < dim; k++) out->momentum[k] += s->host->sum(s->run, n, work + (1 + k) * n);
-	out->speed += s->host->sum(s->run, n, work + 4 * n);
-	out->kinetic += s->host->sum(s->run, n, work + 5 * n);
+	for (uint32_t i = 0; i < of->n; i++) square[i] = cloud_square(velocity, i, s->dim);
+	CLOUD_ADD(&c, i, sqrt(square[i]), out->speed);
+	CLOUD_ADD(&c, i, 0.5 * square[i], out->kinetic);
 	return true;
 }
 
@@ -52,12 +37,13 @@ static quern_real impulse(const quern_step *s, uint32_t axis) {
 static bool take_sums(const quern_step *s, sums *out) {
 	const quern_column *u = s->use;
 	const size_t cells = s->host->set(s->run, "cell").n;
-	const cloud clouds[2] = { { &u[A_GRAIN_VELOCITY], &u[A_GRAIN_MASS], &u[A_GRAIN_WEIGHT],
-								  u[A_GRAIN_FIXED].index, s->host->set(s->run, "grain").n },
-		{ &u[A_POINT_VELOCITY], &u[A_POINT_MASS], &u[A_POINT_WEIGHT], NULL,
-			s->host->set(s->run, "point").n } };
-	for (int c = 0; c < 2; c++)
-		if (!add_cloud(s, &clouds[c], out)) return false;
+	const cloud grains = { u[A_GRAIN_MASS].real[0], u[A_GRAIN_WEIGHT].real[0], u[A_GRAIN_FIXED].index,
+		s->host->set(s->run, "grain").n };
+	const cloud points = { u[A_POINT_MASS].real[0], u[A_POINT_WEIGHT].real[0], NULL,
+		s->host->set(s->run, "point").n };
+	if (!add_cloud(s, &grains, &u[A_GRAIN_VELOCITY], out) ||
+		!add_cloud(s, &points, &u[A_POINT_VELOCITY], out))
+		return false;
 	out->mass = out->carried + s->host->sum(s->run, cells, u[A_GRAIN_OWED].real[0]) +
 				s->host->sum(s->run, cells, u[A_POINT_OWED].real[0]);
 	for (uint32_t k = 0; k < s->dim; k++)
@@ -66,8 +52,8 @@ static bool take_sums(const quern_step *s, sums *out) {
 	return true;
 }
 
-/* A leak shows in the step that makes it. What adds up over a run is also the round-off of every v += g dt, which has the
- * same sign for long: half a unit in the last place for each grain step is allowed on top. */
+/* A leak shows in the step that makes it. What adds up over a run is also the round-off of every v += g dt, which has
+ * the same sign for long: half a unit in the last place for each grain step is allowed on top. */
 static quern_status judge_momentum(const quern_step *s, const sums *now) {
 	const quern_column *u = s->use;
 	quern_real off = 0, leak = 0, pull = 0;

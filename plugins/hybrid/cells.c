@@ -1,65 +1,32 @@
 /* SPDX-License-Identifier: MIT */
 /* cells - who is in which cell, and what cells hold on average */
 #include "../common/cover.h"
+#include "../common/sort.h"
 #include "update.h"
 #include <math.h>
 #include <string.h>
 
 enum { N = QUERN_BLOCK_CELLS };
 
-bool quern_hybrid_cell(const update *d, uint32_t entry, int32_t cell[3]) {
-	const uint32_t edge = d->g->edge, k = entry % N, b = entry / N;
-	const uint32_t place[3] = { k % edge, k / edge % edge, d->g->dim == 3 ? k / (edge * edge) : 0 };
-	bool inside = true;
-	for (uint32_t a = 0; a < 3; a++) {
-		cell[a] = a < d->g->dim ? d->g->at[b][a] * (int32_t)edge + (int32_t)place[a] : 0;
-		inside = inside && cell[a] < d->g->cells[a];
-	}
-	return inside;
-}
-
 void quern_hybrid_centre(const update *d, const int32_t cell[3], quern_real x[3]) {
 	for (uint32_t a = 0; a < 3; a++) x[a] = a < d->g->dim ? d->g->lower[a] + (cell[a] + 0.5) * d->g->cell : 0;
-}
-
-int32_t quern_hybrid_entry(const update *d, int32_t cell[3]) {
-	for (uint32_t k = 0; k < d->g->dim; k++) {
-		const int32_t n = d->g->cells[k];
-		if (d->g->periodic[k]) cell[k] = (cell[k] % n + n) % n;
-		if (cell[k] < 0 || cell[k] >= n) return -2;
-	}
-	return quern_grid_entry(d->g, cell);
-}
-
-int32_t quern_hybrid_number(const update *d, const int32_t cell[3]) {
-	return (cell[2] * d->g->cells[1] + cell[1]) * d->g->cells[0] + cell[0];
 }
 
 int32_t quern_hybrid_beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]) {
 	memcpy(out, cell, 3 * sizeof(int32_t));
 	out[axis] += step;
-	return quern_hybrid_entry(d, out);
+	return quern_grid_entry_back(d->g, out);
 }
 
 /* ---- sorting ---- */
 
-static int32_t cell_of(const update *d, quern_real *const x[3], uint32_t i) {
-	const quern_real at[3] = { x[0][i], x[1][i], d->g->dim == 3 ? x[2][i] : 0 };
+/* Entry of the cell that entry i of a set lies in; a point on an upper wall belongs to the last cell. */
+static int32_t cell_of(const update *d, quern_real *const x[3], uint32_t i, quern_grid_cursor *last) {
+	quern_real at[3];
 	int32_t cell[3];
-	if (!quern_grid_cell_at(d->g, at, cell)) /* a point on the upper wall belongs to the last cell */
-		for (uint32_t k = 0; k < d->g->dim; k++) {
-			cell[k] = cell[k] < 0 ? 0 : cell[k];
-			cell[k] = cell[k] < d->g->cells[k] ? cell[k] : d->g->cells[k] - 1;
-		}
-	return quern_grid_entry(d->g, cell);
-}
-
-static void bucket(uint32_t n, const int32_t *cell, uint32_t n_cells, uint32_t *begin, int32_t *list) {
-	for (uint32_t i = 0; i < n; i++)
-		if (cell[i] >= 0) begin[cell[i] + 2]++;
-	for (uint32_t c = 0; c < n_cells; c++) begin[c + 1] += begin[c];
-	for (uint32_t i = 0; i < n; i++)
-		if (cell[i] >= 0) list[begin[cell[i] + 1]++] = (int32_t)i;
+	quern_grid_position(d->g, x, i, at);
+	quern_grid_cell_inside(d->g, at, cell);
+	return quern_grid_entry_near(d->g, last, cell);
 }
 
 static void *take(update *d, size_t count, size_t size) {
@@ -68,18 +35,13 @@ static void *take(update *d, size_t count, size_t size) {
 	return memory;
 }
 
-static bool owes(const quern_column *u, int mass, int momentum, uint32_t dim, uint32_t k) {
-	bool any = u[mass].real[0][k] != 0;
-	for (uint32_t a = 0; a < dim; a++) any = any || u[momentum].real[a][k] != 0;
-	return any;
-}
-
-/* Blocks whose cells owe or are owed something stay, wherever the material has gone. */
+/* Blocks of whose cells something is owed to a cloud stay, wherever the material has gone. */
 static bool holds(const void *arg, uint32_t block) {
 	const quern_step *s = arg;
+	const quern_column *u = s->use;
 	for (uint32_t k = block * N; k < (block + 1) * N; k++)
-		if (owes(s->use, U_GRAIN_OWED, U_GRAIN_OWED_MOMENTUM, s->dim, k) ||
-			owes(s->use, U_POINT_OWED, U_POINT_OWED_MOMENTUM, s->dim, k))
+		if (quern_hybrid_is_owed(u[U_GRAIN_OWED].real[0], u[U_GRAIN_OWED_MOMENTUM].real, k, s->dim) ||
+			quern_hybrid_is_owed(u[U_POINT_OWED].real[0], u[U_POINT_OWED_MOMENTUM].real, k, s->dim))
 			return true;
 	return false;
 }
@@ -95,6 +57,7 @@ quern_status quern_hybrid_sort(update *d) {
 	if (status != QUERN_OK) return status;
 	d->g = s->host->grid(s->run);
 	d->u = s->use;
+	d->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
 	d->n_cells = d->g->n_blocks * N;
 	d->n_grains = s->host->set(s->run, "grain").n;
 	d->n_points = s->host->set(s->run, "point").n;
@@ -114,18 +77,20 @@ quern_status quern_hybrid_sort(update *d) {
 	for (uint32_t k = 0; k < s->dim; k++) d->velocity[k] = take(d, d->n_cells, sizeof(quern_real));
 	if (d->failed) return QUERN_E_MEMORY;
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
+	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < d->n_grains; i++)
-		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i);
-	for (uint32_t i = 0; i < d->n_points; i++) d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i);
-	bucket(d->n_grains, d->grain_cell, d->n_cells, d->grain_begin, d->grain);
-	bucket(d->n_points, d->point_cell, d->n_cells, d->point_begin, d->point);
+		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i, &last);
+	for (uint32_t i = 0; i < d->n_points; i++)
+		d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i, &last);
+	quern_bucket(d->n_grains, d->grain_cell, d->n_cells, d->grain_begin, d->grain);
+	quern_bucket(d->n_points, d->point_cell, d->n_cells, d->point_begin, d->point);
 	return QUERN_OK;
 }
 
 /* ---- averages ---- */
 
 static void add_particle(
-	const update *d, uint32_t c, quern_real m, quern_real *const v[3], int32_t i, quern_real *second) {
+	const update *d, uint32_t c, quern_real m, quern_real *const v[3], uint32_t i, quern_real *second) {
 	quern_real v2 = 0;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		d->velocity[k][c] += m * v[k][i];
@@ -138,19 +103,18 @@ static void add_particle(
 /* Mass, mean velocity and its spread of both clouds together, with the weights as they are. */
 void quern_hybrid_averages(update *d) {
 	const quern_column *u = d->u;
+	const cloud grains = moving_grains(d->s), points = all_points(d->s);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		quern_real second = 0, square = 0;
 		d->mass[c] = d->spread[c] = 0;
 		for (uint32_t k = 0; k < d->s->dim; k++) d->velocity[k][c] = 0;
 		for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
-			const int32_t i = d->grain[q];
-			add_particle(d, c, u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i],
-				u[U_GRAIN_VELOCITY].real, i, &second);
+			const uint32_t i = (uint32_t)d->grain[q];
+			add_particle(d, c, cloud_mass(&grains, i), u[U_GRAIN_VELOCITY].real, i, &second);
 		}
 		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-			const int32_t i = d->point[q];
-			add_particle(d, c, u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i],
-				u[U_POINT_VELOCITY].real, i, &second);
+			const uint32_t i = (uint32_t)d->point[q];
+			add_particle(d, c, cloud_mass(&points, i), u[U_POINT_VELOCITY].real, i, &second);
 		}
 		if (!(d->mass[c] > 0)) continue;
 		for (uint32_t k = 0; k < d->s->dim; k++) {
@@ -186,12 +150,13 @@ static void spread_grain(const update *d, uint32_t i, quern_real times, quern_re
 									 to = at + half < low + h ? at + half : low + h;
 					part *= to > from ? to - from : 0;
 				}
-				const int32_t c = quern_hybrid_entry(d, cell);
+				const int32_t c = quern_grid_entry_back(d->g, cell);
 				if (c >= 0) out[c] += times * (part / volume);
 			}
 }
 
-/* Fixed grains are walls: as densely as they may lie, they leave no room. Where nothing moves between them nothing will. */
+/* Fixed grains are walls: as densely as they may lie, they leave no room. Where nothing moves between them nothing
+ * will. */
 void quern_hybrid_fixed(update *d) {
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
 	quern_real *taken = fixed ? take(d, d->n_cells, sizeof(quern_real)) : NULL;
@@ -205,8 +170,8 @@ void quern_hybrid_fixed(update *d) {
 	}
 }
 
-/* Of the room that bodies and fixed grains leave. A cell with a tenth of the mass that fills it in points is full: so is what
- * points stand for. */
+/* Of the room that bodies and fixed grains leave. A cell with a tenth of the mass that fills it in points is full: so
+ * is what points stand for. */
 void quern_hybrid_fractions(update *d) {
 	const quern_column *u = d->u;
 	quern_real *fraction = u[U_FRACTION].real[0];
@@ -223,19 +188,19 @@ void quern_hybrid_fractions(update *d) {
 	}
 }
 
-/* The share of a cell's hat in which there can be contacts: bodies and fixed grains hold none. What lies behind a face of the domain is
- * sampled before it. */
+/* The share of a cell's hat in which there can be contacts: bodies and fixed grains hold none. What lies behind a
+ * face of the domain is sampled before it. */
 static quern_real room_of(const update *d, uint32_t c) {
 	const int depth = d->s->dim == 3 ? 1 : 0;
 	int32_t cell[3];
 	quern_real room = 0;
 	const bool alone = d->wall[c] >= 2 * d->g->cell && !d->u[U_GRAIN_FIXED].index;
-	if (alone || !quern_hybrid_cell(d, c, cell)) return 1;
+	if (alone || !quern_grid_cell_of(d->g, c, cell)) return 1;
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
 				const int32_t i =
-					quern_hybrid_entry(d, (int32_t[3]) { cell[0] + x, cell[1] + y, cell[2] + z });
+					quern_grid_entry_back(d->g, (int32_t[3]) { cell[0] + x, cell[1] + y, cell[2] + z });
 				const quern_real part =
 					(x ? 0.125 : 0.75) * (y ? 0.125 : 0.75) * (depth ? z ? 0.125 : 0.75 : 1);
 				room += part * (i >= 0 ? d->open[i] : 1);
@@ -296,7 +261,7 @@ void quern_hybrid_rates(update *d) {
 	if (!rate && !inertial) return;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
-		const bool there = quern_hybrid_cell(d, c, cell) && d->mass[c] > 0;
+		const bool there = quern_grid_cell_of(d->g, c, cell) && d->mass[c] > 0;
 		const quern_real shear = there ? shear_rate(d, cell) : 0;
 		if (rate) rate[c] = shear;
 		if (!inertial) continue;
@@ -311,7 +276,7 @@ static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 	int32_t cell[3], other[3];
 	quern_real length = 0;
 	n[0] = n[1] = n[2] = 0;
-	if (!quern_hybrid_cell(d, c, cell)) return;
+	if (!quern_grid_cell_of(d->g, c, cell)) return;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		const int32_t up = quern_hybrid_beside(d, cell, k, 1, other),
 					  down = quern_hybrid_beside(d, cell, k, -1, other);
@@ -323,8 +288,9 @@ static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 
 static void put_normals(
 	const update *d, uint32_t n, const quern_column *x, const quern_column *out, quern_real (*normal)[3]) {
+	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < n && out->real[0]; i++) {
-		const int32_t c = cell_of(d, x->real, i);
+		const int32_t c = cell_of(d, x->real, i, &last);
 		for (uint32_t k = 0; k < d->s->dim; k++) out->real[k][i] = c < 0 ? 0 : normal[c][k];
 	}
 }
@@ -342,11 +308,12 @@ quern_status quern_hybrid_normals(update *d) {
 
 static void put_homes(
 	const update *d, uint32_t n, const quern_column *x, const int32_t *fixed, int32_t *home) {
+	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < n; i++) {
-		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i);
+		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i, &last);
 		int32_t cell[3];
 		home[i] = -1;
-		if (c >= 0 && quern_hybrid_cell(d, (uint32_t)c, cell)) home[i] = quern_hybrid_number(d, cell);
+		if (c >= 0 && quern_grid_cell_of(d->g, (uint32_t)c, cell)) home[i] = quern_grid_number(d->g, cell);
 	}
 }
 

@@ -27,7 +27,7 @@ static quern_real waiting(const enriching *e) {
 }
 
 /* Half a grain over would never be paid back: a grain is placed while more than all of it is owed. */
-static bool owes(const enriching *e) {
+static bool is_owed(const enriching *e) {
 	return e->rest > grain_share(e->d->zone[e->c]) * mass_of(e->d->h, waiting(e));
 }
 
@@ -63,7 +63,7 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	e->rest -= g->weight * mass_of(d->h, g->radius);
 	e->draws++;
 	d->failed = d->failed || e->placer.failed;
-	return !d->failed && owes(e);
+	return !d->failed && is_owed(e);
 }
 
 /* ---- the motion of the flow around ---- */
@@ -73,15 +73,13 @@ typedef struct {
 	quern_real way[3];
 } surroundings;
 
-static void look_at(const update *d, const quern_column *x, const quern_column *v, quern_real mass, int32_t i,
-	const quern_real at[3], surroundings *sum) {
+static void look_at(const update *d, const quern_column *x, const quern_column *v, quern_real mass,
+	uint32_t i, const quern_real at[3], surroundings *sum) {
 	const uint32_t dim = d->s->dim;
 	const quern_real inverse = 1 / d->h->diameter;
 	quern_real r[3] = { 0 }, r2 = 0;
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real length = d->s->upper[k] - d->s->lower[k];
-		r[k] = x->real[k][i] - at[k];
-		if (d->s->periodic[k]) r[k] -= length * floor(r[k] / length + 0.5);
+		r[k] = quern_image(x->real[k][i] - at[k], d->images.half[k], d->images.length[k]);
 		r2 += r[k] * r[k] * inverse * inverse;
 	}
 	if (r2 > 36) return;
@@ -96,15 +94,14 @@ static void look_at(const update *d, const quern_column *x, const quern_column *
 
 static void look_into(const update *d, uint32_t c, const quern_real at[3], surroundings *sum) {
 	const quern_column *u = d->u;
+	const cloud grains = moving_grains(d->s), points = all_points(d->s);
 	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
-		const int32_t i = d->grain[q];
-		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY],
-			u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i], i, at, sum);
+		const uint32_t i = (uint32_t)d->grain[q];
+		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY], cloud_mass(&grains, i), i, at, sum);
 	}
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const int32_t i = d->point[q];
-		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY],
-			u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i], i, at, sum);
+		const uint32_t i = (uint32_t)d->point[q];
+		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY], cloud_mass(&points, i), i, at, sum);
 	}
 }
 
@@ -120,7 +117,7 @@ static void look_around(const update *d, const quern_real at[3], surroundings *s
 	for (int32_t z = low[2]; z <= high[2]; z++)
 		for (int32_t y = low[1]; y <= high[1]; y++)
 			for (int32_t x = low[0]; x <= high[0]; x++) {
-				const int32_t c = quern_hybrid_entry(d, (int32_t[3]) { x, y, z });
+				const int32_t c = quern_grid_entry_back(d->g, (int32_t[3]) { x, y, z });
 				if (c >= 0) look_into(d, (uint32_t)c, at, sum);
 			}
 }
@@ -189,7 +186,7 @@ static void enrich_cell(enriching *e, uint32_t c) {
 	e->c = c;
 	e->rest = d->u[U_GRAIN_OWED].real[0][c];
 	e->first = d->n_new_grains;
-	if (!owes(e) || !quern_hybrid_cell(d, c, cell)) return;
+	if (!is_owed(e) || !quern_grid_cell_of(d->g, c, cell)) return;
 	for (uint32_t k = 0; k < 3; k++) {
 		e->lower[k] = k < d->s->dim ? d->g->lower[k] + cell[k] * d->g->cell : 0;
 		e->upper[k] = k < d->s->dim ? e->lower[k] + d->g->cell : 0;
@@ -197,7 +194,7 @@ static void enrich_cell(enriching *e, uint32_t c) {
 	quern_pack_job job = { .dim = d->s->dim,
 		.stream = d->h->radii.stream + 1,
 		.host = d->s->host,
-		.key = (uint64_t)quern_hybrid_number(d, cell),
+		.key = (uint64_t)quern_grid_number(d->g, cell),
 		.counter = (uint64_t)d->u[U_UPDATES].index[0] << 32,
 		.seed = e->seed,
 		.radius = job_radius,
@@ -247,7 +244,7 @@ quern_status quern_hybrid_grains(update *d) {
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		e.c = c;
 		e.rest = d->u[U_GRAIN_OWED].real[0][c];
-		any = any || (d->zone[c] == QUERN_HYBRID && owes(&e));
+		any = any || (d->zone[c] == QUERN_HYBRID && is_owed(&e));
 	}
 	if (!any) return QUERN_OK;
 	d->failed = d->failed || !place_obstacles(&e);

@@ -1,37 +1,27 @@
 /* SPDX-License-Identifier: MIT */
 /* gain - motion that nobody has given: docs/theory/hybrid.md, section 5 */
 #include "../common/symmetric.h"
-#include "hybrid.h"
+#include "contacts.h"
 #include <math.h>
 
-/* A spring that stiffens holds less than half of force times overlap, and the tangential one about as much again. Pairs across
- * blocks stand in both. */
+/* A spring that stiffens holds less than half of force times overlap, and the tangential one about as much again. */
 static quern_real in_contacts(const quern_step *s) {
-	const quern_column *u = s->use;
-	const quern_set_view contacts = s->host->set(s->run, "contact"), grains = s->host->set(s->run, "grain");
+	const contact_list list = contacts_of(s, A_FORCE, A_FIRST, A_SECOND, A_GRAIN_POSITION);
+	const quern_real *radius = s->use[A_GRAIN_RADIUS].real[0];
 	quern_real sum = 0;
-	for (uint32_t b = 0; b < contacts.n_blocks; b++)
-		for (uint32_t q = contacts.block[b]; q < contacts.block[b + 1]; q++) {
-			const int32_t i = u[A_FIRST].index[q], j = u[A_SECOND].index[q];
-			quern_real distance2 = 0, force2 = 0;
-			if (i < (int32_t)grains.block[b] || i >= (int32_t)grains.block[b + 1]) continue;
-			for (uint32_t k = 0; k < s->dim; k++) {
-				const quern_real length = s->upper[k] - s->lower[k], f = u[A_FORCE].real[k][q];
-				quern_real x = u[A_GRAIN_POSITION].real[k][i] - u[A_GRAIN_POSITION].real[k][j];
-				if (s->periodic[k]) x -= length * floor(x / length + 0.5);
-				distance2 += x * x;
-				force2 += f * f;
-			}
-			const quern_real overlap =
-				u[A_GRAIN_RADIUS].real[0][i] + u[A_GRAIN_RADIUS].real[0][j] - sqrt(distance2);
-			if (overlap > 0) sum += sqrt(force2) * overlap;
+	contact_seen c;
+	for (uint32_t b = 0; b < list.contacts.n_blocks; b++)
+		for (uint32_t q = list.contacts.block[b]; q < list.contacts.block[b + 1]; q++) {
+			if (!contact_at(&list, b, q, &c)) continue;
+			const quern_real overlap = radius[c.first] + radius[c.second] - sqrt(c.distance2);
+			if (overlap > 0) sum += sqrt(c.force2) * overlap;
 		}
 	return sum;
 }
 
 static quern_real in_spins(const quern_step *s) {
 	const quern_column *u = s->use;
-	const quern_real share = s->dim == 2 ? 0.25 : 0.2;
+	const quern_real share = 0.5 * quern_radius_inertia(s->dim);
 	quern_real sum = 0;
 	for (uint32_t i = 0; u[A_GRAIN_SPIN].real[0] && i < s->host->set(s->run, "grain").n; i++) {
 		const quern_real r = u[A_GRAIN_RADIUS].real[0][i],
@@ -62,16 +52,15 @@ static quern_real in_points(const quern_step *s) {
 
 quern_real quern_hybrid_held(const quern_step *s) { return in_contacts(s) + in_spins(s) + in_points(s); }
 
-/* Bodies that stand still do no work, contacts and the coupling take energy. Twice what there can be, since a conversion may
- * make some; what lifts all by a diameter, since steps within their limits keep energy about as well as that; and, where
- * nothing pulls, what round-off moves: a millionth of a diameter in a step. */
+/* Bodies that stand still do no work, contacts and the coupling take energy. Twice what there can be, since a
+ * conversion may make some; what lifts all by a diameter, since steps within their limits keep energy about as well
+ * as that; and, where nothing pulls, what round-off moves: a millionth of a diameter in a step. */
 quern_status quern_hybrid_judge_gain(
 	const hybrid *h, const quern_step *s, quern_real kinetic, quern_real carried) {
 	const quern_real had = s->use[A_ENERGY].real[0][0], work = s->use[A_WORK].real[0][0];
 	const quern_real still = 1e-6 * h->diameter / s->dt;
-	quern_real g2 = 0;
-	for (uint32_t k = 0; k < s->dim; k++) g2 += s->gravity[k] * s->gravity[k];
-	const quern_real slack = carried * (h->gain * sqrt(g2) * h->diameter + 0.5 * still * still);
+	const quern_real lift = h->gain * quern_gravity_size(s->dim, s->gravity) * h->diameter;
+	const quern_real slack = carried * (lift + 0.5 * still * still);
 	if (!(h->gain > 0) || kinetic <= 2 * (had + fmax(work, 0)) + slack) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 		"grains and points move with %.3g J, though they had %.3g J at first and gravity has given %.3g J "

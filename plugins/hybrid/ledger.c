@@ -25,10 +25,14 @@ static void shift(entry e, uint32_t to, entry from, uint32_t c, uint32_t dim) {
 	}
 }
 
+bool quern_hybrid_is_owed(const quern_real *mass, quern_real *const *momentum, uint32_t cell, uint32_t dim) {
+	bool any = mass[cell] != 0;
+	for (uint32_t k = 0; k < dim; k++) any = any || momentum[k][cell] != 0;
+	return any;
+}
+
 static bool is_empty(entry e, uint32_t c, uint32_t dim) {
-	bool any = e.mass[c] != 0;
-	for (uint32_t k = 0; k < dim; k++) any = any || e.momentum[k][c] != 0;
-	return !any;
+	return !quern_hybrid_is_owed(e.mass, e.momentum, c, dim);
 }
 
 /* ---- entries move with the material ---- */
@@ -36,14 +40,14 @@ static bool is_empty(entry e, uint32_t c, uint32_t dim) {
 typedef struct {
 	const int32_t *home; /* by particle: linear cell of the last update, -1: new */
 	const int32_t *now;  /* by particle: its cell */
-	const quern_real *weight, *mass;
-	uint32_t n;
+	cloud of;
 } movers;
 
 static int32_t home_entry(const update *d, int32_t home) {
+	int32_t cell[3];
 	if (home < 0) return -1;
-	const int32_t nx = d->g->cells[0], ny = d->g->cells[1];
-	return quern_grid_entry(d->g, (const int32_t[3]) { home % nx, home / nx % ny, home / nx / ny });
+	quern_grid_numbered(d->g, home, cell);
+	return quern_grid_entry(d->g, cell);
 }
 
 static void give_share(update *d, entry e, const entry old, uint32_t from, uint32_t to, quern_real share) {
@@ -71,10 +75,8 @@ static entry copy_of(update *d, entry e, quern_real *momentum[3]) {
 /* A particle that has left a cell takes its share of what the cell owed: by mass, of both clouds together. */
 void quern_hybrid_move_entries(update *d) {
 	const quern_column *u = d->u;
-	const movers clouds[2] = { { u[U_GRAIN_HOME].index, d->grain_cell, u[U_GRAIN_WEIGHT].real[0],
-								   u[U_GRAIN_MASS].real[0], d->n_grains },
-		{ u[U_POINT_HOME].index, d->point_cell, u[U_POINT_WEIGHT].real[0], u[U_POINT_MASS].real[0],
-			d->n_points } };
+	const movers clouds[2] = { { u[U_GRAIN_HOME].index, d->grain_cell, moving_grains(d->s) },
+		{ u[U_POINT_HOME].index, d->point_cell, all_points(d->s) } };
 	quern_real *of_home = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	quern_real *grain_momentum[3] = { NULL }, *point_momentum[3] = { NULL };
 	const entry grains = grain_entry(d), points = point_entry(d);
@@ -84,20 +86,19 @@ void quern_hybrid_move_entries(update *d) {
 		d->failed = true;
 		return;
 	}
-	for (int cloud = 0; cloud < 2; cloud++)
-		for (uint32_t i = 0; i < clouds[cloud].n; i++) {
-			const int32_t home = clouds[cloud].now[i] < 0 ? -1 : home_entry(d, clouds[cloud].home[i]);
-			if (home >= 0) of_home[home] += clouds[cloud].weight[i] * clouds[cloud].mass[i];
+	for (const movers *m = clouds; m < clouds + 2; m++)
+		for (uint32_t i = 0; i < m->of.n; i++) {
+			const int32_t home = m->now[i] < 0 ? -1 : home_entry(d, m->home[i]);
+			if (home >= 0) of_home[home] += cloud_mass(&m->of, i);
 		}
-	for (int cloud = 0; cloud < 2; cloud++)
-		for (uint32_t i = 0; i < clouds[cloud].n; i++) {
-			const int32_t now = clouds[cloud].now[i],
-						  home = now < 0 ? -1 : home_entry(d, clouds[cloud].home[i]);
+	for (const movers *m = clouds; m < clouds + 2; m++)
+		for (uint32_t i = 0; i < m->of.n; i++) {
+			const int32_t now = m->now[i], home = now < 0 ? -1 : home_entry(d, m->home[i]);
 			if (home < 0 || home == now || !(of_home[home] > 0)) continue;
 			if (is_empty(old_grains, (uint32_t)home, d->s->dim) &&
 				is_empty(old_points, (uint32_t)home, d->s->dim))
 				continue;
-			const quern_real share = clouds[cloud].weight[i] * clouds[cloud].mass[i] / of_home[home];
+			const quern_real share = cloud_mass(&m->of, i) / of_home[home];
 			give_share(d, grains, old_grains, (uint32_t)home, (uint32_t)now, share);
 			give_share(d, points, old_points, (uint32_t)home, (uint32_t)now, share);
 		}

@@ -38,10 +38,9 @@ static uint32_t parts_of(const update *d) { return d->s->dim == 2 ? 4 : 8; }
 static uint32_t part_of(const update *d, const int32_t cell[3], quern_real *const x[3], int32_t i) {
 	uint32_t part = 0;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
-		quern_real t = (x[k][i] - d->g->lower[k]) / d->g->cell - cell[k];
-		if (d->g->periodic[k] && t < -1) t += d->g->cells[k];
-		if (d->g->periodic[k] && t > 2) t -= d->g->cells[k];
-		part |= (uint32_t)(t >= 0.5) << k;
+		const quern_real around = d->g->periodic[k] ? (quern_real)d->g->cells[k] : INFINITY;
+		const quern_real t = (x[k][i] - d->g->lower[k]) / d->g->cell - cell[k];
+		part |= (uint32_t)(quern_image_at(t, 0.5, 0.5 * around, around) >= 0.5) << k;
 	}
 	return part;
 }
@@ -51,19 +50,18 @@ static void part_centre(const update *d, const int32_t cell[3], uint32_t part, q
 		x[k] = k < d->s->dim ? d->g->lower[k] + (cell[k] + (part >> k & 1 ? 0.75 : 0.25)) * d->g->cell : 0;
 }
 
-/* Marks the parts whose middle cannot be seen from particle i of the cell, since a body is in the way, unless that is true
- * of all; returns how many are left. */
+/* Marks the parts whose middle cannot be seen from particle i of the cell, since a body is in the way, unless that is
+ * true of all; returns how many are left. */
 static uint32_t close_parts(
 	const update *d, uint32_t c, const int32_t cell[3], quern_real *const x[3], int32_t i, bool closed[8]) {
+	const quern_images images = quern_grid_images(d->g);
 	const uint32_t parts = parts_of(d);
 	uint32_t n = 0;
 	for (uint32_t p = 0; p < parts; p++) {
 		quern_real to[3], from[3] = { 0 };
 		part_centre(d, cell, p, to);
 		for (uint32_t k = 0; k < d->s->dim; k++) {
-			const quern_real length = d->g->cells[k] * d->g->cell;
-			from[k] = x[k][i];
-			if (d->g->periodic[k]) from[k] -= length * floor((from[k] - to[k]) / length + 0.5);
+			from[k] = quern_image_at(x[k][i], to[k], images.half[k], images.length[k]);
 		}
 		closed[p] = quern_hybrid_walled(d, c, from, to);
 		n += !closed[p];
@@ -79,7 +77,7 @@ static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]
 	int32_t cell[3];
 	quern_real held[8] = { 0 };
 	bool taken[8] = { false };
-	quern_hybrid_cell(d, c, cell);
+	quern_grid_cell_of(d->g, c, cell);
 	const bool any = d->grain_begin[c + 1] > d->grain_begin[c];
 	const uint32_t open =
 		any ? close_parts(d, c, cell, d->u[U_GRAIN_POSITION].real, d->grain[d->grain_begin[c]], taken)
@@ -163,9 +161,9 @@ static void settle(update *d, uint32_t c) {
 	} else if (owed < 0 && held > 0) shrink(d, c, mass, held);
 }
 
-/* ---- few and many: what parts and joins keeps mass, momentum and volume, and with them the density: an open point stays
- *      open. Stress is the mean by volume, so that the sum of V sigma stays; history that goes with the stress is the mean by
- *      mass. Whatever else a point remembers is that of the heavier one. ---- */
+/* ---- few and many: what parts and joins keeps mass, momentum and volume, and with them the density: an open point
+ * stays open. Stress is the mean by volume, so that the sum of V sigma stays; history that goes with the stress is
+ * the mean by mass. Whatever else a point remembers is that of the heavier one. ---- */
 
 /* What the material's state-from-stress writes. Entry `to` gets the share of what entry i has. */
 static void mix_history(const update *d, uint32_t to, uint32_t i, quern_real share) {
@@ -190,7 +188,7 @@ static void split(update *d, uint32_t c) {
 	bool taken[8] = { false };
 	uint32_t free_part = parts;
 	if (!n || n >= parts || held * share < 0.25 * d->nominal) return;
-	quern_hybrid_cell(d, c, cell);
+	quern_grid_cell_of(d->g, c, cell);
 	close_parts(d, c, cell, u[U_POINT_POSITION].real, d->point[d->point_begin[c]], taken);
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
 		taken[part_of(d, cell, u[U_POINT_POSITION].real, d->point[q])] = true;

@@ -54,13 +54,10 @@ static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed
 /* ---- what the log says ---- */
 
 static quern_real carried_mass(const quern_step *s) {
-	const quern_column *u = s->use;
-	const uint32_t grains = s->host->set(s->run, "grain").n, points = s->host->set(s->run, "point").n;
-	const int32_t *fixed = u[U_GRAIN_FIXED].index;
+	const cloud clouds[2] = { moving_grains(s), all_points(s) };
 	quern_real sum = 0;
-	for (uint32_t i = 0; i < grains; i++)
-		if (!fixed || !fixed[i]) sum += u[U_GRAIN_WEIGHT].real[0][i] * u[U_GRAIN_MASS].real[0][i];
-	for (uint32_t i = 0; i < points; i++) sum += u[U_POINT_WEIGHT].real[0][i] * u[U_POINT_MASS].real[0][i];
+	for (int k = 0; k < 2; k++)
+		for (uint32_t i = 0; i < clouds[k].n; i++) sum += cloud_mass(&clouds[k], i);
 	return sum;
 }
 

@@ -20,6 +20,7 @@ typedef struct update {
 	const quern_step *s;
 	const quern_grid_view *g;
 	const quern_column *u;
+	quern_images images;
 	uint32_t n_cells, n_grains, n_points;
 	/* by cell: the moving grains and the points in it */
 	uint32_t *grain_begin, *point_begin;
@@ -38,14 +39,8 @@ typedef struct update {
 	bool failed;      /* memory ran out */
 } update;
 
-/* Global coordinates of a cell of the set "cell"; false for cells beyond the domain's end. */
-bool quern_hybrid_cell(const update *, uint32_t entry, int32_t cell[3]);
 void quern_hybrid_centre(const update *, const int32_t cell[3], quern_real x[3]);
-/* Brings a cell back through periodic faces and returns its entry: -1 where there is none in the grid, -2 beyond a face. */
-int32_t quern_hybrid_entry(const update *, int32_t cell[3]);
-/* The number of a cell among all of the domain. */
-int32_t quern_hybrid_number(const update *, const int32_t cell[3]);
-/* The entry, as above, of the neighbour one step along an axis. */
+/* The entry of the neighbour one step along an axis, -1 where there is none. */
 int32_t quern_hybrid_beside(const update *, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]);
 
 /* ---- cells.c ---- */
@@ -54,16 +49,18 @@ void quern_hybrid_averages(update *);
 void quern_hybrid_fixed(update *);
 void quern_hybrid_fractions(update *);
 void quern_hybrid_rates(update *);
-/* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is none. */
+/* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is
+ * none. */
 bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stress[6]);
-/* Normals of the zone at every particle, and where each is, for the next update. After the sets have their new order. */
+/* Normals of the zone at every particle, and where each is, for the next update. After the sets have their new
+ * order. */
 quern_status quern_hybrid_normals(update *);
 void quern_hybrid_homes(update *);
 
 /* ---- walls.c ---- */
 quern_status quern_hybrid_walls(update *);
-/* Whether a body stands between two places, one of them in that cell and the other in it or in one beside it, be it ever so
- * thin. */
+/* Whether a body stands between two places, one of them in that cell and the other in it or in one beside it, be it
+ * ever so thin. */
 bool quern_hybrid_walled(const update *, uint32_t entry, const quern_real from[3], const quern_real to[3]);
 
 /* ---- zones.c ---- */
@@ -72,6 +69,8 @@ quern_status quern_hybrid_zones(update *);
 quern_status quern_hybrid_nearest(update *, const bool *source, int32_t *nearest);
 
 /* ---- ledger.c ---- */
+/* Whether a cloud is owed anything by a cell, mass or momentum, be it less than nothing. */
+bool quern_hybrid_is_owed(const quern_real *mass, quern_real *const *momentum, uint32_t cell, uint32_t dim);
 void quern_hybrid_move_entries(update *);
 void quern_hybrid_weigh(update *);
 void quern_hybrid_net(update *);

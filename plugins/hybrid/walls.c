@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* walls - bodies as cells see them: how far the nearest surface is, how much of a cell is open, and what stands between two
- * cells. docs/theory/hybrid.md, section 3 */
+/* walls - bodies as cells see them: how far the nearest surface is, how much of a cell is open, and what stands
+ * between two cells. docs/theory/hybrid.md, section 3 */
 #include "update.h"
 #include <math.h>
 
@@ -53,7 +53,7 @@ quern_status quern_hybrid_walls(update *d) {
 		int32_t cell[3];
 		for (uint32_t i = 0; i < N; i++) {
 			quern_real x[3];
-			quern_hybrid_cell(d, b * N + i, cell);
+			quern_grid_cell_of(d->g, b * N + i, cell);
 			quern_hybrid_centre(d, cell, x);
 			for (uint32_t k = 0; k < d->s->dim; k++) p->position[k][i] = x[k];
 		}
@@ -61,7 +61,7 @@ quern_status quern_hybrid_walls(update *d) {
 		for (uint32_t i = 0; i < N; i++) gap[i] = p->least[i];
 		for (uint32_t i = 0; i < N; i++) {
 			open[i] = gap[i] > 0 ? 1 : 0;
-			if (fabs(gap[i]) < reach && quern_hybrid_cell(d, b * N + i, cell))
+			if (fabs(gap[i]) < reach && quern_grid_cell_of(d->g, b * N + i, cell))
 				open[i] = open_share(d, cell, p);
 		}
 	}

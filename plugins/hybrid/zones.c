@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* zones - oracles mark a surface, the distance inwards from it is made once for each, they wish, and the least continuous
- * wish becomes a zone, with hysteresis and one step at a time */
+/* zones - oracles mark a surface, the distance inwards from it is made once for each, they wish, and the least
+ * continuous wish becomes a zone, with hysteresis and one step at a time */
 #include "update.h"
 #include <math.h>
 #include <stdlib.h>
@@ -81,7 +81,7 @@ static void spread(spreading *p, const bool *open) {
 	while (p->n && !p->failed) {
 		const heap_entry e = pop(p);
 		int32_t cell[3];
-		if (e.distance > p->distance[e.cell] || !quern_hybrid_cell(p->d, e.cell, cell)) continue;
+		if (e.distance > p->distance[e.cell] || !quern_grid_cell_of(p->d->g, e.cell, cell)) continue;
 		for (int z = -depth; z <= depth; z++)
 			for (int y = -1; y <= 1; y++)
 				for (int x = -1; x <= 1; x++) {
@@ -92,7 +92,7 @@ static void spread(spreading *p, const bool *open) {
 						to[k] = cell[k] + step[k];
 						way[k] = p->way[e.cell][k] - step[k];
 					}
-					const int32_t c = quern_hybrid_entry(p->d, to);
+					const int32_t c = quern_grid_entry_back(p->d->g, to);
 					if (c >= 0 && (!open || open[c])) offer(p, (uint32_t)c, way);
 				}
 	}
@@ -116,9 +116,9 @@ quern_status quern_hybrid_nearest(update *d, const bool *source, int32_t *neares
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
 		nearest[c] = -1;
-		if (!isfinite(distance[c]) || !quern_hybrid_cell(d, c, cell)) continue;
+		if (!isfinite(distance[c]) || !quern_grid_cell_of(d->g, c, cell)) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++) cell[k] += p.way[c][k];
-		nearest[c] = quern_hybrid_entry(d, cell);
+		nearest[c] = quern_grid_entry_back(d->g, cell);
 	}
 	free(p.heap);
 	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
@@ -152,7 +152,7 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3], other;
 		bool open = false;
-		if (!quern_hybrid_cell(d, c, cell) || f->solid[c] || level[c] > 0) continue;
+		if (!quern_grid_cell_of(d->g, c, cell) || f->solid[c] || level[c] > 0) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2)
 				open = open || beside(d, c, cell, k, step, &other) == BESIDE_OPEN;
@@ -160,13 +160,49 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 	}
 	for (uint32_t q = 0; q < n; q++) {
 		int32_t cell[3], c;
-		quern_hybrid_cell(d, f->queue[q], cell);
+		quern_grid_cell_of(d->g, f->queue[q], cell);
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2) {
 				if (beside(d, f->queue[q], cell, k, step, &c) != BESIDE_CELL) continue;
 				if (f->outside[c] || f->solid[c] || level[c] > 0) continue;
 				f->outside[c] = true;
 				f->queue[n++] = (uint32_t)c;
+			}
+	}
+}
+
+static void find_sides(const update *d, surface *f, const quern_real *level, uint32_t flags) {
+	int32_t cell[3];
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		if (!quern_grid_cell_of(d->g, c, cell)) continue;
+		f->solid[c] = d->open[c] == 0;
+		if (!(flags & QUERN_SURFACE_FLOOD)) f->outside[c] = !f->solid[c] && level[c] <= 0;
+	}
+	if (flags & QUERN_SURFACE_FLOOD) flood(d, f, level);
+	for (uint32_t c = 0; c < d->n_cells; c++) f->inside[c] = !f->outside[c] && !f->solid[c];
+}
+
+/* Whether there is surface between a cell inside and what lies one step from it. */
+static bool is_surface(const update *d, const surface *f, uint32_t c, const int32_t cell[3], uint32_t axis,
+	int step, uint32_t flags) {
+	int32_t other;
+	switch (beside(d, c, cell, axis, step, &other)) {
+	case BESIDE_OPEN: return flags & QUERN_SURFACE_FLOOD;
+	case BESIDE_WALL: return flags & QUERN_SURFACE_WALLS;
+	default: return f->outside[other] || (f->solid[other] && flags & QUERN_SURFACE_WALLS);
+	}
+}
+
+static void begin_at_surface(spreading *p, const surface *f, uint32_t flags) {
+	const update *d = p->d;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3];
+		if (!f->inside[c] || !quern_grid_cell_of(d->g, c, cell)) continue;
+		for (uint32_t k = 0; k < d->g->dim; k++)
+			for (int step = -1; step <= 1; step += 2) {
+				int32_t way[3] = { 0 };
+				way[k] = step;
+				if (is_surface(d, f, c, cell, k, step, flags)) offer(p, c, way);
 			}
 	}
 }
@@ -181,28 +217,8 @@ static quern_status surface_distance(
 	spreading p;
 	if (!f.outside || !f.solid || !f.inside || !f.queue || !spreading_init(&p, d, true, distance))
 		return QUERN_E_MEMORY;
-	for (uint32_t c = 0; c < d->n_cells; c++) {
-		int32_t cell[3];
-		if (!quern_hybrid_cell(d, c, cell)) continue;
-		f.solid[c] = d->open[c] == 0;
-		if (!(flags & QUERN_SURFACE_FLOOD)) f.outside[c] = !f.solid[c] && level[c] <= 0;
-	}
-	if (flags & QUERN_SURFACE_FLOOD) flood(d, &f, level);
-	for (uint32_t c = 0; c < d->n_cells; c++) f.inside[c] = !f.outside[c] && !f.solid[c];
-	for (uint32_t c = 0; c < d->n_cells; c++) {
-		int32_t cell[3], other;
-		if (!f.inside[c] || !quern_hybrid_cell(d, c, cell)) continue;
-		for (uint32_t k = 0; k < d->g->dim; k++)
-			for (int step = -1; step <= 1; step += 2) {
-				const int what = beside(d, c, cell, k, step, &other);
-				const bool wall = what == BESIDE_WALL || (what == BESIDE_CELL && f.solid[other]);
-				const bool nothing = what == BESIDE_OPEN && flags & QUERN_SURFACE_FLOOD;
-				const bool open = nothing || (what == BESIDE_CELL && f.outside[other]);
-				int32_t way[3] = { 0 };
-				way[k] = step;
-				if (open || (wall && flags & QUERN_SURFACE_WALLS)) offer(&p, c, way);
-			}
-	}
+	find_sides(d, &f, level, flags);
+	begin_at_surface(&p, &f, flags);
 	spread(&p, f.inside);
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (!f.inside[c]) distance[c] = 0;
@@ -231,7 +247,7 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 	for (uint32_t i = 0; i < N; i++) {
 		int32_t cell[3];
 		quern_real x[3];
-		quern_hybrid_cell(d, b * N + i, cell);
+		quern_grid_cell_of(d->g, b * N + i, cell);
 		quern_hybrid_centre(d, cell, x);
 		for (uint32_t k = 0; k < 3; k++) m->centre[k][i] = x[k];
 		if (distance) m->shifted[i] = distance[b * N + i] + shift;

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* mpm - the continuum solver's own parameters and the rows of its stages, shared by its source files */
+/* mpm - the continuum solver's own parameters and its stages, shared by its source files */
 #pragma once
 #include "../bodies/bodies.h"
 #include "../common/account.h"
 #include "../common/tools.h"
+#include "rows.h"
 #include <quern/grid.h>
 #include <quern/material.h>
 #include <quern/shape.h>
@@ -28,47 +29,6 @@ typedef struct mpm_fill {
 } mpm_fill;
 
 enum { SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
-
-enum {
-	FILL_POSITION,
-	FILL_VELOCITY,
-	FILL_MASS,
-	FILL_VOLUME,
-	FILL_STRESS,
-	FILL_WEIGHT,
-	FILL_ENERGY,
-	FILL_UNSORTED,
-	FILL_AFFINE
-};
-enum { SORT_POSITION, SORT_UNSORTED };
-enum {
-	SCATTER_POSITION,
-	SCATTER_VELOCITY,
-	SCATTER_MASS,
-	SCATTER_VOLUME,
-	SCATTER_STRESS,
-	SCATTER_WEIGHT,
-	SCATTER_AFFINE,
-	SCATTER_NODE_MASS
-};
-enum { NODES_NODE, NODES_MOTION, NODES_IMPULSE, NODES_FACES };
-enum { WALLS_MOTION, WALLS_NODE, WALLS_IMPULSE, WALLS_FACES };
-enum {
-	GATHER_MOTION,
-	GATHER_NODE,
-	GATHER_POSITION,
-	GATHER_VELOCITY,
-	GATHER_MASS,
-	GATHER_VOLUME,
-	GATHER_STRESS,
-	GATHER_WEIGHT,
-	GATHER_GRADIENT,
-	GATHER_AFFINE,
-	GATHER_PRESSURE,
-	GATHER_ENERGY,
-	GATHER_WAVE,
-	GATHER_UNSORTED
-};
 
 /* Lanes of a node's row (mass, momentum, force) and of its motion (velocity, change, density). */
 QUERN_INLINE uint32_t node_force(uint32_t dim) { return 1 + dim; }

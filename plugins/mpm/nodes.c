@@ -32,12 +32,6 @@ static quern_real node_share(const grid_work *w, const int32_t at[3]) {
 	return share;
 }
 
-static void node_at(const grid_work *w, uint32_t b, uint32_t k, int32_t at[3]) {
-	const int32_t edge = (int32_t)w->g->edge;
-	const int32_t place[3] = { (int32_t)k % edge, (int32_t)k / edge % edge, (int32_t)k / (edge * edge) };
-	for (uint32_t a = 0; a < 3; a++) at[a] = a < w->g->dim ? w->g->at[b][a] * edge + place[a] : 0;
-}
-
 /* Sets a node's velocity and books the impulse that it takes. */
 QUERN_INLINE void change_velocity(
 	quern_row *motion, uint32_t k, uint32_t dim, quern_real v, quern_real mass, quern_real *impulse) {
@@ -98,7 +92,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_rea
 	}
 	for (uint32_t i = 0; i < N; i++) {
 		quern_real x[3];
-		quern_grid_corner(w->g, b, i, x);
+		quern_grid_corner(w->g, b * N + i, x);
 		for (uint32_t k = 0; k < s->dim; k++) n->position[k][i] = x[k];
 		n->radius[i] = 0;
 	}
@@ -128,7 +122,7 @@ static void close_faces(const grid_work *w, uint32_t b, quern_real *impulse) {
 			int32_t at[3];
 			quern_row *motion = &w->motion[(size_t)b * N + i];
 			const quern_real mass = w->node[(size_t)b * N + i][0];
-			node_at(w, b, i, at);
+			quern_grid_cell_of(g, b * N + i, at);
 			if (!(mass > 0)) continue;
 			if ((at[k] == 0 && (*motion)[k] < 0) || (at[k] == g->cells[k] && (*motion)[k] > 0))
 				change_velocity(motion, k, g->dim, 0, mass, impulse);
@@ -160,7 +154,7 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 		const quern_real mass = row[0], one_over = mass > 0 ? 1 / mass : 0,
 						 limited = mass > cut ? one_over : 1 / cut;
 		int32_t at[3];
-		node_at(w, b, i, at);
+		quern_grid_cell_of(w->g, b * N + i, at);
 		for (uint32_t k = 0; k < dim && mass > 0; k++) {
 			const quern_real force = row[node_force(dim) + k],
 							 change = s->dt * (force * limited + s->gravity[k]);

@@ -9,7 +9,6 @@ typedef struct {
 	const quern_step *s;
 	const quern_grid_view *g;
 	const uint32_t *point; /* partition by block */
-	const uint32_t *list;  /* blocks of this colour */
 	quern_row *node;
 } scatter_work;
 
@@ -59,15 +58,15 @@ QUERN_INLINE void scatter_block(const scatter_work *w, scatter_memory *m, uint32
 	quern_tile_add(w->g, w->node, b, m->tile);
 }
 
-static void scatter_2d(void *arg, uint32_t i, uint32_t worker) {
+static void scatter_2d(void *arg, uint32_t b, uint32_t worker) {
 	const scatter_work *w = arg;
 	scatter_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
-	if (m) scatter_block(w, m, w->list[i], 2);
+	if (m) scatter_block(w, m, b, 2);
 }
-static void scatter_3d(void *arg, uint32_t i, uint32_t worker) {
+static void scatter_3d(void *arg, uint32_t b, uint32_t worker) {
 	const scatter_work *w = arg;
 	scatter_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
-	if (m) scatter_block(w, m, w->list[i], 3);
+	if (m) scatter_block(w, m, b, 3);
 }
 
 quern_status quern_mpm_scatter(const void *self, const quern_step *s) {
@@ -77,10 +76,6 @@ quern_status quern_mpm_scatter(const void *self, const quern_step *s) {
 		.point = points.block,
 		.node = (quern_row *)(void *)s->use[SCATTER_NODE_MASS].real[0] };
 	(void)self;
-	for (uint32_t c = 0; c < w.g->n_colours && points.n; c++) {
-		w.list = w.g->by_colour + w.g->colour[c];
-		s->host->parallel(
-			s->run, w.g->colour[c + 1] - w.g->colour[c], s->dim == 2 ? scatter_2d : scatter_3d, &w);
-	}
+	if (points.n) stencil_by_colour(s, w.g, s->dim == 2 ? scatter_2d : scatter_3d, &w);
 	return QUERN_OK;
 }

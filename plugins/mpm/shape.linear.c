@@ -41,8 +41,8 @@ static void shares(const void *self, quern_real *wall, quern_real *next) {
 	*next = 1;
 }
 
-/* No bound holds for every arrangement of points, since a node of little mass may feel a full force. This one, a Courant
- * number of 0.5, is what two points per cell and axis bear in practice. */
+/* No bound holds for every arrangement of points, since a node of little mass may feel a full force. This one, a
+ * Courant number of 0.5, is what two points per cell and axis bear in practice. */
 static quern_real stiffness(const void *self) {
 	(void)self;
 	return 16;

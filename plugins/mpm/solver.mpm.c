@@ -59,64 +59,12 @@ static const quern_slot slots[] = { { .name = "material",
 	{ .name = "bodies", .kind = &quern_body_kind, .list = 1, .stage = { "mpm.nodes" }, .same_as = "bodies" },
 	{ .name = NULL } };
 
-#define UNSORTED                                                                                             \
-	F("total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX,                                                      \
-		.doc = "1: points must be sorted before the next scatter.")
-#define IMPULSES                                                                                             \
-	F("body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL),                           \
-		F("total.faces", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL,                         \
-			.doc =                                                                                           \
-				"Impulse on the continuum by closed faces of the domain and by the limit on light nodes.")
-static const quern_use fill_uses[] = { F("point.position", "m", QUERN_WRITE, QUERN_VECTOR,
-										   .flags = QUERN_SHOWN, .doc = "Position."),
-	F("point.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."),
-	F("point.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted."),
-	F("point.volume", "m^3", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, .doc = "Volume, unweighted."),
-	F("point.stress", "Pa", QUERN_WRITE, QUERN_SYMMETRIC, .doc = "Cauchy stress, tension positive."),
-	F("point.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1,
-		.doc = "Share of its mass that the point carries."),
-	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Stored elastic energy."),
-	UNSORTED, F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
-static const quern_use sort_uses[] = { F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR), UNSORTED,
-	QUERN_END_USES };
-static const quern_use scatter_uses[] = { F("point.position", "m", QUERN_READ, QUERN_VECTOR),
-	F("point.velocity", "m/s", QUERN_READ, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("point.volume", "m^3", QUERN_READ, QUERN_SCALAR), F("point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC),
-	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL),
-	F("node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass."),
-	F("node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum."),
-	F("node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force."),
-	F("point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .when = "affine"), QUERN_END_USES };
-static const quern_use nodes_uses[] = { F("node.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("motion.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity."), IMPULSES,
-	F("motion.change", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity gained in this step."),
-	F("motion.density", "kg/m^3", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass of a node over its volume."),
-	F("node.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR), F("node.force", "N", QUERN_READ, QUERN_VECTOR),
-	QUERN_END_USES };
-static const quern_use walls_uses[] = { F("motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR),
-	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), IMPULSES,
-	F("motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR), QUERN_END_USES };
-static const quern_use gather_uses[] = { F("motion.velocity", "m/s", QUERN_READ, QUERN_VECTOR),
-	F("node.mass", "kg", QUERN_READ, QUERN_SCALAR), F("point.position", "m", QUERN_UPDATE, QUERN_VECTOR),
-	F("point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR), F("point.mass", "kg", QUERN_READ, QUERN_SCALAR),
-	F("point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR),
-	F("point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC),
-	F("point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL,
-		.doc = "Velocity gradient of the last step."),
-	/* it is there if somebody wants it sent; that it shall be written out does not make it */
-	F("point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, .with = "point.affine",
-		.doc = "The same, sent to the nodes with the velocity."),
-	F("point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Minus the mean normal stress."),
-	F("point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Stored elastic energy."),
-	F("point.wave_speed", "m/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL,
-		.doc = "Of pressure waves."),
-	UNSORTED, F("motion.change", "m/s", QUERN_READ, QUERN_VECTOR),
-	F("motion.density", "kg/m^3", QUERN_READ, QUERN_SCALAR), QUERN_END_USES };
+static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
+static const quern_use sort_uses[] = QUERN_USE_ROWS(SORT_USES);
+static const quern_use scatter_uses[] = QUERN_USE_ROWS(SCATTER_USES);
+static const quern_use nodes_uses[] = QUERN_USE_ROWS(NODES_USES);
+static const quern_use walls_uses[] = QUERN_USE_ROWS(WALLS_USES);
+static const quern_use gather_uses[] = QUERN_USE_ROWS(GATHER_USES);
 
 static const quern_stage stages[] = { { .name = "mpm.fill",
 										  .doc = "Places the first points.",
@@ -153,13 +101,11 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mpm *p = self;
-	quern_real g2 = 0;
 	fill_height loose = fill_height_of(setup);
 	p->dim = setup->dim;
 	p->affine = p->rasterise == RASTERISE_AFFINE;
 	for (uint32_t k = 0; k < p->dim; k++) {
 		const quern_real cells = (setup->upper[k] - setup->lower[k]) / p->cell, whole = floor(cells + 0.5);
-		g2 += setup->gravity[k] * setup->gravity[k];
 		if (whole < 1 || fabs(cells - whole) > 1e-6 * whole)
 			return setup->host->fail(err, QUERN_E_PARAM, "cell",
 				"the domain is %.6g cells wide along axis %u; it must be a whole number: make it %.6g m, or "
@@ -187,7 +133,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	setup->host->publish(setup, "fill.height", "m", height);
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
 	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
-	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(sqrt(g2) / height) : 0);
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
+	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
 	return QUERN_OK;
 }
 
@@ -216,9 +163,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	const uint32_t n = s->host->set(s->run, "point").n;
 	quern_real fastest = 0;
 	for (uint32_t i = 0; i < n; i++) {
-		quern_real v2 = 0;
-		for (uint32_t k = 0; k < s->dim; k++)
-			v2 += s->use[FILL_VELOCITY].real[k][i] * s->use[FILL_VELOCITY].real[k][i];
+		const quern_real v2 = cloud_square(&s->use[FILL_VELOCITY], i, s->dim);
 		fastest = v2 > fastest ? v2 : fastest;
 	}
 	fastest = sqrt(fastest);
@@ -238,30 +183,14 @@ static const quern_output sums[] = { ACCOUNT_ROWS,
 
 static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
-	const size_t n = s->host->set(s->run, "point").n;
-	quern_real *sum = s->host->memory(s->run, (n + 1) * 7 * sizeof(quern_real));
+	const cloud points = { u[FILL_MASS].real[0], u[FILL_WEIGHT].real[0], NULL,
+		s->host->set(s->run, "point").n };
+	cloud_sums c;
 	(void)self;
-	if (!sum || !n) return;
-	for (size_t i = 0; i < n; i++) {
-		const quern_real m =
-			(u[FILL_WEIGHT].real[0] ? u[FILL_WEIGHT].real[0][i] : 1) * u[FILL_MASS].real[0][i];
-		quern_real v2 = 0, height = 0;
-		for (uint32_t k = 0; k < s->dim; k++) {
-			const quern_real v = u[FILL_VELOCITY].real[k][i];
-			v2 += v * v;
-			height -= s->gravity[k] * u[FILL_POSITION].real[k][i];
-			sum[(1 + k) * n + i] = m * v;
-		}
-		sum[i] = m;
-		sum[4 * n + i] = 0.5 * m * v2;
-		sum[5 * n + i] = m * height;
-		sum[6 * n + i] = u[FILL_ENERGY].real[0] ? m * u[FILL_ENERGY].real[0][i] : 0;
-	}
-	out[SUM_MASS] = s->host->sum(s->run, n, sum);
-	for (uint32_t k = 0; k < s->dim; k++) out[SUM_MOMENTUM + k] = s->host->sum(s->run, n, sum + (1 + k) * n);
-	out[SUM_KINETIC] = s->host->sum(s->run, n, sum + 4 * n);
-	out[SUM_POTENTIAL] = s->host->sum(s->run, n, sum + 5 * n);
-	out[SUM_ELASTIC] = s->host->sum(s->run, n, sum + 6 * n);
+	if (!points.n || !cloud_open(&c, s->host, s->run, &points)) return;
+	cloud_account(&c, &u[FILL_POSITION], &u[FILL_VELOCITY], s, out);
+	CLOUD_ADD(&c, i, 0.5 * cloud_square(&u[FILL_VELOCITY], i, s->dim), out[SUM_KINETIC]);
+	if (u[FILL_ENERGY].real[0]) CLOUD_ADD(&c, i, u[FILL_ENERGY].real[0][i], out[SUM_ELASTIC]);
 }
 
 static quern_real cell(const void *self) { return ((const mpm *)self)->cell; }

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no tension.
- * docs/theory/materials.md, section 4
- *
- * What is kept is small where strains are, J - 1 and dev b of the isochoric strain b, so that the yield stress is met to
- * round-off at any pressure; b = dev b + t I follows from det b = 1. */
+/* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no
+ * tension. docs/theory/materials.md, section 4 What is kept is small where strains are, J - 1 and dev b of the
+ * isochoric strain b, so that the yield stress is met to round-off at any pressure; b = dev b + t I follows from det
+ * b = 1. */
 #include "../common/rotation.h"
 #include <quern/material.h>
 #include <quern/math.h>
@@ -24,30 +23,19 @@ static const quern_param params[] = { QUERN_PARAM(drucker_prager, bulk_modulus, 
 		.from = "grain.critical_density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_END_PARAMS };
 
-enum { VOLUME, DEVIATOR, ASSIGNED_VOLUME, ASSIGNED_DEVIATOR };
-static const quern_use uses[] = { { .field = "point.volume_strain",
-									  .unit = "1",
-									  .doc = "J - 1, elastic; positive while the point is open.",
-									  .access = QUERN_UPDATE,
-									  .shape = QUERN_SCALAR },
-	{ .field = "point.deviator",
-		.unit = "1",
-		.doc = "Deviator of the isochoric elastic left Cauchy-Green strain.",
-		.access = QUERN_UPDATE,
-		.shape = QUERN_SYMMETRIC },
-	{ .field = "point.volume_strain",
-		.unit = "1",
-		.doc = "From stress.",
-		.access = QUERN_WRITE,
-		.shape = QUERN_SCALAR,
-		.hook = QUERN_MATERIAL_ASSIGN },
-	{ .field = "point.deviator",
-		.unit = "1",
-		.doc = "From stress.",
-		.access = QUERN_WRITE,
-		.shape = QUERN_SYMMETRIC,
-		.hook = QUERN_MATERIAL_ASSIGN },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(VOLUME, "point.volume_strain", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "J - 1, elastic; positive while the point is open.") \
+	X(DEVIATOR, "point.deviator", "1", QUERN_UPDATE, QUERN_SYMMETRIC, \
+		.doc = "Deviator of the isochoric elastic left Cauchy-Green strain.") \
+	X(ASSIGNED_VOLUME, "point.volume_strain", "1", QUERN_WRITE, QUERN_SCALAR, .hook = QUERN_MATERIAL_ASSIGN, \
+		.doc = "From stress.") \
+	X(ASSIGNED_DEVIATOR, "point.deviator", "1", QUERN_WRITE, QUERN_SYMMETRIC, .hook = QUERN_MATERIAL_ASSIGN, \
+		.doc = "From stress.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	drucker_prager *law = self;
@@ -67,8 +55,8 @@ QUERN_INLINE quern_real excess_step(quern_real y, quern_real q, quern_real det) 
 	return y - (y * (3 + y * (3 + y)) - (q * t - det)) / (3 * t * t - q);
 }
 
-/* t - 1 of det(s + t I) = 1 for a deviator s, q = s:s/2. In 3-D it is the largest root that makes s + t I positive: with
- * r^2 = q/3 it lies between r, beyond which the cubic rises, and sqrt(1 + 4 r^2). Newton's steps from above are
+/* t - 1 of det(s + t I) = 1 for a deviator s, q = s:s/2. In 3-D it is the largest root that makes s + t I positive:
+ * with r^2 = q/3 it lies between r, beyond which the cubic rises, and sqrt(1 + 4 r^2). Newton's steps from above are
  * monotone; four are enough for any r below 1/4, six up to 1. */
 QUERN_INLINE quern_real isochoric_excess(const int dim, symmetric s) {
 	const quern_real q = symmetric_half_square(dim, s);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* material.elastic - linear hypoelasticity: it carries tension, and nothing yields. docs/theory/materials.md, section 2.
- * Start here to write a material of your own. */
+/* material.elastic - linear hypoelasticity: it carries tension, and nothing yields. docs/theory/materials.md, section
+ * 2. Start here to write a material of your own. */
 #include "../common/rotation.h"
 #include <quern/material.h>
 #include <quern/math.h>

@@ -32,14 +32,13 @@ static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
 		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 
-enum { SHEAR_RATE };
-static const quern_use uses[] = { { .field = "point.shear_rate",
-									  .unit = "1/s",
-									  .doc = "Equivalent plastic shear rate; of an open point the whole one.",
-									  .access = QUERN_WRITE,
-									  .shape = QUERN_SCALAR,
-									  .flags = QUERN_OPTIONAL },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(SHEAR_RATE, "point.shear_rate", "1/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Equivalent plastic shear rate; of an open point the whole one.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mu_i *law = self;
@@ -55,8 +54,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
-/* The root of (tau - S_0) a = (S_2 - tau) (trial - tau) between S_0 and the smaller of S_2 and `trial`, for trial > S_0.
- * From S_0 up, with both ends measured from there, nothing cancels: at S_2 = S_0 it is S_0, at a = 0 the smaller end. */
+/* The root of (tau - S_0) a = (S_2 - tau) (trial - tau) between S_0 and the smaller of S_2 and `trial`, for trial >
+ * S_0. From S_0 up, with both ends measured from there, nothing cancels: at S_2 = S_0 it is S_0, at a = 0 the smaller
+ * end. */
 QUERN_INLINE quern_real flow_stress(quern_real s0, quern_real s2, quern_real trial, quern_real a) {
 	const quern_real u = s2 - s0, v = trial - s0, apart = u - v;
 	const quern_real root = __builtin_sqrt(apart * apart + a * (a + 2 * (u + v)));

@@ -7,18 +7,18 @@ typedef struct {
 	int32_t unused;
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
-static const quern_use uses[] = { CLOUD_USES, QUERN_END_USES };
+static const quern_use uses[] = QUERN_USE_ROWS(CLOUD_USES);
 static const quern_output outputs[] = {
 	{ .name = "share", .unit = "1", .doc = "Of the carried mass, by grains." }, { .name = NULL }
 };
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
-	quern_real grains = 0, points = 0;
+	cloud_sums grains, points;
 	(void)self;
-	CLOUD_SUM(b, host, run, false, i, 1, grains);
-	CLOUD_SUM(b, host, run, true, i, 1, points);
-	out[0] = grains + points > 0 ? grains / (grains + points) : 0;
+	if (!observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
+	const quern_real discrete = cloud_total(&grains), all = discrete + cloud_total(&points);
+	out[0] = all > 0 ? discrete / all : 0;
 	return QUERN_OK;
 }
 

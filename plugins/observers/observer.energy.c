@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section 5 */
+/* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section
+ * 5 */
+#include "../common/radius.h"
 #include "observers.h"
 #include <quern/observer.h>
 
@@ -7,29 +9,23 @@ typedef struct {
 	int32_t unused;
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
-enum {
-	GRAIN_POSITION = CLOUD_ROWS,
-	GRAIN_VELOCITY,
-	GRAIN_SPIN,
-	GRAIN_RADIUS,
-	POINT_POSITION,
-	POINT_VELOCITY,
-	POINT_ENERGY,
-	STORED,
-	SHEARED,
-	DAMPED,
-	RUBBED,
-	EXCHANGED
-};
-#define LOOK(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_OPTIONAL)
-#define WANT(field, unit, shape) F(field, unit, QUERN_READ, shape, .flags = QUERN_WANTED)
-static const quern_use uses[] = { CLOUD_USES, LOOK("grain.position", "m", QUERN_VECTOR),
-	LOOK("grain.velocity", "m/s", QUERN_VECTOR), LOOK("grain.spin", "rad/s", QUERN_AXIAL),
-	LOOK("grain.radius", "m", QUERN_SCALAR), LOOK("point.position", "m", QUERN_VECTOR),
-	LOOK("point.velocity", "m/s", QUERN_VECTOR), WANT("point.energy", "J/kg", QUERN_SCALAR),
-	WANT("total.stored", "J", QUERN_SCALAR), WANT("total.sheared", "J", QUERN_SCALAR),
-	WANT("total.damped", "J", QUERN_SCALAR), WANT("total.rubbed", "J", QUERN_SCALAR),
-	WANT("total.exchanged", "J", QUERN_SCALAR), QUERN_END_USES };
+/* clang-format off */
+#define OWN_USES(X) \
+	X(GRAIN_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
+	X(GRAIN_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(POINT_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(POINT_VELOCITY, "point.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(POINT_ENERGY, "point.energy", "J/kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(STORED, "total.stored", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(SHEARED, "total.sheared", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(DAMPED, "total.damped", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(RUBBED, "total.rubbed", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED)
+/* clang-format on */
+QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
+static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 
 enum { KINETIC, SPINNING, POINTS, POTENTIAL, SPRINGS, TANGENTIAL, ELASTIC, DASHPOTS, SLIDING, COUPLING, SUM };
 static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = "Kinetic, of grains." },
@@ -44,32 +40,22 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
 	{ .name = "budget", .unit = "J", .doc = "All of it: constant for grains alone." }, { .name = NULL } };
 
-static quern_real square(const quern_column *c, uint32_t i, uint32_t n) {
-	quern_real sum = 0;
-	for (uint32_t k = 0; k < n; k++) sum += c->real[k][i] * c->real[k][i];
-	return sum;
-}
-static quern_real height(const quern_observer_batch *b, const quern_column *x, uint32_t i) {
-	quern_real sum = 0;
-	for (uint32_t k = 0; k < b->dim; k++) sum -= b->gravity[k] * x->real[k][i];
-	return sum;
-}
-
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t turns = b->dim == 3 ? 3 : 1;
+	const quern_real *radius = u[GRAIN_RADIUS].real[0], turning = quern_radius_inertia(b->dim);
+	cloud_sums grains, points;
 	(void)self;
-	CLOUD_SUM(b, host, run, false, i, 0.5 * square(&u[GRAIN_VELOCITY], i, b->dim), out[KINETIC]);
+	if (!observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
+	CLOUD_ADD(&grains, i, 0.5 * cloud_square(&u[GRAIN_VELOCITY], i, b->dim), out[KINETIC]);
 	if (u[GRAIN_SPIN].real[0])
-		CLOUD_SUM(b, host, run, false, i,
-			(b->dim == 2 ? 0.25 : 0.2) * u[GRAIN_RADIUS].real[0][i] * u[GRAIN_RADIUS].real[0][i] *
-				square(&u[GRAIN_SPIN], i, turns),
+		CLOUD_ADD(&grains, i, 0.5 * turning * radius[i] * radius[i] * cloud_square(&u[GRAIN_SPIN], i, turns),
 			out[SPINNING]);
-	CLOUD_SUM(b, host, run, true, i, 0.5 * square(&u[POINT_VELOCITY], i, b->dim), out[POINTS]);
-	CLOUD_SUM(b, host, run, false, i, height(b, &u[GRAIN_POSITION], i), out[POTENTIAL]);
-	CLOUD_SUM(b, host, run, true, i, height(b, &u[POINT_POSITION], i), out[POTENTIAL]);
-	if (u[POINT_ENERGY].real[0]) CLOUD_SUM(b, host, run, true, i, u[POINT_ENERGY].real[0][i], out[ELASTIC]);
+	CLOUD_ADD(&points, i, 0.5 * cloud_square(&u[POINT_VELOCITY], i, b->dim), out[POINTS]);
+	CLOUD_ADD(&grains, i, cloud_height(&u[GRAIN_POSITION], i, b->dim, b->gravity), out[POTENTIAL]);
+	CLOUD_ADD(&points, i, cloud_height(&u[POINT_POSITION], i, b->dim, b->gravity), out[POTENTIAL]);
+	if (u[POINT_ENERGY].real[0]) CLOUD_ADD(&points, i, u[POINT_ENERGY].real[0][i], out[ELASTIC]);
 	const int rows[] = { STORED, SHEARED, DAMPED, RUBBED, EXCHANGED },
 			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
 	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;

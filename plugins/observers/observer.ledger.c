@@ -8,14 +8,17 @@ typedef struct {
 	int32_t unused;
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
-enum { GRAIN_OWED = CLOUD_ROWS, POINT_OWED, MASS, MASS_DEFECT, MOMENTUM_DEFECT, EXCHANGE_DEFECT };
-static const quern_use uses[] = { CLOUD_USES,
-	F("cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.mass_initial", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL),
-	F("total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
+/* clang-format off */
+#define OWN_USES(X) \
+	X(GRAIN_OWED, "cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(POINT_OWED, "cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(MASS, "total.mass_initial", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(EXCHANGE_DEFECT, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
+/* clang-format on */
+QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
+static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 static const quern_output outputs[] = {
 	{ .name = "entries", .unit = "1", .doc = "Sum of |entries| over the mass." },
 	{ .name = "carried", .unit = "1", .doc = "Carried mass over that at the release, minus 1." },
@@ -34,16 +37,15 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t n = u[GRAIN_OWED].real[0] ? b->count[GRAIN_OWED] : 0;
-	quern_real mass = 0, *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
+	quern_real *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
+	cloud_sums grains, points;
 	(void)self;
 	if (!u[GRAIN_OWED].real[0] || !(u[MASS].real[0][0] > 0)) return QUERN_OK;
-	if (!size) return QUERN_E_MEMORY;
+	if (!size || !observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < n; i++)
 		size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
-	CLOUD_SUM(b, host, run, false, i, 1, mass);
-	CLOUD_SUM(b, host, run, true, i, 1, mass);
 	out[0] = host->sum(run, n, size) / u[MASS].real[0][0];
-	out[1] = mass / u[MASS].real[0][0] - 1;
+	out[1] = (cloud_total(&grains) + cloud_total(&points)) / u[MASS].real[0][0] - 1;
 	out[2] = host->sum(run, n, u[GRAIN_OWED].real[0]);
 	out[3] = host->sum(run, n, u[POINT_OWED].real[0]);
 	for (int k = 0; k < 3; k++) out[4 + k] = u[MASS_DEFECT + k].real[0][0];

@@ -7,16 +7,18 @@ typedef struct {
 	int32_t unused;
 } observer;
 static const quern_param params[] = { QUERN_END_PARAMS };
-static const quern_use uses[] = { CLOUD_USES, QUERN_END_USES };
+static const quern_use uses[] = QUERN_USE_ROWS(CLOUD_USES);
 static const quern_output outputs[] = { { .name = "carried", .unit = "kg", .doc = "By both." },
 	{ .name = "grains", .unit = "kg", .doc = "By grains, weighted, without fixed ones." },
 	{ .name = "points", .unit = "kg", .doc = "By points, weighted." }, { .name = NULL } };
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
+	cloud_sums grains, points;
 	(void)self;
-	CLOUD_SUM(b, host, run, false, i, 1, out[1]);
-	CLOUD_SUM(b, host, run, true, i, 1, out[2]);
+	if (!observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
+	out[1] = cloud_total(&grains);
+	out[2] = cloud_total(&points);
 	out[0] = out[1] + out[2];
 	return QUERN_OK;
 }

@@ -21,10 +21,13 @@ static const quern_param params[] = { QUERN_PARAM(observer, axis, "1", "Axis of 
 	QUERN_PARAM(observer, diameter, "m", "Mean diameter of the grains.", .from = "grain.diameter",
 		.flags = QUERN_MAYBE | QUERN_ADVANCED),
 	QUERN_END_PARAMS };
-enum { GRAIN_POSITION = CLOUD_ROWS, POINT_POSITION };
-static const quern_use uses[] = { CLOUD_USES,
-	F("grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL),
-	F("point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL), QUERN_END_USES };
+/* clang-format off */
+#define OWN_USES(X) \
+	X(GRAIN_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(POINT_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL)
+/* clang-format on */
+QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
+static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 static const quern_output outputs[] = {
 	{ .name = "front", .unit = "m", .doc = "Quantile of the connected mass, from the origin." },
 	{ .name = "height",
@@ -67,8 +70,9 @@ static uint32_t collect(const observer *o, const quern_observer_batch *b, item *
 	uint32_t n = 0;
 	for (int point = 0; point < 2; point++) {
 		const quern_column *x = &b->use[point ? POINT_POSITION : GRAIN_POSITION];
-		for (uint32_t i = 0; i < cloud_size(b, point); i++) {
-			const quern_real m = carried(b, point, i);
+		const cloud c = observed(b, point);
+		for (uint32_t i = 0; i < c.n; i++) {
+			const quern_real m = cloud_mass(&c, i);
 			if (!(m > 0)) continue;
 			const quern_real h = down ? b->upper[up] - x->real[up][i] : x->real[up][i] - b->lower[up];
 			out[n] = (item) { x->real[o->axis][i] - o->origin, h, m, n };
@@ -90,7 +94,7 @@ static quern_real quantile(const item *it, uint32_t n, quern_real wanted, bool u
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
 	const observer *o = self;
-	const size_t most = (size_t)cloud_size(b, false) + cloud_size(b, true);
+	const size_t most = (size_t)observed(b, false).n + observed(b, true).n;
 	item *it = host->memory(run, (most + 1) * sizeof(item));
 	quern_real all = 0, mass = 0;
 	uint32_t connected = 0;

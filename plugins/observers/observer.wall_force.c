@@ -13,14 +13,16 @@ static const quern_param params[] = { QUERN_PARAM(observer, body, "1",
 	QUERN_PARAM(observer, bodies, "1", "Bodies that there are.", .from = "bodies.count",
 		.flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),
 	QUERN_END_PARAMS };
-enum { IMPULSE, BEFORE, SINCE, FORCE };
-static const quern_use uses[] = { F("body.impulse", "N s", QUERN_READ, QUERN_VECTOR,
-									  .doc = "Given to the material since the release."),
-	F("body.impulse_before", "N s", QUERN_UPDATE, QUERN_VECTOR, .doc = "The same, at the last observation."),
-	F("body.observed", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Time of the last observation."),
-	F("body.force", "N", QUERN_UPDATE, QUERN_VECTOR,
-		.doc = "Mean force of the material between the last two observations."),
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(IMPULSE, "body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .doc = "Given to the material since the release.") \
+	X(BEFORE, "body.impulse_before", "N s", QUERN_UPDATE, QUERN_VECTOR, .doc = "The same, at the last observation.") \
+	X(SINCE, "body.observed", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Time of the last observation.") \
+	X(FORCE, "body.force", "N", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "Mean force of the material between the last two observations.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 static const quern_output outputs[] = { { .name = "x", .unit = "N", .doc = "Along x." },
 	{ .name = "y", .unit = "N", .doc = "Along y." },
 	{ .name = "z", .unit = "N", .doc = "Along z; 0 in 2-D." }, { .name = NULL } };

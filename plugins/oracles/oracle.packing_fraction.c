@@ -1,40 +1,30 @@
 /* SPDX-License-Identifier: MIT */
 /* oracle.packing_fraction - grains near the free surface, continuum deep inside. docs/theory/hybrid.md, section 3 */
-#include <quern/oracle.h>
+#include "band.h"
 
 typedef struct {
-	quern_real critical, depth, half_width, cell;
+	quern_real critical;
+	oracle_band band;
 	bool walls;
 } surface;
 
 static const quern_param params[] = {
 	QUERN_PARAM(surface, critical, "1", "Packing fraction of grains below which a cell is empty.", .def = 0.4,
 		.min = 0, .max = 1, .flags = QUERN_MIN_OPEN | QUERN_MAX_OPEN),
-	QUERN_PARAM(surface, depth, "m", "Depth of the middle of the hybrid zone below the surface.",
-		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(surface, half_width, "m", "Half the width of the hybrid zone; a cell at least.",
-		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(
-		surface, cell, "m", "Cell of the grid.", .from = "grid.cell", .flags = QUERN_MAYBE | QUERN_ADVANCED),
+	BAND_PARAMS(surface, "Depth of the middle of the hybrid zone below the surface."),
 	QUERN_PARAM(surface, walls, NULL, "Walls and floors count as surface too, so that grains meet them."),
 	QUERN_END_PARAMS
 };
-enum { FRACTION };
-static const quern_use uses[] = { { .field = "cell.packing_fraction",
-									  .unit = "1",
-									  .doc = "Of grains; 1 where the continuum fills the cell.",
-									  .access = QUERN_READ,
-									  .shape = QUERN_SCALAR },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(FRACTION, "cell.packing_fraction", "1", QUERN_READ, QUERN_SCALAR, \
+		.doc = "Of grains; 1 where the continuum fills the cell.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
-	const surface *p = self;
-	if (p->half_width < (1 - 1e-9) * p->cell)
-		return setup->host->fail(err, QUERN_E_PARAM, "half_width",
-			"must be a cell at least, %.4g m: a narrower zone is none in places", p->cell);
-	if (p->depth > p->half_width) return QUERN_OK;
-	return setup->host->fail(err, QUERN_E_PARAM, "half_width",
-		"must be less than the depth, %.4g m: grains must be left at the surface", p->depth);
+	return band_check(&((const surface *)self)->band, setup, err, "at the surface");
 }
 
 static void mark(const void *self, const quern_cell_batch *b) {
@@ -45,13 +35,7 @@ static void mark(const void *self, const quern_cell_batch *b) {
 }
 
 static void decide(const void *self, const quern_cell_batch *b) {
-	const surface *p = self;
-	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_real d = b->distance[i] - p->depth;
-		b->wish[i] = d < -p->half_width   ? QUERN_DISCRETE
-					 : d <= p->half_width ? QUERN_HYBRID
-										  : QUERN_CONTINUUM;
-	}
+	band_decide(&((const surface *)self)->band, b);
 }
 
 static uint32_t flags(const void *self) {

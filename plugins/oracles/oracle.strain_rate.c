@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* oracle.strain_rate - grains where the flow shears fast. docs/theory/hybrid.md, section 3 */
+#include "band.h"
 #include <math.h>
-#include <quern/oracle.h>
 
 typedef struct {
-	quern_real shear_rate, inertial_number, release, depth, half_width, cell;
+	quern_real shear_rate, inertial_number, release;
+	oracle_band band;
 	bool by_rate, by_number;
 } shear;
 
@@ -15,29 +16,19 @@ static const quern_param params[] = { QUERN_PARAM(shear, shear_rate, "1/s",
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(shear, release, "1", "Grains stay until the flow is slower than this share of the threshold.",
 		.def = 0.6, .min = 0, .max = 1, .flags = QUERN_MIN_OPEN),
-	QUERN_PARAM(shear, depth, "m", "Distance from the fast region to the middle of the hybrid zone.",
-		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(shear, half_width, "m", "Half the width of the hybrid zone; a cell at least.",
-		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(
-		shear, cell, "m", "Cell of the grid.", .from = "grid.cell", .flags = QUERN_MAYBE | QUERN_ADVANCED),
+	BAND_PARAMS(shear, "Distance from the fast region to the middle of the hybrid zone."),
 	QUERN_PARAM(shear, by_rate, NULL, "Keep the shear rate; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_PARAM(shear, by_number, NULL, "Keep the inertial number; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
-enum { RATE, NUMBER };
-static const quern_use uses[] = { { .field = "cell.shear_rate",
-									  .unit = "1/s",
-									  .doc = "Of the mean velocity of both.",
-									  .when = "by_rate",
-									  .access = QUERN_READ,
-									  .shape = QUERN_SCALAR },
-	{ .field = "cell.inertial_number",
-		.unit = "1",
-		.doc = "Shear rate times d sqrt(rho/p).",
-		.when = "by_number",
-		.access = QUERN_READ,
-		.shape = QUERN_SCALAR },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(RATE, "cell.shear_rate", "1/s", QUERN_READ, QUERN_SCALAR, .when = "by_rate", \
+		.doc = "Of the mean velocity of both.") \
+	X(NUMBER, "cell.inertial_number", "1", QUERN_READ, QUERN_SCALAR, .when = "by_number", \
+		.doc = "Shear rate times d sqrt(rho/p).")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	shear *p = self;
@@ -45,12 +36,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	p->by_number = !isnan(p->inertial_number);
 	if (!p->by_rate && !p->by_number)
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "give shear_rate, inertial_number or both");
-	if (p->half_width < (1 - 1e-9) * p->cell)
-		return setup->host->fail(err, QUERN_E_PARAM, "half_width",
-			"must be a cell at least, %.4g m: a narrower zone is none in places", p->cell);
-	if (p->depth > p->half_width) return QUERN_OK;
-	return setup->host->fail(err, QUERN_E_PARAM, "half_width",
-		"must be less than the depth, %.4g m: grains must be left where the flow is fast", p->depth);
+	return band_check(&p->band, setup, err, "where the flow is fast");
 }
 
 /* Above the threshold: outside. A cell that has grains keeps them down to a lower one, so that it does not flicker. */
@@ -66,13 +52,7 @@ static void mark(const void *self, const quern_cell_batch *b) {
 }
 
 static void decide(const void *self, const quern_cell_batch *b) {
-	const shear *p = self;
-	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_real d = b->distance[i] - p->depth;
-		b->wish[i] = d < -p->half_width   ? QUERN_DISCRETE
-					 : d <= p->half_width ? QUERN_HYBRID
-										  : QUERN_CONTINUUM;
-	}
+	band_decide(&((const shear *)self)->band, b);
 }
 
 static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide };

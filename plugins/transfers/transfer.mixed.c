@@ -8,15 +8,16 @@ typedef struct {
 	int32_t unused;
 } mixed;
 static const quern_param params[] = { QUERN_END_PARAMS };
-enum { NORMAL };
-static const quern_use uses[] = { { .field = "particle.zone_normal",
-									  .unit = "1",
-									  .doc = "Unit normal of the zone's level set; zero away from it.",
-									  .access = QUERN_READ,
-									  .shape = QUERN_VECTOR },
-	QUERN_END_USES };
+/* clang-format off */
+#define USES(X) \
+	X(NORMAL, "particle.zone_normal", "1", QUERN_READ, QUERN_VECTOR, \
+		.doc = "Unit normal of the zone's level set; zero away from it.")
+/* clang-format on */
+QUERN_USE_ENUM(USES);
+static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
-/* r = n (n . (v_flip - v_pic)); first pass sends r, the last one sets v = v_flip - r + sum S R_i, R_i = sum S m r/m_i */
+/* r = n (n . (v_flip - v_pic)); first pass sends r, the last one sets v = v_flip - r + sum S R_i, R_i = sum S m
+ * r/m_i */
 QUERN_INLINE void gather(const int dim, const bool last, const quern_transfer_batch *b) {
 	quern_real *const *normal = b->use[NORMAL].real;
 	QUERN_SIMD

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* transfer.picflip - keeps what lies below the grid (FLIP) and lets it decay at a rate (PIC). docs/theory/transfers.md */
+/* transfer.picflip - keeps what lies below the grid (FLIP) and lets it decay at a rate (PIC).
+ * docs/theory/transfers.md */
 #include <quern/math.h>
 #include <quern/transfer.h>
 

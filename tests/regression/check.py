@@ -19,7 +19,8 @@ def at_once(function, items):
 
 
 def properties_of(path, *options):
-    done = workshop.subprocess.run([workshop.QUERN, "check", path, *options], capture_output=True, text=True, timeout=300)
+    words = [workshop.QUERN, "check", path, *options]
+    done = workshop.subprocess.run(words, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, f"{path}: exit status {done.returncode}\n{done.stdout}"
     kind = str(path).rsplit("/", 1)[1].split(".")[0]
     return {(kind, name) for name in re.findall(r"^  ok +([^:]+):", done.stdout, re.M)}
@@ -230,7 +231,8 @@ def fly(folder, changes, *options, status=2):
     """A solver from the template with some changes, in a scene."""
     scene = workshop.pathlib.Path(folder) / "flight.yaml"
     scene.write_text(FLIGHT)
-    return quern("check", compile(source("solver", *changes), "solver.mine", folder), "--scene", scene, *options, status=status)
+    path = compile(source("solver", *changes), "solver.mine", folder)
+    return quern("check", path, "--scene", scene, *options, status=status)
 
 
 def check_one_solver(broken):
@@ -261,7 +263,8 @@ def check_solvers():
             said = fly(folder, once_moved(statement), "--seconds", 2)
             assert sentence in said, f"'{sentence}' is not in\n{said}"
     found = set().union(*at_once(check_one_solver, BROKEN_SOLVERS))
-    print(f"{len(BROKEN_SOLVERS)} solvers broken on purpose fail where they should in a scene, {len(SOLVERS_THAT_END)} end in a sentence")
+    print(f"{len(BROKEN_SOLVERS)} solvers broken on purpose fail where they should in a scene, "
+          f"{len(SOLVERS_THAT_END)} end in a sentence")
     return found
 
 
@@ -385,7 +388,8 @@ def check_outside():
         template = f"""#include <quern/abi.h>
 {kind}
 typedef struct {{ quern_real size; }} lamp;
-static const quern_param params[] = {{ QUERN_PARAM(lamp, size, "m", "Size.", .def = 1, .min = 0.1, .max = 9), QUERN_END_PARAMS }};
+static const quern_param params[] = {{ QUERN_PARAM(lamp, size, "m", "Size.", .def = 1, .min = 0.1, .max = 9),
+	QUERN_END_PARAMS }};
 static const quern_use uses[] = {{ QUERN_END_USES }};
 static void value(const void *self, const glow_batch *b) {{
 	for (uint32_t i = 0; i < b->n; i++) b->value[i] = ((const lamp *)self)->size * b->place[i] * b->place[i];
@@ -407,13 +411,21 @@ QUERN_LIBRARY(plugin, "1", "MIT");
         compile(test, "check.glow", folder)
         said = quern("check", bulb, status=0, **path)
         assert "the same on both sides" in said and "batches" in said and "61 settings" not in said, said
-        assert "check.glow" in quern("list", "--all", status=0, **path) and "check.glow" not in quern("list", status=0, **path)
+        assert "check.glow" in quern("list", "--all", status=0, **path)
+        assert "check.glow" not in quern("list", status=0, **path)
+        # nobody is offered a test in place of a plugin
+        assert "no plugin 'glow'" in quern("describe", "glow", status=2, **path)
+        scene = workshop.SOURCE / "configs/two_grains.yaml"
+        said = quern("plan", scene, "--set", "grains.contact=glow", status=2, **path)
+        assert "unknown contact 'glow'" in said and "check.glow" not in said, said
         tilted = text.replace("b->place[i];", "b->place[i] + 0.1 * b->place[i];")
-        assert failures(quern("check", compile(tilted, "glow.bulb", folder), status=2, **path)) == {"the same on both sides"}
+        said = quern("check", compile(tilted, "glow.bulb", folder), status=2, **path)
+        assert failures(said) == {"the same on both sides"}, said
         later = text.replace("uint32_t size, pad;", "uint32_t size, pad; void *later[2];")
         assert "newer header" in quern("check", compile(later, "glow.bulb", folder), status=2, **path)
         # a test that crashes, and one whose table is wrong
-        bad = test.replace("static void law(const quern_check *c) {", "static void law(const quern_check *c) { __builtin_trap();")
+        begin = "static void law(const quern_check *c) {"
+        bad = test.replace(begin, begin + " __builtin_trap();")
         compile(text, "glow.bulb", folder), compile(bad, "check.glow", folder)
         assert "FAILED  law: glow.bulb: crashed (SIGILL) in" in quern("check", bulb, status=2, **path)
         compile(test.replace('"check.glow"', '"check.shine"'), "check.glow", folder)
@@ -423,8 +435,8 @@ QUERN_LIBRARY(plugin, "1", "MIT");
 
 def check_places():
     """Nothing of a plugin runs in the process that was started."""
-    start = '\n#include <stdio.h>\n#include <stdlib.h>\n#include <unistd.h>\n__attribute__((constructor)) static void start(void) {' \
-            ' FILE *f = fopen(getenv("NOTES"), "a"); fprintf(f, "%d\\n", (int)getpid()); fclose(f); }\n'
+    start = '\n#include <stdio.h>\n#include <stdlib.h>\n#include <unistd.h>\n' \
+            '__attribute__((constructor)) static void start(void) { FILE *f = fopen(getenv("NOTES"), "a"); fprintf(f, "%d\\n", (int)getpid()); fclose(f); }\n'
     with tempfile.TemporaryDirectory() as folder:
         notes = workshop.pathlib.Path(folder) / "notes"
         path = compile(source(LINEAR) + start, "contact.linear", folder)

@@ -16,7 +16,8 @@ from workshop import FLAGS, PLUGINS, QUERN, SOURCE, source
 
 BUILD = pathlib.Path(QUERN).parent
 # What plugins fill has a size or a stride; what the host fills and hands over by pointer may be longer than they know.
-LONGER = r"\} (quern_(?:param|use|plugin|library|setup|step|host|kind|function|output|set|slot|stage|bound|check|check_host|check_instance|check_kernel|check_column|\w+_ops|\w+_batch|neighbour_job|coupling_job));"
+LONGER = (r"\} (quern_(?:param|use|plugin|library|setup|step|host|kind|function|output|set|slot|stage|bound|\w+_ops|\w+_batch|"
+          r"neighbour_job|coupling_job|check|check_host|check_instance|check_kernel|check_column));")
 
 
 def newer_headers(folder):

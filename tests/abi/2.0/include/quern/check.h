@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* quern/check.h - the kind `check`: a conformance test of one kind of plugins, which `quern check` finds and calls.
  *
- * A conformance test of the kind KIND is a plugin check.KIND.so (id "check.contact"): it lies where plugins of that kind do,
- * and whoever brings a kind brings it along. `quern check FILE.so` looks for the one of the plugin's kind and calls it in
- * child processes, a group of tests each. What all kinds have in common, tables, parameters, batches, threads, guards, is
- * the program's part; what must hold for this kind alone is `law`.
+ * A conformance test of the kind KIND is a plugin check.KIND.so (id "check.contact"): it lies where plugins of that
+ * kind do, and whoever brings a kind brings it along. `quern check FILE.so` looks for the one of the plugin's kind and
+ * calls it in child processes, a group of tests each. What all kinds have in common, tables, parameters, batches,
+ * threads, guards, is the program's part; what must hold for this kind alone is `law`.
  *
  * A test works with instances of the plugin, whose parameters the program makes up from its rows, and with kernels: a
- * function of the plugin that is called with batches, together with the columns that it gets. Every call of a kernel gets
- * copies of its columns: cut as wished, padded with harmless lanes, with guards on both ends. What was tried is summed up in
- * tallies, a line of output each.
+ * function of the plugin that is called with batches, together with the columns that it gets. Every call of a kernel
+ * gets copies of its columns: cut as wished, padded with harmless lanes, with guards on both ends. What was tried is
+ * summed up in tallies, a line of output each.
  *
- * Growth.  What is marked "the host's" comes from it by pointer and may be longer than a test knows. A tally stands in the
- *          test's own memory and never grows. */
+ * Growth.  What is marked "the host's" comes from it by pointer and may be longer than a test knows. A tally stands in
+ *          the test's own memory and never grows. */
 #pragma once
 #include <quern/abi.h>
 
@@ -127,8 +127,8 @@ typedef struct quern_check_host {
 	/* Setting 0: ordinary parameters; 1 .. 2 n: one of them at its lower or upper bound; above: any mixture. NULL if
 	 * the plugin refuses these parameters, or if this dimension is not its own or not to be tried. Destroy takes NULL. */
 	quern_check_instance *(*instance_create)(const quern_check *, uint32_t dim, uint64_t setting);
-	/* The same setting with every parameter that contains a mass, such as N/m or J/kg, for masses that are `factor` times
-	 * as large. */
+	/* The same setting with every parameter that contains a mass, such as N/m or J/kg, for masses that are `factor`
+	 * times as large. */
 	quern_check_instance *(*instance_scaled)(
 		const quern_check *, const quern_check_instance *, double factor);
 	void (*instance_destroy)(quern_check_instance *);
@@ -174,12 +174,12 @@ typedef struct quern_check_host {
 typedef struct quern_check_ops {
 	uint32_t size, pad;
 	const quern_kind *kind; /* that is checked: &quern_contact_kind of quern/contact.h, or one's own */
-	/* A kernel on ordinary input, which the host runs with many cuts and settings; NULL if there is no such variant: they
-	 * are counted from 0. May be NULL. */
+	/* A kernel on ordinary input, which the host runs with many cuts and settings; NULL if there is no such variant:
+	 * they are counted from 0. May be NULL. */
 	quern_check_kernel *(*make)(
 		const quern_check *, const quern_check_instance *, uint32_t variant, uint32_t n);
-	/* Whether an instance, whatever its parameters, gives sensible results, or what does not; for kinds without `make`.
-	 * May be NULL. */
+	/* Whether an instance, whatever its parameters, gives sensible results, or what does not; for kinds without
+	 * `make`. May be NULL. */
 	bool (*sane)(const quern_check *, const quern_check_instance *, const char **why);
 	/* What must hold for this kind: tallies, each told once. */
 	void (*law)(const quern_check *);

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: MIT */
+/* rows - the uses of the grain solver's stages, and the numbers of their rows */
+#pragma once
+#include <math.h>
+#include <quern/abi.h>
+
+/* clang-format off */
+#define DISPLACEMENT_USE \
+	"total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY, \
+	.doc = "Farthest way of a grain since the last list; infinite: the list is stale."
+#define FIXED_USE(access) \
+	"grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed", .doc = "1: it does not move."
+#define ENERGY_USE(name, access, text) \
+	"total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, .doc = text
+
+#define FILL_USES(X) \
+	X(FILL_POSITION, "grain.position", "m", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_SHOWN, .doc = "Centre.") \
+	X(FILL_VELOCITY, "grain.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity.") \
+	X(FILL_RADIUS, "grain.radius", "m", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, .doc = "Radius.") \
+	X(FILL_MASS, "grain.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted.") \
+	X(FILL_SPIN, "grain.spin", "rad/s", QUERN_WRITE, QUERN_AXIAL, .flags = QUERN_OPTIONAL, \
+		.doc = "Angular velocity.") \
+	X(FILL_WEIGHT, "grain.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1, \
+		.doc = "Share of its mass that the grain carries.") \
+	X(FILL_FIXED, FIXED_USE(QUERN_WRITE)) \
+	X(FILL_ID, "grain.id", "1", QUERN_WRITE, QUERN_ID, .flags = QUERN_SHOWN, \
+		.doc = "Number of the grain, for ever.") \
+	X(FILL_DISPLACEMENT, DISPLACEMENT_USE)
+QUERN_USE_ENUM(FILL_USES);
+
+#define OPEN_USES(X) \
+	X(OPEN_POSITION, "grain.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(OPEN_VELOCITY, "grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(OPEN_SPIN, "grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
+	X(OPEN_ANCHOR, "grain.anchor", "m", QUERN_READ, QUERN_VECTOR) \
+	X(OPEN_FIXED, FIXED_USE(QUERN_READ)) \
+	X(OPEN_DISPLACEMENT, DISPLACEMENT_USE)
+QUERN_USE_ENUM(OPEN_USES);
+
+/* positions are brought back through periodic faces in place, all of them before anybody looks at others */
+#define NEAR_USES(X) \
+	X(NEAR_POSITION, "grain.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(NEAR_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS) \
+	X(NEAR_ID, "grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS) \
+	X(NEAR_FIXED, FIXED_USE(QUERN_READ)) \
+	X(NEAR_DISPLACEMENT, DISPLACEMENT_USE) \
+	X(NEAR_ANCHOR, "grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made.") \
+	X(NEAR_FIRST, "contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", \
+		.doc = "The grain of lower id.") \
+	X(NEAR_SECOND, "contact.second", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", \
+		.doc = "The grain of higher id.") \
+	X(NEAR_GRAIN, "touch.grain", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain.") \
+	X(NEAR_BODY, "touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body.") \
+	X(NEAR_FEATURE, "touch.feature", "1", QUERN_WRITE, QUERN_INDEX, .when = "features", \
+		.doc = "The body's face, edge or vertex.")
+QUERN_USE_ENUM(NEAR_USES);
+
+/* Forces of the state as it is: what a look at them takes and what a step does. */
+#define STATE_USES(X, moves, gives) \
+	X(FORCE_OLD_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS) \
+	X(FORCE_OLD_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS) \
+	X(FORCE_OLD_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL) \
+	X(FORCE_POSITION, "grain.position", "m", moves, QUERN_VECTOR) \
+	X(FORCE_VELOCITY, "grain.velocity", "m/s", moves, QUERN_VECTOR) \
+	X(FORCE_SPIN, "grain.spin", "rad/s", moves, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
+	X(FORCE_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS) \
+	X(FORCE_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS) \
+	X(FORCE_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL) \
+	X(FORCE_FIXED, FIXED_USE(QUERN_READ)) \
+	X(FORCE_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(FORCE_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(FORCE_GRAIN, "touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(FORCE_BODY, "touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body") \
+	X(FORCE_FEATURE, "touch.feature", "1", QUERN_READ, QUERN_INDEX, .when = "features") \
+	X(FORCE_CONTACT, "contact.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
+		.doc = "On the first, unweighted.") \
+	X(FORCE_TOUCH, "touch.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
+		.doc = "On the grain, unweighted.") \
+	X(FORCE_CONTACT_COUPLE, "contact.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL, \
+		.doc = "On the first, unweighted.") \
+	X(FORCE_TOUCH_COUPLE, "touch.couple", "N m", gives, QUERN_AXIAL, .flags = QUERN_OPTIONAL, \
+		.doc = "On the grain, unweighted.") \
+	X(FORCE_SUM, "grain.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
+		.doc = "Of all contacts, weighted; without gravity.") \
+	X(FORCE_CONTACT_SHEARED, "contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, \
+		.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step.") \
+	X(FORCE_TOUCH_SHEARED, "touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, \
+		.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step.") \
+	X(FORCE_ID, "grain.id", "1", QUERN_READ, QUERN_ID)
+#define LOOK_USES(X) STATE_USES(X, QUERN_READ, QUERN_UPDATE)
+QUERN_USE_ENUM(LOOK_USES);
+
+#define MOVE_USES(X) \
+	X(FORCE_ANCHOR, "grain.anchor", "m", QUERN_READ, QUERN_VECTOR) \
+	X(FORCE_DISPLACEMENT, DISPLACEMENT_USE) \
+	X(FORCE_IMPULSE, "body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED) \
+	X(FORCE_SUPPORT, "total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, \
+		.doc = "Impulse that fixed grains have given to moving ones.") \
+	X(FORCE_DAMPED, ENERGY_USE("damped", QUERN_UPDATE, "Lost in dashpots so far.")) \
+	X(FORCE_RUBBED, ENERGY_USE("rubbed", QUERN_UPDATE, "Lost to sliding so far.")) \
+	X(FORCE_TREMBLING, "total.trembling", "1", QUERN_UPDATE, QUERN_INDEX, \
+		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0.") \
+	X(FORCE_DEEP_FIRST, "total.deep_first", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", .initial = -1, \
+		.doc = "Id of the grain whose deep contact is watched; -1: none is.") \
+	X(FORCE_DEEP_SECOND, "total.deep_second", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", \
+		.doc = "Id of its partner; -1 - k for body k.") \
+	X(FORCE_DEEP_TIME, "total.deep_time", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", \
+		.doc = "For how long the contact has been deep.")
+QUERN_USE_ENUM_FROM(LOOK_USES_ROWS, MOVE_USES);
+
+#define ENERGY_USES(X) \
+	X(OBSERVE_KINETIC, \
+		ENERGY_USE("kinetic", QUERN_WRITE, "Of the grains, with the velocity in the middle of a kick.")) \
+	X(OBSERVE_POTENTIAL, ENERGY_USE("potential", QUERN_WRITE, "Of the grains, -m g x.")) \
+	X(OBSERVE_STORED, ENERGY_USE("stored", QUERN_WRITE, "In normal springs.")) \
+	X(OBSERVE_SHEARED, ENERGY_USE("sheared", QUERN_WRITE, "In tangential springs."))
+QUERN_USE_ENUM_FROM(LOOK_USES_ROWS, ENERGY_USES);
+
+#define FORCE_USES(X) STATE_USES(X, QUERN_UPDATE, QUERN_WRITE) MOVE_USES(X)
+#define OBSERVE_USES(X) LOOK_USES(X) ENERGY_USES(X)
+/* clang-format on */

@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: MIT */
+/* rows - the uses of the hybrid solver's stages, and the numbers of their rows */
+#pragma once
+#include <quern/abi.h>
+
+/* clang-format off */
+#define FIXED_USE "grain.fixed", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL
+
+/* sees everything */
+#define UPDATE_USES(X) \
+	X(U_GRAIN_POSITION, "grain.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(U_GRAIN_VELOCITY, "grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(U_GRAIN_SPIN, "grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
+	X(U_GRAIN_RADIUS, "grain.radius", "m", QUERN_UPDATE, QUERN_SCALAR) \
+	X(U_GRAIN_MASS, "grain.mass", "kg", QUERN_UPDATE, QUERN_SCALAR) \
+	X(U_GRAIN_WEIGHT, "grain.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN) \
+	X(U_GRAIN_FIXED, FIXED_USE) \
+	X(U_GRAIN_HOME, "grain.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update.") \
+	X(U_GRAIN_NORMAL, "grain.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
+		.doc = "Unit normal of the zone's level set.") \
+	X(U_POINT_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(U_POINT_VELOCITY, "point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(U_POINT_MASS, "point.mass", "kg", QUERN_UPDATE, QUERN_SCALAR) \
+	X(U_POINT_VOLUME, "point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR) \
+	X(U_POINT_STRESS, "point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC) \
+	X(U_POINT_WEIGHT, "point.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN) \
+	X(U_POINT_HOME, "point.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update.") \
+	X(U_POINT_NORMAL, "point.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
+		.doc = "Unit normal of the zone's level set.") \
+	X(U_ZONE, "cell.zone", "1", QUERN_UPDATE, QUERN_INDEX, .flags = QUERN_SHOWN, \
+		.doc = "0: grains, 1: both, 2: continuum.") \
+	X(U_FRACTION, "cell.packing_fraction", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Of grains; 1 where the continuum fills the cell.") \
+	X(U_SHEAR_RATE, "cell.shear_rate", "1/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Of the mean velocity of both.") \
+	X(U_INERTIAL, "cell.inertial_number", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Shear rate times d sqrt(rho/p).") \
+	X(U_GRAIN_OWED, "cell.grain_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the grains.") \
+	X(U_POINT_OWED, "cell.point_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the continuum.") \
+	X(U_GRAIN_OWED_MOMENTUM, "cell.grain_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "Momentum owed to the grains.") \
+	X(U_POINT_OWED_MOMENTUM, "cell.point_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "Momentum owed to the continuum.") \
+	X(U_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, \
+		.doc = "Sum of the contact stress over the samples since the last update.") \
+	X(U_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Samples of the contact stress.") \
+	X(U_DRAWS, "total.draws", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Radii drawn for new grains.") \
+	X(U_UPDATES, "total.updates", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Zone updates so far.") \
+	X(U_MASS, "total.mass_initial", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass at the release.") \
+	X(U_DISPLACEMENT, "total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY) \
+	X(U_UNSORTED, "total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX) \
+	X(U_MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR) \
+	X(U_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR)
+QUERN_USE_ENUM(UPDATE_USES);
+
+#define SAMPLE_USES(X) \
+	X(S_FORCE, "contact.force", "N", QUERN_READ, QUERN_VECTOR) \
+	X(S_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(S_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(S_TOUCH_FORCE, "touch.force", "N", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED) \
+	X(S_TOUCH_GRAIN, "touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL) \
+	X(S_TOUCH_BODY, "touch.body", "1", QUERN_READ, QUERN_INDEX, .target = "body", .flags = QUERN_OPTIONAL) \
+	X(S_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(S_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR) \
+	X(S_FIXED, FIXED_USE) \
+	X(S_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, .flags = QUERN_RELEASED) \
+	X(S_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED) \
+	X(S_TOUCH_FEATURE, "touch.feature", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL)
+QUERN_USE_ENUM(SAMPLE_USES);
+
+#define RASTER_USES(X) \
+	X(R_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(R_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(R_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(R_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR) \
+	X(R_FIXED, FIXED_USE) \
+	X(R_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(R_MOTION, "motion.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(R_MIXTURE, "mixture.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass of grains.") \
+	X(R_MIXTURE_MOMENTUM, "mixture.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, \
+		.doc = "Weighted momentum of grains.")
+QUERN_USE_ENUM(RASTER_USES);
+
+#define COUPLE_USES(X) \
+	X(C_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(C_MOTION, "motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(C_MIXTURE, "mixture.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(C_EXCHANGE, "total.exchange_defect", "1", QUERN_WRITE, QUERN_SCALAR, \
+		.doc = "Momentum that the coupling made, over that of the node: the worst node.") \
+	X(C_ENERGY, "total.exchanged", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Taken by the coupling so far.") \
+	X(C_CHANGE, "motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(C_DENSITY, "motion.density", "kg/m^3", QUERN_UPDATE, QUERN_SCALAR) \
+	X(C_MIXTURE_MOMENTUM, "mixture.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
+	X(C_MIXTURE_CHANGE, "mixture.change", "m/s", QUERN_ADD, QUERN_VECTOR, .doc = "What the coupling changes.")
+QUERN_USE_ENUM(COUPLE_USES);
+
+#define BACK_USES(X) \
+	X(B_POSITION, "grain.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(B_VELOCITY, "grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(B_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(B_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR) \
+	X(B_FIXED, FIXED_USE) \
+	X(B_ANCHOR, "grain.anchor", "m", QUERN_READ, QUERN_VECTOR) \
+	X(B_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(B_MIXTURE, "mixture.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(B_DISPLACEMENT, "total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY) \
+	X(B_MIXTURE_MOMENTUM, "mixture.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
+	X(B_MIXTURE_CHANGE, "mixture.change", "m/s", QUERN_READ, QUERN_VECTOR)
+QUERN_USE_ENUM(BACK_USES);
+
+#define AUDIT_USES(X) \
+	X(A_GRAIN_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(A_GRAIN_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(A_GRAIN_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR) \
+	X(A_GRAIN_FIXED, FIXED_USE) \
+	X(A_POINT_VELOCITY, "point.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(A_POINT_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(A_POINT_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR) \
+	X(A_GRAIN_OWED, "cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(A_POINT_OWED, "cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(A_GRAIN_OWED_MOMENTUM, "cell.grain_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
+	X(A_POINT_OWED_MOMENTUM, "cell.point_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
+	X(A_BODY, "body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED) \
+	X(A_FACES, "total.faces", "N s", QUERN_READ, QUERN_VECTOR) \
+	X(A_SUPPORT, "total.support", "N s", QUERN_READ, QUERN_VECTOR) \
+	X(A_EXCHANGE, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR) \
+	X(A_GRAVITY, "total.gravity_impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "Given by gravity since the first audit.") \
+	X(A_MASS, "total.audit_mass", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Carried and owed at the first audit.") \
+	X(A_MOMENTUM, "total.audit_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "Carried and owed at the first audit, without impulses.") \
+	X(A_SCALE, "total.audit_scale", "kg m/s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Largest sum of w m |v| so far.") \
+	X(A_LEFT, "total.audit_left", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "What the momentum invariant was off by after the last step.") \
+	X(A_AUDITS, "total.audits", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: the first audit has been.") \
+	X(A_MASS_DEFECT, "total.mass_defect", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "Of the mass invariant, relative: the worst so far.") \
+	X(A_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "Of the momentum invariant, relative: the worst so far.") \
+	X(A_ENERGY, "total.audit_energy", "J", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "Of motion and in springs at the first audit: no less than that.") \
+	X(A_WORK, "total.gravity_work", "J", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "Done by gravity since the first audit.") \
+	X(A_FORCE, "contact.force", "N", QUERN_READ, QUERN_VECTOR) \
+	X(A_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(A_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(A_GRAIN_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(A_GRAIN_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR) \
+	X(A_GRAIN_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
+	X(A_POINT_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR) \
+	X(A_POINT_STRESS, "point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC)
+QUERN_USE_ENUM(AUDIT_USES);
+/* clang-format on */

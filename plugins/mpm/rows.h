@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: MIT */
+/* rows - the uses of the continuum solver's stages, and the numbers of their rows */
+#pragma once
+#include <quern/abi.h>
+
+/* clang-format off */
+#define UNSORTED_USE \
+	"total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: points must be sorted before the next scatter."
+#define IMPULSE_USE "body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL
+#define FACES_USE \
+	"total.faces", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
+	.doc = "Impulse on the continuum by closed faces of the domain and by the limit on light nodes."
+
+#define FILL_USES(X) \
+	X(FILL_POSITION, "point.position", "m", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_SHOWN, .doc = "Position.") \
+	X(FILL_VELOCITY, "point.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity.") \
+	X(FILL_MASS, "point.mass", "kg", QUERN_WRITE, QUERN_SCALAR, .doc = "Mass, unweighted.") \
+	X(FILL_VOLUME, "point.volume", "m^3", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_SHOWN, \
+		.doc = "Volume, unweighted.") \
+	X(FILL_STRESS, "point.stress", "Pa", QUERN_WRITE, QUERN_SYMMETRIC, .doc = "Cauchy stress, tension positive.") \
+	X(FILL_WEIGHT, "point.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1, \
+		.doc = "Share of its mass that the point carries.") \
+	X(FILL_ENERGY, "point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Stored elastic energy.") \
+	X(FILL_UNSORTED, UNSORTED_USE) \
+	X(FILL_AFFINE, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL)
+QUERN_USE_ENUM(FILL_USES);
+
+#define SORT_USES(X) \
+	X(SORT_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(SORT_UNSORTED, UNSORTED_USE)
+QUERN_USE_ENUM(SORT_USES);
+
+#define SCATTER_USES(X) \
+	X(SCATTER_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(SCATTER_VELOCITY, "point.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(SCATTER_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(SCATTER_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR) \
+	X(SCATTER_STRESS, "point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC) \
+	X(SCATTER_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(SCATTER_AFFINE, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL) \
+	X(SCATTER_NODE_MASS, "node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass.") \
+	X(SCATTER_NODE_MOMENTUM, "node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum.") \
+	X(SCATTER_NODE_FORCE, "node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force.") \
+	X(SCATTER_AFFINE_WANTED, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .when = "affine")
+QUERN_USE_ENUM(SCATTER_USES);
+
+#define NODES_USES(X) \
+	X(NODES_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(NODES_MOTION, "motion.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity.") \
+	X(NODES_IMPULSE, IMPULSE_USE) \
+	X(NODES_FACES, FACES_USE) \
+	X(NODES_CHANGE, "motion.change", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity gained in this step.") \
+	X(NODES_DENSITY, "motion.density", "kg/m^3", QUERN_WRITE, QUERN_SCALAR, \
+		.doc = "Mass of a node over its volume.") \
+	X(NODES_NODE_MOMENTUM, "node.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
+	X(NODES_NODE_FORCE, "node.force", "N", QUERN_READ, QUERN_VECTOR)
+QUERN_USE_ENUM(NODES_USES);
+
+#define WALLS_USES(X) \
+	X(WALLS_MOTION, "motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(WALLS_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(WALLS_IMPULSE, IMPULSE_USE) \
+	X(WALLS_FACES, FACES_USE) \
+	X(WALLS_CHANGE, "motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR)
+QUERN_USE_ENUM(WALLS_USES);
+
+/* point.affine is written if somebody wants it sent; that it shall be written out does not make it */
+#define GATHER_USES(X) \
+	X(GATHER_MOTION, "motion.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(GATHER_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(GATHER_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(GATHER_VELOCITY, "point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(GATHER_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(GATHER_VOLUME, "point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR) \
+	X(GATHER_STRESS, "point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC) \
+	X(GATHER_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(GATHER_GRADIENT, "point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
+		.doc = "Velocity gradient of the last step.") \
+	X(GATHER_AFFINE, "point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
+		.with = "point.affine", .doc = "The same, sent to the nodes with the velocity.") \
+	X(GATHER_PRESSURE, "point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Minus the mean normal stress.") \
+	X(GATHER_ENERGY, "point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Stored elastic energy.") \
+	X(GATHER_WAVE, "point.wave_speed", "m/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Of pressure waves.") \
+	X(GATHER_UNSORTED, UNSORTED_USE) \
+	X(GATHER_CHANGE, "motion.change", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(GATHER_DENSITY, "motion.density", "kg/m^3", QUERN_READ, QUERN_SCALAR)
+QUERN_USE_ENUM(GATHER_USES);
+/* clang-format on */
