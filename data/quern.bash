@@ -10,7 +10,7 @@ _quern() {
 	elif [ "$command" = describe ]; then
 		mapfile -t COMPREPLY < <(compgen -W "scene $(quern list | cut -d' ' -f1)" -- "$word")
 	elif [ "$command" = new ] && [ "$before" = new ]; then
-		mapfile -t COMPREPLY < <(compgen -W "$(quern list | cut -d. -f1 | sort -u)" -- "$word")
+		mapfile -t COMPREPLY < <(compgen -W "$(quern list --all | cut -d. -f1 | sort -u)" -- "$word")
 	else
 		mapfile -t COMPREPLY < <(compgen -f -- "$word")
 	fi

@@ -2,6 +2,7 @@
 /* check_setting - instances with parameters of ordinary size, at their bounds, or mixed; written as a scene would */
 #include "check.h"
 #include "random.h"
+#include "scene.h"
 #include "text.h"
 #include <math.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@ typedef enum { ORDINARY, LOW, HIGH, ANY, NEAR } choice;
 /* Settings from here on lie around the ordinary values, for what refuses these. */
 static const uint64_t nearby = 1u << 20;
 
-double quern_check_ordinary(const check *c, const char *unit) {
+double quern_check_ordinary(const quern_check *open, const char *unit) {
 	static const struct {
 		const char *unit;
 		double value;
@@ -20,6 +21,7 @@ double quern_check_ordinary(const check *c, const char *unit) {
 		{ "1/s", 10 }, { "s", 1e-3 }, { "kg", 1e-3 }, { "m/s^2", 9.81 }, { "1", 0.5 }, { "N", 1 },
 		{ "J", 1e-3 }, { "rad/s", 10 }, { "rad", 0.5 }, { "m^3", 1e-9 }, { "kg m^2", 1e-9 }, { "J/kg", 1 },
 		{ "N m", 1e-3 } };
+	const check *c = (const check *)(const void *)open;
 	if (!unit || !*unit) return 0.5;
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
 		if (!strcmp(unit, sizes[i].unit) || quern_units_equal(c->units, unit, sizes[i].unit))
@@ -44,7 +46,7 @@ static bool needs_a_value(const quern_param *row) {
 
 static double usual(const check *c, uint32_t dim, const quern_param *row) {
 	if (needs_a_value(row) || row->from || row->flags & QUERN_MAYBE)
-		return within(row, quern_check_ordinary(c, row->unit));
+		return within(row, quern_check_ordinary(&c->open, row->unit));
 	return quern_param_default(row, dim);
 }
 
@@ -74,7 +76,7 @@ static void put_number(quern_node *map, const char *name, double value) {
 /* Vectors that must be given: different for every row, so that corners are apart and normals have a length. */
 static void put_vector(const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how,
 	uint64_t key, quern_node *map) {
-	const double size = quern_check_ordinary(c, row->unit);
+	const double size = quern_check_ordinary(&c->open, row->unit);
 	if (!needs_a_value(row) && how == ORDINARY) return;
 	if (how != ORDINARY && how != ANY && !bounded(row)) return;
 	quern_node *list = quern_node_put_list(map, row->name);
@@ -151,13 +153,23 @@ static void put_rows(
 	}
 }
 
-uint64_t quern_check_settings(const check *c) { return 2 * (uint64_t)(c->file->n_params) + 1; }
+uint64_t quern_check_settings(const quern_check *c) {
+	return 2 * (uint64_t)(((const check *)(const void *)c)->file->n_params) + 1;
+}
+
+/* ---- instances ---- */
 
 static void no_publish(const quern_setup *setup, const char *name, const char *unit, quern_real value) {
 	(void)setup, (void)name, (void)unit, (void)value;
 }
 
 static const void *no_extension(const char *id) { return (void)id, NULL; }
+
+const quern_host quern_check_init_services = { .abi = QUERN_ABI,
+	.fail = quern_scene_fail,
+	.random = quern_random,
+	.publish = no_publish,
+	.extension = no_extension };
 
 static void say_why(check_instance *it, const char *fallback) {
 	char *data = NULL;
@@ -170,20 +182,15 @@ static void say_why(check_instance *it, const char *fallback) {
 	free(data);
 }
 
-static check_outcome call_init(const check *c, check_instance *it, uint64_t setting) {
-	quern_host host = { .abi = QUERN_ABI,
-		.fail = quern_scene_fail,
-		.random = quern_random,
-		.publish = no_publish,
-		.extension = no_extension };
-	const uint32_t up = it->dim - 1;
-	quern_setup setup = { .dim = it->dim, .lanes = QUERN_LANES, .stream = 7, .host = &host };
+static check_outcome call_init(const check *c, check_instance *it) {
+	const uint32_t dim = it->open.dim;
+	quern_setup setup = { .dim = dim, .lanes = QUERN_LANES, .stream = 7, .host = &quern_check_init_services };
 	quern_err err = { it->report, it->tree->root, { 0 }, c->file->plugin.id };
-	for (uint32_t k = 0; k < it->dim; k++) setup.upper[k] = 1;
-	setup.gravity[up] = -9.81;
-	quern_check_place(
-		c, "init, %u-D, with setting %llu of its parameters", it->dim, (unsigned long long)setting);
-	const quern_status status = c->file->plugin.init(it->self, &setup, &err);
+	for (uint32_t k = 0; k < dim; k++) setup.upper[k] = 1;
+	setup.gravity[dim - 1] = -9.81;
+	quern_check_place(&c->open, "init, %u-D, with setting %llu of its parameters", dim,
+		(unsigned long long)it->open.setting);
+	const quern_status status = c->file->plugin.init(it->open.self, &setup, &err);
 	quern_check_environment(c);
 	const bool spoke = quern_report_errors(it->report) > 0;
 	it->ready = status == QUERN_OK;
@@ -199,7 +206,7 @@ static void scale_rows(const check *c, const quern_param *rows, double factor, v
 	for (; rows && rows->name; rows++) {
 		quern_real *at = (quern_real *)(void *)((char *)self + rows->offset);
 		const quern_list *list = (const quern_list *)(const void *)at;
-		const double times = pow(factor, quern_units_mass(c->units, rows->unit ? rows->unit : "1"));
+		const double times = pow(factor, quern_check_mass_power(&c->open, rows->unit));
 		const uint32_t n = rows->type == QUERN_T_REAL ? 1 : rows->type == QUERN_T_VECTOR ? 3 : 0;
 		for (uint32_t k = 0; k < n; k++) at[k] *= times;
 		for (uint32_t i = 0; rows->type == QUERN_T_LIST && i < list->n; i++)
@@ -207,60 +214,81 @@ static void scale_rows(const check *c, const quern_param *rows, double factor, v
 	}
 }
 
-static check_outcome create(
-	const check *c, uint32_t dim, uint64_t setting, double factor, check_instance *it) {
-	const quern_plugin *p = &c->file->plugin;
-	const size_t size = (p->instance_size + 127u) & ~(size_t)63;
-	*it = (check_instance) { .dim = dim, .setting = setting };
-	it->report = quern_report_create();
-	it->tree = quern_take(1, sizeof *it->tree);
-	it->tree->root = quern_node_create(QUERN_NODE_MAP);
-	it->self = aligned_alloc(64, size);
-	if (!it->self) abort();
-	memset(it->self, 0, size);
-	put_rows(c, dim, c->file->params, setting, it->tree->root);
-	quern_node_merge(it->tree->root, c->given);
-	const quern_reading reading = { it->report, c->units, dim, NULL, 0, it->tree };
-	quern_params_read(&reading, p->id, c->file->params, it->tree->root, (quern_mark) { 0 }, NULL, it->self);
+static check_outcome read_and_init(const check *c, double factor, check_instance *it) {
+	const quern_reading reading = { it->report, c->units, it->open.dim, NULL, 0, it->tree };
+	put_rows(c, it->open.dim, c->file->params, it->open.setting, it->tree->root);
+	quern_node_merge(it->tree->root, c->task->given);
+	quern_params_read(&reading, c->file->plugin.id, c->file->params, it->tree->root, (quern_mark) { 0 }, NULL,
+		it->open.self);
 	if (quern_report_errors(it->report)) return say_why(it, ""), CHECK_REFUSED;
-	if (factor != 1) scale_rows(c, c->file->params, factor, it->self);
-	if (p->init) return call_init(c, it, setting);
+	if (factor != 1) scale_rows(c, c->file->params, factor, it->open.self);
+	if (c->file->plugin.init) return call_init(c, it);
 	it->ready = true;
 	return CHECK_READY;
 }
 
-check_outcome quern_check_instance_create(
-	const check *c, uint32_t dim, uint64_t setting, check_instance *it) {
-	check_instance other;
-	check_outcome outcome = create(c, dim, setting, 1, it);
-	for (uint64_t i = 0; !setting && outcome == CHECK_REFUSED && i < 200; i++) {
-		if (create(c, dim, nearby + i, 1, &other) == CHECK_READY) {
-			quern_check_instance_finish(c, it);
-			*it = other;
-			return CHECK_READY;
-		}
-		quern_check_instance_finish(c, &other);
+static check_instance *create(const check *c, uint32_t dim, uint64_t setting, double factor) {
+	const size_t size = (c->file->plugin.instance_size + 127u) & ~(size_t)63;
+	check_instance *it = quern_take(1, sizeof *it);
+	*it = (check_instance) { .open = { .dim = dim, .setting = setting }, .check = c };
+	it->report = quern_report_create();
+	it->tree = quern_take(1, sizeof *it->tree);
+	it->tree->root = quern_node_create(QUERN_NODE_MAP);
+	it->open.self = aligned_alloc(64, size);
+	if (!it->open.self) abort();
+	memset(it->open.self, 0, size);
+	it->outcome = read_and_init(c, factor, it);
+	return it;
+}
+
+check_instance *quern_check_try(const check *c, uint32_t dim, uint64_t setting) {
+	check_instance *it = create(c, dim, setting, 1);
+	for (uint64_t i = 0; !setting && it->outcome == CHECK_REFUSED && i < 200; i++) {
+		check_instance *other = create(c, dim, nearby + i, 1);
+		const bool better = other->outcome == CHECK_READY;
+		quern_check_instance_destroy(better ? &it->open : &other->open);
+		if (better) return other;
 	}
-	return outcome;
+	return it;
 }
 
-check_outcome quern_check_instance_scaled(
-	const check *c, const check_instance *base, double factor, check_instance *it) {
-	return create(c, base->dim, base->setting, factor, it);
+bool quern_check_has_dim(const check *c, uint32_t dim) {
+	return (!c->task->dimension || c->task->dimension == dim) &&
+		   c->file->plugin.dims & (dim == 2 ? QUERN_2D : QUERN_3D);
 }
 
-void quern_check_instance_finish(const check *c, check_instance *it) {
-	quern_check_place(c, "finish, %u-D", it->dim);
-	if (it->ready && c->file->plugin.finish) c->file->plugin.finish(it->self);
+static quern_check_instance *ready_one(check_instance *it) {
+	if (it->outcome == CHECK_READY) return &it->open;
+	quern_check_instance_destroy(&it->open);
+	return NULL;
+}
+
+quern_check_instance *quern_check_instance_create(const quern_check *open, uint32_t dim, uint64_t setting) {
+	const check *c = (const check *)(const void *)open;
+	return quern_check_has_dim(c, dim) ? ready_one(quern_check_try(c, dim, setting)) : NULL;
+}
+
+quern_check_instance *quern_check_instance_scaled(
+	const quern_check *open, const quern_check_instance *base, double factor) {
+	return ready_one(create((const check *)(const void *)open, base->dim, base->setting, factor));
+}
+
+void quern_check_instance_destroy(quern_check_instance *open) {
+	check_instance *it = (check_instance *)(void *)open;
+	if (!it) return;
+	const check *c = it->check;
+	quern_check_place(&c->open, "finish, %u-D", open->dim);
+	if (it->ready && c->file->plugin.finish) c->file->plugin.finish(open->self);
 	quern_check_environment(c);
-	if (it->self) quern_params_finish(c->file->params, it->self);
-	free(it->self);
+	quern_params_finish(c->file->params, open->self);
+	free(open->self);
 	quern_tree_destroy(it->tree);
 	quern_report_destroy(it->report);
-	*it = (check_instance) { 0 };
+	free(it);
 }
 
-bool quern_check_counts(const check *c, const check_instance *it, const quern_use *row) {
-	const quern_param *when = row->when ? quern_param_find(c->file->params, row->when) : NULL;
+bool quern_check_counts(const quern_check *open, const quern_check_instance *it, const quern_use *row) {
+	const quern_param *params = ((const check *)(const void *)open)->file->params;
+	const quern_param *when = row->when ? quern_param_find(params, row->when) : NULL;
 	return !row->when || (when && quern_param_number(when, it->self) != 0);
 }

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_solver - a solver's sets, slots and stages: names that exist, units that parse, defaults that can be read */
+/* quern_check_solver - a solver's sets, slots and stages: names that exist, units that parse, defaults that can be
+ * read */
 #include "check.h"
 #include "check_table.h"
 #include "text.h"
 #include <string.h>
 
-static const quern_solver_ops *ops_of(const check *c) { return c->ops; }
+static const quern_solver_ops *ops_of(const check *c) { return c->file->plugin.ops; }
 
-static void check_sets(const check *c, check_tally *t) {
+static void check_sets(const check *c, quern_check_tally *t) {
 	const quern_set *sets = ops_of(c)->sets;
 	for (const quern_set *s = sets; s && s->name; s++) {
 		quern_check_expect(t, s->doc && *s->doc, "set %s: no doc", s->name);
@@ -18,7 +19,7 @@ static void check_sets(const check *c, check_tally *t) {
 	}
 }
 
-static void check_slot_default(const quern_slot *s, check_tally *t) {
+static void check_slot_default(const quern_slot *s, quern_check_tally *t) {
 	quern_report *report = quern_report_create();
 	quern_tree *tree = quern_tree_parse("default", s->def, strlen(s->def), report);
 	const quern_node *root = tree->root;
@@ -29,7 +30,7 @@ static void check_slot_default(const quern_slot *s, check_tally *t) {
 	quern_report_destroy(report);
 }
 
-static void check_slots(const check *c, check_tally *t) {
+static void check_slots(const check *c, quern_check_tally *t) {
 	const quern_slot *slots = ops_of(c)->slots;
 	for (const quern_slot *s = slots; s && s->name; s++) {
 		quern_check_expect(t, s->same_as || (s->doc && *s->doc), "slot %s: no doc", s->name);
@@ -42,7 +43,7 @@ static void check_slots(const check *c, check_tally *t) {
 	}
 }
 
-static void check_stages(const check *c, check_tally *t) {
+static void check_stages(const check *c, quern_check_tally *t) {
 	const quern_stage *stages = ops_of(c)->stages;
 	uint32_t last = 0;
 	for (const quern_stage *s = stages; s && s->name; s++) {
@@ -58,12 +59,12 @@ static void check_stages(const check *c, check_tally *t) {
 }
 
 void quern_check_solver(const check *c) {
-	check_tally sets = { .name = "sets" }, slots = { .name = "slots" }, stages = { .name = "stages" };
-	quern_check_place(c, "its tables");
+	quern_check_tally sets = { .name = "sets" }, slots = { .name = "slots" }, stages = { .name = "stages" };
+	quern_check_place(&c->open, "its tables");
 	check_sets(c, &sets);
 	check_slots(c, &slots);
 	check_stages(c, &stages);
-	quern_check_tell(c, &sets, NULL);
-	quern_check_tell(c, &slots, NULL);
-	quern_check_tell(c, &stages, "%u cases; stages run in scenes, not here", stages.tried);
+	quern_check_tell(&c->open, &sets, NULL);
+	quern_check_tell(&c->open, &slots, NULL);
+	quern_check_tell(&c->open, &stages, NULL);
 }

@@ -1,23 +1,17 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_table - what a plugin's tables say of it beyond what the loader asks: docs, units, ranges, one meaning each */
+/* quern_check_table - what a plugin's tables say of it beyond what the loader asks: docs, units, ranges, one meaning
+ * each */
 #include "check_table.h"
 #include "check.h"
 #include "text.h"
 #include <math.h>
 #include <string.h>
 
-bool quern_check_is_unit(const check *c, const char *unit) {
-	char text[96], why[160];
-	double value;
-	snprintf(text, sizeof text, "1 %s", unit ? unit : "?");
-	return unit && (!strcmp(unit, "1") || quern_quantity_read(c->units, text, unit, &value, why));
-}
-
 /* ---- the plugin itself ---- */
 
 static bool has_text(const char *text) { return text && *text; }
 
-static void check_identity(const check *c, check_tally *t) {
+static void check_identity(const check *c, quern_check_tally *t) {
 	const quern_plugin *p = &c->file->plugin;
 	const quern_library *lib = c->file->library;
 	const char *slash = strrchr(c->file->path, '/'), *name = slash ? slash + 1 : c->file->path;
@@ -32,7 +26,7 @@ static void check_identity(const check *c, check_tally *t) {
 
 /* ---- parameters ---- */
 
-static void check_default(check_tally *t, const quern_param *row) {
+static void check_default(quern_check_tally *t, const quern_param *row) {
 	const bool number = row->type == QUERN_T_REAL || row->type == QUERN_T_INT;
 	if (!number || row->choices || row->min == row->max || row->from) return;
 	if (row->flags & (QUERN_REQUIRED | QUERN_MAYBE)) return;
@@ -49,12 +43,12 @@ static bool same_name(const char *a, const char *b) {
 	return !strcmp(a, b) || (!strncmp(a, b, n) && b[n] == '.');
 }
 
-void quern_check_parameter_rows(const check *c, check_tally *t, const quern_param *rows) {
+void quern_check_parameter_rows(const check *c, quern_check_tally *t, const quern_param *rows) {
 	for (const quern_param *row = rows; row && row->name; row++) {
 		const char *name = row->name;
 		quern_check_expect(t, has_text(row->doc), "%s: no doc", name);
-		quern_check_expect(
-			t, !row->unit || quern_check_is_unit(c, row->unit), "%s: '%s' is no unit", name, row->unit);
+		quern_check_expect(t, !row->unit || quern_check_is_unit(&c->open, row->unit), "%s: '%s' is no unit",
+			name, row->unit);
 		quern_check_expect(
 			t, row->type != QUERN_T_REAL || row->unit, "%s: a number has a unit; \"1\" if it is pure", name);
 		check_default(t, row);
@@ -71,13 +65,13 @@ void quern_check_parameter_rows(const check *c, check_tally *t, const quern_para
 
 /* ---- uses ---- */
 
-void quern_check_use_rows(const check *c, check_tally *t, const quern_use *rows) {
+void quern_check_use_rows(const check *c, quern_check_tally *t, const quern_use *rows) {
 	const bool solver = quern_id_is_of(c->file->plugin.id, quern_solver_kind.name);
 	for (const quern_use *row = rows; row && row->field; row++) {
 		const char *name = row->field;
 		bool told = false;
-		quern_check_expect(t, row->unit && quern_check_is_unit(c, row->unit), "%s: '%s' is no unit", name,
-			row->unit ? row->unit : "");
+		quern_check_expect(t, row->unit && quern_check_is_unit(&c->open, row->unit), "%s: '%s' is no unit",
+			name, row->unit ? row->unit : "");
 		for (const quern_use *other = rows; other->field; other++) {
 			if (strcmp(other->field, name) != 0) continue;
 			told = told || has_text(other->doc);
@@ -93,7 +87,7 @@ void quern_check_use_rows(const check *c, check_tally *t, const quern_use *rows)
 
 /* ---- what the installed solvers say of the same fields ---- */
 
-static void compare_rows(const check *c, check_tally *t, const char *field, const quern_use *row,
+static void compare_rows(const check *c, quern_check_tally *t, const char *field, const quern_use *row,
 	const quern_plugin_file *solver) {
 	const quern_solver_ops *ops = solver->plugin.ops;
 	for (const quern_stage *s = ops->stages; s && s->name; s++)
@@ -109,7 +103,7 @@ static void compare_rows(const check *c, check_tally *t, const char *field, cons
 
 /* "particle.*" is what a slot for this kind makes of it. */
 static void compare_particle(
-	const check *c, check_tally *t, const quern_use *row, const quern_plugin_file *solver) {
+	const check *c, quern_check_tally *t, const quern_use *row, const quern_plugin_file *solver) {
 	const quern_solver_ops *ops = solver->plugin.ops;
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		char field[64];
@@ -119,7 +113,7 @@ static void compare_particle(
 	}
 }
 
-static void compare_with_solvers(const check *c, check_tally *t) {
+static void compare_with_solvers(const check *c, quern_check_tally *t) {
 	quern_loader *loader = quern_loader_create();
 	quern_report *report = quern_report_create();
 	char **ids = quern_loader_ids(loader);
@@ -139,15 +133,16 @@ static void compare_with_solvers(const check *c, check_tally *t) {
 
 void quern_check_table(const check *c) {
 	const quern_plugin *p = &c->file->plugin;
-	check_tally identity = { .name = "identity" }, params = { .name = "parameter rows" },
-				uses = { .name = "uses" };
-	quern_check_place(c, "its tables");
+	quern_check_tally identity = { .name = "identity" }, params = { .name = "parameter rows" },
+					  uses = { .name = "uses" };
+	quern_check_place(&c->open, "its tables");
 	check_identity(c, &identity);
-	quern_check_tell(c, &identity, "%s %s, %s", p->id, c->file->library->version, c->file->library->license);
+	quern_check_tell(
+		&c->open, &identity, "%s %s, %s", p->id, c->file->library->version, c->file->library->license);
 	quern_check_parameter_rows(c, &params, c->file->params);
-	quern_check_tell(c, &params, "%zu rows, %u bytes", c->file->n_params, p->instance_size);
+	quern_check_tell(&c->open, &params, "%zu rows, %u bytes", c->file->n_params, p->instance_size);
 	quern_check_use_rows(c, &uses, c->file->uses);
-	quern_check_place(c, "its tables, held against those of installed solvers");
+	quern_check_place(&c->open, "its tables, held against those of installed solvers");
 	compare_with_solvers(c, &uses);
-	quern_check_tell(c, &uses, "%zu rows", c->file->n_uses);
+	quern_check_tell(&c->open, &uses, "%zu rows", c->file->n_uses);
 }

@@ -35,10 +35,19 @@ static const quern_plugin_file *load(quern_loader *loader, const char *id, quern
 
 /* ---- list ---- */
 
+static json_t *line_json(const quern_plugin_file *f) {
+	return json_pack("{s:s, s:s, s:s, s:s}", "id", f->plugin.id, "brief",
+		f->plugin.brief ? f->plugin.brief : "", "version", f->library->version, "file", f->path);
+}
+
+/* What no scene can name is left out unless it is asked for. */
 static int list_plugins(int argc, char **argv) {
-	bool json = false;
+	bool json = false, all = false;
 	quern_words words = { 0 };
-	const quern_option options[] = { QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS };
+	const quern_option options[] = {
+		QUERN_FLAG(&all, "all", "also conformance tests, which `quern check` calls and no scene names"),
+		QUERN_FLAG(&json, "json", "for programs"), QUERN_END_OPTIONS
+	};
 	int status = quern_options_read(&quern_command_list, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	quern_loader *loader = quern_loader_create();
@@ -48,13 +57,10 @@ static int list_plugins(int argc, char **argv) {
 	json_t *list = json_array();
 	quern_loader_report_strays(loader, report);
 	for (size_t i = 0; ids[i]; i++) {
+		if (!all && quern_id_is_of(ids[i], quern_check_kind.name)) continue;
 		const quern_plugin_file *f = load(loader, ids[i], report);
-		if (!f) continue;
-		if (json)
-			json_array_append_new(list,
-				json_pack("{s:s, s:s, s:s, s:s}", "id", f->plugin.id, "brief",
-					f->plugin.brief ? f->plugin.brief : "", "version", f->library->version, "file", f->path));
-		else printf("%-32s %s\n", f->plugin.id, f->plugin.brief ? f->plugin.brief : "");
+		if (f && json) json_array_append_new(list, line_json(f));
+		else if (f) printf("%-32s %s\n", f->plugin.id, f->plugin.brief ? f->plugin.brief : "");
 	}
 	if (json) json_dumpf(list, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 	json_decref(list);
@@ -320,7 +326,8 @@ static const quern_plugin_file *find(quern_loader *loader, const char *name, que
 	size_t n = 0;
 	quern_text all = { 0 };
 	for (size_t i = 0; ids[i]; i++)
-		if (!strcmp(quern_id_name(ids[i]), name)) quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
+		if (!quern_id_is_of(ids[i], quern_check_kind.name) && !strcmp(quern_id_name(ids[i]), name))
+			quern_text_add(&all, "%s%s", n++ ? ", " : "", ids[i]);
 	if (n == 1) found = load(loader, quern_text_string(&all), report);
 	else if (n)
 		quern_report_add(
@@ -358,7 +365,7 @@ static int describe_one(int argc, char **argv) {
 	return f || scene ? QUERN_EXIT_DONE : QUERN_EXIT_SCENE;
 }
 
-const quern_command quern_command_list = { "list", "[--json]", "installed plugins", list_plugins };
+const quern_command quern_command_list = { "list", "[--all] [--json]", "installed plugins", list_plugins };
 
 const quern_command quern_command_describe = { "describe", "NAME [--json]",
 	"keys, units, ranges, sources of a plugin, a section, or `scene`", describe_one };

@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-/* quern new - a plugin of one's own, from a template that works */
+/* quern new - a plugin of one's own, from the template of its kind, a file among the plugins */
 #include "command.h"
 #include "folder.h"
 #include "loader.h"
 #include "options.h"
-#include "templates.h"
 #include "text.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-enum { LONGEST_NAME = 48 };
+enum { LONGEST_NAME = 48, LARGEST = 1 << 20 };
 
 /* ---- what is asked for ---- */
 
@@ -22,38 +22,29 @@ static bool is_plain(const char *name) {
 	return *name >= 'a' && *name <= 'z' && !name[n] && n <= LONGEST_NAME;
 }
 
-static int check_kind(const char *kind) {
-	const char *names[32] = { NULL };
-	size_t n = 0;
+static int check_kind(const quern_loader *loader, const char *kind) {
+	char **kinds = quern_loader_words(loader, "template.", ".c");
 	quern_text all = { 0 };
-	for (const quern_template *t = quern_templates; t->name && n < 31; t++) {
-		if (strcmp(t->name + strlen(t->name) - 2, ".c") != 0) continue;
-		char *name = quern_copy(t->name);
-		name[strlen(name) - 2] = 0;
-		names[n++] = name;
-		quern_text_add(&all, "%s%s", all.length ? ", " : "", name);
-	}
 	int status = QUERN_EXIT_DONE;
-	const char *near = quern_nearest(kind, names);
-	if (near && !strcmp(near, kind)) near = NULL;
-	else if (near)
+	for (size_t i = 0; kinds[i]; i++) quern_text_add(&all, "%s%s", i ? ", " : "", kinds[i]);
+	const char *near = quern_nearest(kind, (const char *const *)kinds);
+	if (near && strcmp(near, kind) != 0)
 		status = quern_usage(&quern_command_new, "unknown kind '%s'; did you mean '%s'?", kind, near);
-	else
+	else if (!near)
 		status =
 			quern_usage(&quern_command_new, "unknown kind '%s'; there are %s", kind, quern_text_string(&all));
-	for (size_t i = 0; i < n; i++) free((void *)(uintptr_t)names[i]);
+	quern_loader_free_ids(kinds);
 	quern_text_finish(&all);
 	return status;
 }
 
 /* Two plugins of one kind and name would stand in each other's way as soon as both are on the search path. */
-static int check_name(const char *kind, const char *name) {
+static int check_name(const quern_loader *loader, const char *kind, const char *name) {
 	if (!is_plain(name))
 		return quern_usage(&quern_command_new,
 			"'%s' is no name: small letters, digits and underscores, a letter first", name);
 	if (!strcmp(name, "v3") || !strcmp(name, "v4"))
 		return quern_usage(&quern_command_new, "'%s' stands for an instruction set: take another name", name);
-	quern_loader *loader = quern_loader_create();
 	char **ids = quern_loader_ids(loader), *id = quern_format("%s.%s", kind, name);
 	int status = QUERN_EXIT_DONE;
 	for (size_t i = 0; ids[i]; i++)
@@ -61,28 +52,37 @@ static int check_name(const char *kind, const char *name) {
 			status = quern_usage(&quern_command_new, "%s is installed already: take another name", id);
 	free(id);
 	quern_loader_free_ids(ids);
-	quern_loader_destroy(loader);
 	return status;
 }
 
 /* ---- files ---- */
 
+/* The file as a text; NULL after a sentence. */
+static char *read_template(const quern_loader *loader, const char *name) {
+	char *path = quern_loader_data(loader, name), *text = NULL;
+	FILE *file = path ? fopen(path, "rb") : NULL;
+	struct stat is;
+	if (file && !fstat(fileno(file), &is) && is.st_size < LARGEST) {
+		text = quern_take((size_t)is.st_size + 1, 1);
+		text[fread(text, 1, (size_t)is.st_size, file)] = 0;
+	} else
+		fprintf(
+			stderr, "quern new: %s cannot be read; is the program beside its plugins?\n", path ? path : name);
+	if (file) fclose(file);
+	free(path);
+	return text;
+}
+
+/* With the kind and the name in place of the words that stand for them. */
 static char *filled_in(const char *template, const char *kind, const char *name) {
-	const quern_template *t = quern_templates;
 	quern_text text = { 0 };
-	while (t->name && strcmp(t->name, template) != 0) t++;
-	for (const char *const *line = t->lines; line && *line; line++) {
-		const char *rest = *line;
-		for (const char *mark; (mark = strstr(rest, "my_")) != NULL; rest = mark) {
-			const bool is_kind = !strncmp(mark, "my_kind", 7), is_name = !strncmp(mark, "my_name", 7);
-			quern_text_add(&text, "%.*s%s", (int)(mark - rest), rest,
-				is_kind   ? kind
-				: is_name ? name
-						  : "my_");
-			mark += is_kind || is_name ? 7 : 3;
-		}
-		quern_text_add(&text, "%s\n", rest);
+	const char *rest = template;
+	for (const char *mark; (mark = strstr(rest, "my_")) != NULL; rest = mark) {
+		const bool is_kind = !strncmp(mark, "my_kind", 7), is_name = !strncmp(mark, "my_name", 7);
+		quern_text_add(&text, "%.*s%s", (int)(mark - rest), rest, is_kind ? kind : is_name ? name : "my_");
+		mark += is_kind || is_name ? 7 : 3;
 	}
+	quern_text_add(&text, "%s", rest);
 	return text.data;
 }
 
@@ -102,24 +102,40 @@ static int write_file(const char *path, const char *text) {
 	return QUERN_EXIT_DONE;
 }
 
-static int write_all(const char *folder, const char *kind, const char *name) {
-	char *template[3] = { quern_format("%s.c", kind), quern_copy("meson.build.txt"),
-		quern_copy("README.md.txt") };
-	char *path[3] = { quern_format("%s/%s.%s.c", folder, kind, name), quern_format("%s/meson.build", folder),
-		quern_format("%s/README.md", folder) };
+enum { FILES = 3 };
+
+static int write_files(const char *folder, const char *const *name, char *const *text) {
+	char *path[FILES];
 	int status = quern_folder_make(folder) ? QUERN_EXIT_DONE : refuse(folder);
-	for (int k = 0; k < 3 && status == QUERN_EXIT_DONE; k++)
+	for (int k = 0; k < FILES; k++) path[k] = quern_format("%s/%s", folder, name[k]);
+	for (int k = 0; k < FILES && status == QUERN_EXIT_DONE; k++)
 		if (!access(path[k], F_OK)) {
 			fprintf(stderr, "quern new: %s is there already, and nothing was written\n", path[k]);
 			status = QUERN_EXIT_IO;
 		}
-	for (int k = 0; k < 3; k++) {
-		char *text = filled_in(template[k], kind, name);
-		if (status == QUERN_EXIT_DONE) status = write_file(path[k], text);
-		free(text);
-		free(template[k]);
+	for (int k = 0; k < FILES; k++) {
+		if (status == QUERN_EXIT_DONE) status = write_file(path[k], text[k]);
 		free(path[k]);
 	}
+	return status;
+}
+
+static int write_all(const quern_loader *loader, const char *folder, const char *kind, const char *name) {
+	char *template = quern_format("template.%s.c", kind), *source = quern_format("%s.%s.c", kind, name);
+	const char *const from[FILES] = { template, "template.meson.build.txt", "template.README.md.txt" };
+	const char *const to[FILES] = { source, "meson.build", "README.md" };
+	char *text[FILES] = { NULL };
+	bool good = true;
+	for (int k = 0; k < FILES && good; k++) {
+		char *raw = read_template(loader, from[k]);
+		good = raw != NULL;
+		if (good) text[k] = filled_in(raw, kind, name);
+		free(raw);
+	}
+	const int status = good ? write_files(folder, to, text) : QUERN_EXIT_IO;
+	for (int k = 0; k < FILES; k++) free(text[k]);
+	free(template);
+	free(source);
 	return status;
 }
 
@@ -132,12 +148,13 @@ static int make_plugin(int argc, char **argv) {
 	int status = quern_options_read(&quern_command_new, options, &words, argc, argv);
 	if (status != QUERN_OPTIONS_READ) return status;
 	const char *kind = words.at[0], *name = words.at[1];
-	status = check_kind(kind);
-	if (status == QUERN_EXIT_DONE) status = check_name(kind, name);
-	if (status != QUERN_EXIT_DONE) return status;
 	char *folder = out ? quern_copy(out) : quern_format("%s.%s", kind, name);
-	status = write_all(folder, kind, name);
+	quern_loader *loader = quern_loader_create();
+	status = check_kind(loader, kind);
+	if (status == QUERN_EXIT_DONE) status = check_name(loader, kind, name);
+	if (status == QUERN_EXIT_DONE) status = write_all(loader, folder, kind, name);
 	if (status == QUERN_EXIT_DONE) printf("\ncd %s && meson setup build && ninja -C build\n", folder);
+	quern_loader_destroy(loader);
 	free(folder);
 	return status;
 }

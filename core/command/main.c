@@ -66,7 +66,8 @@ static int run(int argc, char **argv) {
 		return QUERN_EXIT_USAGE;
 	}
 	if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h") || !strcmp(argv[1], "help")) return help(stdout);
-	if (!strcmp(argv[1], "--version")) return puts("quern " QUERN_VERSION " (" QUERN_COMMIT ")"), QUERN_EXIT_DONE;
+	if (!strcmp(argv[1], "--version"))
+		return puts("quern " QUERN_VERSION " (" QUERN_COMMIT ")"), QUERN_EXIT_DONE;
 	for (size_t i = 0; i < N_COMMANDS; i++)
 		if (!strcmp(commands[i]->name, argv[1])) return commands[i]->run(argc - 1, argv + 1);
 	char *path = quern_program_find(argv[1]);

@@ -234,7 +234,7 @@ static void ask(void *arg) {
 	quern_text_finish(&why);
 }
 
-static bool survives(const char *path, quern_report *report, quern_mark mark) {
+bool quern_loader_survives(const char *path, quern_report *report, quern_mark mark) {
 	enum { SECONDS = 20 };
 	char what[80];
 	question q = { path, quern_shared_take(sizeof(bool)) };
@@ -254,7 +254,7 @@ static const quern_plugin_file *open_level(
 	const char *changed;
 	for (size_t i = 0; i < loader->n_files; i++)
 		if (!strcmp(loader->files[i]->path, path)) return loader->files[i];
-	if (loader->wary && !survives(path, report, mark)) return NULL;
+	if (loader->wary && !quern_loader_survives(path, report, mark)) return NULL;
 	void *handle = open_object(path, &changed);
 	if (!handle) {
 		char *text = quern_format("cannot be loaded: %s; rebuild it, or install what it needs", dlerror());
@@ -325,7 +325,8 @@ static void unknown(
 	names[n] = NULL;
 	const char *near = quern_nearest(name, names), *elsewhere = NULL;
 	for (size_t i = 0; ids[i] && !elsewhere; i++)
-		if (!strcmp(quern_id_name(ids[i]), name)) elsewhere = ids[i];
+		if (!quern_id_is_of(ids[i], quern_check_kind.name) && !strcmp(quern_id_name(ids[i]), name))
+			elsewhere = ids[i];
 	if (elsewhere)
 		quern_report_add(report, mark, "'%s' is %s; here a plugin of kind %s is wanted: %s", name, elsewhere,
 			kind, n ? quern_text_string(&list) : "none is installed");
@@ -418,29 +419,35 @@ typedef struct {
 	size_t n, capacity;
 } id_list;
 
-static void collect(void *to, const char *folder, const char *object, char *id) {
-	id_list *list = to;
-	(void)folder, (void)object;
-	if (!quern_id_name(id)) {
-		free(id);
-		return;
-	}
+static void add_id(id_list *list, char *id) {
 	list->at = quern_grow(list->at, list->n + 1, &list->capacity, sizeof(char *));
 	list->at[list->n++] = id;
 }
 
+static void collect(void *to, const char *folder, const char *object, char *id) {
+	(void)folder, (void)object;
+	if (quern_id_name(id)) add_id(to, id);
+	else free(id);
+}
+
+/* Each once, NULL-terminated. */
+static char **sorted(id_list *list) {
+	size_t kept = 0;
+	list->at = quern_grow(list->at, list->n, &list->capacity, sizeof(char *));
+	qsort(list->at, list->n, sizeof(char *), by_name);
+	for (size_t i = 0; i < list->n; i++) {
+		if (kept && !strcmp(list->at[kept - 1], list->at[i])) free(list->at[i]);
+		else list->at[kept++] = list->at[i];
+	}
+	list->at[kept] = NULL;
+	return list->at;
+}
+
+/* One for the objects of all instruction sets. */
 char **quern_loader_ids(const quern_loader *loader) {
 	id_list list = { 0 };
-	size_t kept = 0;
 	visit(loader, collect, &list);
-	list.at = quern_grow(list.at, list.n, &list.capacity, sizeof(char *));
-	qsort(list.at, list.n, sizeof(char *), by_name);
-	for (size_t i = 0; i < list.n; i++) { /* one line for the objects of all instruction sets */
-		if (kept && !strcmp(list.at[kept - 1], list.at[i])) free(list.at[i]);
-		else list.at[kept++] = list.at[i];
-	}
-	list.at[kept] = NULL;
-	return list.at;
+	return sorted(&list);
 }
 
 typedef struct {
@@ -567,7 +574,7 @@ static void note_section(quern_loader *loader, const quern_library *lib) {
 static void ask_solver(quern_loader *loader, const char *id, quern_report *nobody) {
 	int level = 1;
 	char *path = find_object(loader, id, &level, nobody, (quern_mark) { 0 });
-	if (path && (!loader->wary || survives(path, nobody, (quern_mark) { 0 }))) {
+	if (path && (!loader->wary || quern_loader_survives(path, nobody, (quern_mark) { 0 }))) {
 		quern_watch_enter(path, "its start-up code");
 		void *handle = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
 		quern_watch_leave();
@@ -605,13 +612,23 @@ const quern_section_of *quern_loader_sections(quern_loader *loader, size_t *n) {
 }
 
 const quern_kind *quern_loader_kind(quern_loader *loader, const char *name) {
-	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind };
+	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind, &quern_check_kind };
 	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
 		if (!strcmp(own[i]->name, name)) return own[i];
 	ask_solvers(loader);
 	for (size_t i = 0; i < loader->n_kinds; i++)
 		if (!strcmp(loader->kinds[i]->name, name)) return loader->kinds[i];
 	return NULL;
+}
+
+/* ---- other files ---- */
+
+bool quern_loader_searches(const quern_loader *loader, const char *folder) {
+	char real[PATH_MAX];
+	bool found = false;
+	if (!realpath(folder, real)) return false;
+	for (size_t i = 0; i < loader->n_folders; i++) found = found || !strcmp(loader->folders[i], real);
+	return found || (loader->own && !strcmp(loader->own, real));
 }
 
 char *quern_loader_data(const quern_loader *loader, const char *name) {
@@ -622,4 +639,30 @@ char *quern_loader_data(const quern_loader *loader, const char *name) {
 		free(path);
 	}
 	return NULL;
+}
+
+/* Adds the word between prefix and suffix of every name in a folder. */
+static void collect_words(const char *path, const char *prefix, const char *suffix, id_list *list) {
+	const size_t before = strlen(prefix), after = strlen(suffix);
+	DIR *folder = opendir(path);
+	for (struct dirent *entry; folder && (entry = readdir(folder));) {
+		const size_t n = strlen(entry->d_name);
+		if (n <= before + after || strncmp(entry->d_name, prefix, before) != 0 ||
+			strcmp(entry->d_name + n - after, suffix) != 0)
+			continue;
+		char *word = quern_copy(entry->d_name + before);
+		word[n - before - after] = 0;
+		if (quern_is_name(word)) add_id(list, word);
+		else free(word);
+	}
+	if (folder) closedir(folder);
+}
+
+char **quern_loader_words(const quern_loader *loader, const char *prefix, const char *suffix) {
+	id_list list = { 0 };
+	for (size_t i = 0; i <= loader->n_folders; i++) {
+		const char *folder = i < loader->n_folders ? loader->folders[i] : loader->own;
+		if (folder) collect_words(folder, prefix, suffix, &list);
+	}
+	return sorted(&list);
 }

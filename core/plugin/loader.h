@@ -45,6 +45,8 @@ void quern_loader_limit(quern_loader *, int level);
 /* From now on a child loads every plugin and reads its tables first, so that one which crashes, hangs or ends the program
  * at that is one sentence. */
 void quern_loader_beware(quern_loader *);
+/* The same of one object by its path: false after one sentence. Nothing is loaded here. */
+bool quern_loader_survives(const char *path, quern_report *, quern_mark);
 
 /* The plugin of that kind and bare name, or NULL after one sentence in the report. */
 const quern_plugin_file *quern_loader_find(
@@ -63,8 +65,12 @@ const quern_section_of *quern_loader_sections(quern_loader *, size_t *n);
 bool quern_solver_steps(const quern_solver_ops *);
 /* A kind by its name, as whoever calls such plugins describes it; NULL if no installed solver does. */
 const quern_kind *quern_loader_kind(quern_loader *, const char *name);
+/* Whether plugins are looked for in this folder. */
+bool quern_loader_searches(const quern_loader *, const char *folder);
 /* The path of a file that lies among the plugins, such as a template; NULL if there is none; free() it. */
 char *quern_loader_data(const quern_loader *, const char *name);
+/* The words for which there is such a file, PREFIXwordSUFFIX, sorted; free with quern_loader_free_ids. */
+char **quern_loader_words(const quern_loader *, const char *prefix, const char *suffix);
 
 /* What is mapped so far, in the order of loading. */
 size_t quern_loader_count(const quern_loader *);

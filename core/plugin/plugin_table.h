@@ -6,6 +6,7 @@
  * it was looked at here. Where a pointer leads cannot be asked: that takes a child, see child.h. */
 #pragma once
 #include "text.h"
+#include <quern/check.h>
 #include <quern/observer.h>
 #include <quern/solver.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* table_ops - tables of functions: their length by their kind, and what solvers and observers hang on theirs */
+/* table_ops - tables of functions: their length by their kind, and what solvers, observers and conformance tests hang on theirs */
 #include "param.h"
 #include "plugin_table_read.h"
 #include <stdlib.h>
@@ -116,7 +116,7 @@ static bool observer(quern_table_reader *r, quern_observer_ops *ops) {
 /* ---- kinds that a solver calls ---- */
 
 static bool functions(quern_table_reader *r, quern_kind *kind) {
-	size_t n;
+	size_t n = 0;
 	if (!count(r, "functions of a kind", kind->functions, kind->function_size, MOST_FUNCTIONS, &n))
 		return false;
 	quern_function *own = copy(r, kind->functions, kind->function_size, sizeof *own, n);
@@ -128,21 +128,30 @@ static bool functions(quern_table_reader *r, quern_kind *kind) {
 	return true;
 }
 
-static bool kind(quern_table_reader *r, const char *slot, const quern_kind **at) {
+/* `what` names its place: "slot contact". */
+static bool kind(quern_table_reader *r, const char *what, const quern_kind **at) {
 	uint32_t size = 0;
 	if (*at) memcpy(&size, *at, sizeof size);
 	if (size < offsetof(quern_kind, functions) + sizeof(void *) || size > LARGEST_ENTRY)
-		return quern_table_refuse(r, "slot %s: there is no kind; use QUERN_KIND", slot);
+		return quern_table_refuse(r, "%s: there is no kind; use QUERN_KIND", what);
 	quern_kind *own = quern_table_keep(r, sizeof *own);
 	memcpy(own, *at, size < sizeof *own ? size : sizeof *own);
 	if (!own->name || !is_short_name(own->name) || !quern_table_text(own->doc, 1 << 16) ||
 		own->ops_size < 8 || own->ops_size > LARGEST_OPS || own->ops_size % 8)
-		return quern_table_refuse(
-			r, "slot %s: its kind has no name, or ops of %u bytes", slot, own->ops_size);
-	if (!strcmp(own->name, quern_solver_kind.name))
-		return quern_table_refuse(r, "slot %s: a solver sits in no slot", slot);
+		return quern_table_refuse(r, "%s: its kind has no name, or ops of %u bytes", what, own->ops_size);
 	*at = own;
 	return functions(r, own);
+}
+
+/* ---- conformance tests ---- */
+
+static bool conformance(quern_table_reader *r, quern_check_ops *ops) {
+	if (!kind(r, "ops", &ops->kind)) return false;
+	const char *id = r->table->plugin.id, *name = ops->kind->name;
+	if (!strcmp(name, quern_solver_kind.name) || !strcmp(name, quern_check_kind.name))
+		return quern_table_refuse(r, "a %s has no conformance test of its kind", name);
+	return !strcmp(id + strlen(quern_check_kind.name) + 1, name) ||
+		   quern_table_refuse(r, "it checks the kind %s, so its id must be check.%s", name, name);
 }
 
 /* ---- solvers ---- */
@@ -189,7 +198,11 @@ static bool slot(quern_table_reader *r, const quern_solver_ops *ops, quern_slot 
 		!quern_table_text(s->def, 1 << 16) || !is_label(s->same_as) || !is_label(s->repeat) ||
 		!is_label(s->again) || !is_label(s->particle) || !is_label(s->override))
 		return quern_table_refuse(r, "slot '%.60s': one of its texts is no plain text", s->name);
-	if (!kind(r, s->name, &s->kind)) return false;
+	char what[QUERN_LONGEST_NAME + 8];
+	snprintf(what, sizeof what, "slot %s", s->name);
+	if (!kind(r, what, &s->kind)) return false;
+	if (!strcmp(s->kind->name, quern_solver_kind.name) || !strcmp(s->kind->name, quern_check_kind.name))
+		return quern_table_refuse(r, "slot %s: a %s sits in no slot", s->name, s->kind->name);
 	for (int h = 0; h < 3; h++)
 		if (!is_label(s->stage[h]) || (s->stage[h] && !has_stage(ops, s->stage[h])))
 			return quern_table_refuse(r, "slot %s: there is no stage '%.60s'", s->name, s->stage[h]);
@@ -266,7 +279,7 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 /* ---- of any plugin ---- */
 
 bool quern_table_ops(quern_table_reader *r, const void *from) {
-	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind };
+	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind, &quern_check_kind };
 	uint32_t size;
 	memcpy(&size, from, sizeof size);
 	if (size < 8 || size > LARGEST_OPS || size % 8)
@@ -279,7 +292,7 @@ bool quern_table_ops(quern_table_reader *r, const void *from) {
 		memcpy(kept, ops, own[k]->ops_size);
 		free(ops);
 		r->table->plugin.ops = kept;
-		return k == 0 ? solver(r, kept) : observer(r, kept);
+		return k == 0 ? solver(r, kept) : k == 1 ? observer(r, kept) : conformance(r, kept);
 	}
 	return true;
 }

@@ -25,6 +25,8 @@ static struct {
 	bool terminal;
 	char kept[256];
 	atomic_flag speaks;
+	void (*see)(void *, const char *, const char *);
+	void *seer;
 } watch = { .speaks = ATOMIC_FLAG_INIT };
 
 /* ---- saying it, with nothing but write() ---- */
@@ -198,6 +200,7 @@ void quern_watch_begin(void) {
 void quern_watch_know(const quern_loader *loader) { watch.loader = loader; }
 
 void quern_watch_enter(const char *plugin, const char *function) {
+	if (watch.see) watch.see(watch.seer, plugin, function);
 	watch.function = function;
 	watch.plugin = plugin;
 }
@@ -205,6 +208,12 @@ void quern_watch_enter(const char *plugin, const char *function) {
 void quern_watch_leave(void) {
 	watch.plugin = NULL;
 	if (watch.own && !*watch.own) end(STATUS);
+	if (watch.see) watch.see(watch.seer, NULL, NULL);
+}
+
+void quern_watch_follow(void (*see)(void *, const char *, const char *), void *arg) {
+	watch.seer = arg;
+	watch.see = see;
 }
 
 void quern_watch_keep(const char *fmt, ...) {

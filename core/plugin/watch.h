@@ -16,5 +16,8 @@ void quern_watch_enter(const char *plugin, const char *function);
 /* A copy of the process that a plugin has made ends here. */
 void quern_watch_leave(void);
 
+/* From here on see(arg, plugin, function) is called before every call, and see(arg, NULL, NULL) after it. */
+void quern_watch_follow(void (*see)(void *arg, const char *plugin, const char *function), void *arg);
+
 /* What stays if the program ends now, to be said then: "out/x keeps 3 frames". */
 void quern_watch_keep(const char *fmt, ...) __attribute__((format(printf, 1, 2)));

@@ -323,21 +323,39 @@ static quern_status begin_interval(quern_run *run) {
 
 /* ---- stages ---- */
 
-static void zero_column(quern_run *run, int k) {
-	quern_field *field = &run->plan->store.fields[k];
-	quern_set_store *set = &run->plan->store.sets[field->set];
-	if (set->rows) {
-		if (field->lane == 0 && set->row) memset(set->row, 0, (size_t)set->n * 64);
-		return;
-	}
+/* In rows, lanes of other fields stay as they are; where there are none, the whole is cleared at once. */
+static void zero_lanes(quern_set_store *set, uint32_t lanes) {
+	if (lanes == (1u << set->lanes) - 1 && set->row) memset(set->row, 0, (size_t)set->n * 64);
+	else
+		for (size_t i = 0; i < set->n; i++)
+			for (uint32_t k = 0; k < set->lanes; k++)
+				if (lanes >> k & 1) set->row[8 * i + k] = 0;
+}
+
+static void zero_column(quern_set_store *set, quern_field *field) {
 	for (uint8_t c = 0; c < field->n_components; c++)
 		memset(field->data[field->now][c], 0, (size_t)set->n * quern_field_bytes(field));
+}
+
+/* What this stage is the first to add to. */
+static void zero(quern_run *run, const int *fields) {
+	quern_store *store = &run->plan->store;
+	for (size_t s = 0; *fields >= 0 && s < store->n_sets; s++) {
+		uint32_t lanes = 0;
+		for (const int *k = fields; *k >= 0; k++) {
+			quern_field *field = &store->fields[*k];
+			if (field->set != (int)s) continue;
+			if (store->sets[s].rows) lanes |= ((1u << field->n_components) - 1) << field->lane;
+			else zero_column(&store->sets[s], field);
+		}
+		if (lanes) zero_lanes(&store->sets[s], lanes);
+	}
 }
 
 static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt) {
 	if (!stage->stage) return QUERN_OK;
 	const double begin = quern_wall();
-	for (const int *k = stage->zeros; *k >= 0; k++) zero_column(run, *k);
+	zero(run, stage->zeros);
 	quern_plan_refresh(run->plan);
 	quern_step step = quern_run_record(run, stage->section);
 	step.dt = dt;

@@ -18,8 +18,9 @@ def at_once(function, items):
         return list(pool.map(function, items))
 
 
-def properties_of(path):
-    done = workshop.subprocess.run([workshop.QUERN, "check", path], capture_output=True, text=True, timeout=300)
+def properties_of(path, *options):
+    words = [workshop.QUERN, "check", path, *options]
+    done = workshop.subprocess.run(words, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, f"{path}: exit status {done.returncode}\n{done.stdout}"
     kind = str(path).rsplit("/", 1)[1].split(".")[0]
     return {(kind, name) for name in re.findall(r"^  ok +([^:]+):", done.stdout, re.M)}
@@ -30,7 +31,10 @@ def check_installed():
     paths = sorted(path for path in PLUGINS.glob("*.so") if not re.search(r"\.v[34]\.so$", path.name))
     assert len(paths) > 10
     stated = set().union(*at_once(properties_of, paths))
-    print(f"{len(paths)} installed plugins pass")
+    solvers = [path for path in paths if path.name.startswith("solver.")]
+    stated |= set().union(*at_once(lambda path: properties_of(path, "--scene", workshop.SOURCE / "configs/column.yaml",
+                                                              "--steps", "12"), solvers))
+    print(f"{len(paths)} installed plugins pass, {len(solvers)} solvers among them in a scene")
     return stated
 
 
@@ -174,10 +178,94 @@ BROKEN = [
      "finite"),
     ("takes an index for a number", "observer", [("QUERN_VECTOR }, QUERN_END_USES", "QUERN_VECTOR }, " + FIXED)], "uses"),
     ("explains no set", "solver", [("Discs or spheres.", "")], "sets"),
-    ("explains no slot", "solver", [("slots[] = { {", "slots[] = { { .name = \"law\", .kind = QUERN_CONTACT, .list = 1, "
+    ("explains no slot", "solver", [("#include <quern/solver.h>", "#include <quern/contact.h>\n#include <quern/solver.h>"),
+                                    ("slots[] = { {", "slots[] = { { .name = \"law\", .kind = &quern_contact_kind, .list = 1, "
                                      ".stage = { \"mine.move\" } }, {")], "slots"),
     ("explains no stage", "solver", [("Places the grains.", "")], "stages"),
 ]
+
+
+FLIGHT = """
+name: a flight
+quern: 1
+dimension: 2
+gravity: [0, -9.81]
+domain: {lower: [0, 0], upper: [0.1, 0.1]}
+time: {end: 1}
+grains: {solver: mine, count: 3000, radius: 1 mm}
+"""
+GRAVITY, MOVED = "s->dt * s->gravity[k]", "(m.n + CHUNK - 1) / CHUNK, move_chunk, &m);"
+UNISTD_IN_SOLVER = ("#include <stdio.h>", "#include <stdio.h>\n#include <unistd.h>")
+
+
+def once_moved(statement):
+    return [(MOVED, f"{MOVED} {statement}"), UNISTD_IN_SOLVER]
+
+
+# what a solver does, change of its template, the property that must fail in a scene
+BROKEN_SOLVERS = [
+    ("looks at the number of threads", [(GRAVITY, f"{GRAVITY} * (1 + 1e-12 * s->host->workers(s->run))")], "threads"),
+    ("looks at the size of batches", [(GRAVITY, f"{GRAVITY} * (1 + 1e-12 * s->batch)")], "batches"),
+    ("loses mass", [("= n * mass;", "= n * mass * (1 - 1e-6 * (quern_real)s->step);")], "mass"),
+    ("loses grains", once_moved('if (s->step == 5) return s->host->remap(s->run, "grain", 0, NULL, 0, NULL);'), "mass"),
+    ("remembers beside its fields", once_moved("static int calls; if (++calls > 25) s->use[MOVE_VELOCITY].real[0][0] = 1;"), "resume"),
+    ("says that it makes what it changes", [('{ .field = "grain.velocity", .unit = "m/s", .access = QUERN_UPDATE,',
+                                             '{ .field = "grain.velocity", .unit = "m/s", .access = QUERN_WRITE,')], "scene"),
+    ("sums up to no number", [("sum[KINETIC] += 0.5", "sum[KINETIC] += (v < 0 ? 0.0 / 0.0 : 0.5)")], "sums"),
+    ("fails in set-up", [("for (uint32_t i = 0; i < n; i++) from[i] = -1;",
+                          'if (n) return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1, "no room for grains");')], "set-up"),
+    ("fails in a step", once_moved('if (s->step == 7) return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", 3, "is lost");'), "steps"),
+    ("makes numbers that nothing goes on from", once_moved("if (s->step == 7) s->use[MOVE_POSITION].real[0][0] = 0.0 / 0.0;"), "steps"),
+    ("moves", once_moved('if (s->step == 7 && chdir("/")) return QUERN_E_IO;'), "environment"),
+    ("rounds down", once_moved("if (s->step == 7) __builtin_ia32_ldmxcsr(0x3f80);"), "environment"),
+]
+SOLVERS_THAT_END = [
+    ("if (s->step == 7) *(volatile int *)0 = 1;", "FAILED  scene: solver.mine: crashed (SIGSEGV) in mine.move"),
+    ("if (s->step == 7) _exit(0);", "FAILED  scene: solver.mine: ended the program in mine.move"),
+    ('while (s->step == 7) __asm__ volatile("");', "FAILED  scene: solver.mine: did not come back within 2 s from mine.move"),
+    ("if (s->host->workers(s->run) > 1) __builtin_trap();", "FAILED  threads: solver.mine: crashed (SIGILL) in mine.move"),
+]
+
+
+def fly(folder, changes, *options, status=2):
+    """A solver from the template with some changes, in a scene."""
+    scene = workshop.pathlib.Path(folder) / "flight.yaml"
+    scene.write_text(FLIGHT)
+    path = compile(source("solver", *changes), "solver.mine", folder)
+    return quern("check", path, "--scene", scene, *options, status=status)
+
+
+def check_one_solver(broken):
+    what, changes, wanted = broken
+    with tempfile.TemporaryDirectory() as folder:
+        said = fly(folder, changes)
+        assert wanted in failures(said), f"a solver that {what} passes '{wanted}'\n{said}"
+    return {("solver", name) for name in failures(said)}
+
+
+def check_solvers():
+    with tempfile.TemporaryDirectory() as folder:
+        said = fly(folder, [], status=0)
+        assert "steps: 40, after 0 of settling" in said and "resume: going on from a checkpoint gives the same bits" in said, said
+        solver = workshop.pathlib.Path(folder) / "solver.mine.so"
+        # without a scene there is a line that says what one would add; a scene must run that very object
+        assert "with --scene FILE.yaml, a scene that names it, it runs: set-up, steps" in quern("check", solver, status=0)
+        two = workshop.SOURCE / "configs/two_grains.yaml"
+        assert f"set-up: {two} does not run {solver}" in quern("check", solver, "--scene", two, status=2)
+        assert "steps: 20, after 0 of settling" in quern("check", solver, "--scene", f"{folder}/flight.yaml", "--steps", 20,
+                                                         "--set", "grains.count=10", status=0)
+        assert "flight.yaml cannot be used: 1 fault" in quern("check", solver, "--scene", f"{folder}/flight.yaml",
+                                                              "--set", "grains.cuont=10", status=2)
+        law = PLUGINS / "contact.linear.so"
+        assert "--scene is for solvers, and contact.linear is none" in quern("check", law, "--scene", two, status=2)
+    for statement, sentence in SOLVERS_THAT_END:
+        with tempfile.TemporaryDirectory() as folder:
+            said = fly(folder, once_moved(statement), "--seconds", 2)
+            assert sentence in said, f"'{sentence}' is not in\n{said}"
+    found = set().union(*at_once(check_one_solver, BROKEN_SOLVERS))
+    print(f"{len(BROKEN_SOLVERS)} solvers broken on purpose fail where they should in a scene, "
+          f"{len(SOLVERS_THAT_END)} end in a sentence")
+    return found
 
 
 def broken_id(path):
@@ -197,7 +285,7 @@ def check_one(broken):
 
 
 def check_broken(stated):
-    failed = set().union(*at_once(check_one, BROKEN))
+    failed = set().union(*at_once(check_one, BROKEN)) | check_solvers()
     print(f"{len(BROKEN)} plugins broken on purpose fail where they should")
     # what all kinds have in common is the same code for each of them
     common = {name for kind in ("contact", "shape") for k, name in failed if k == kind} & {
@@ -223,7 +311,7 @@ DRUM = [  # a ball whose surface runs round
     ("QUERN_VEC_PUT(b->velocity, i, velocity, dim);", "QUERN_VEC_PUT(b->velocity, i, quern_vec_add(velocity, run), dim);")]
 # a couple against rolling, and no force at all
 ROLLING = """
-#include <quern/abi.h>
+#include <quern/contact.h>
 typedef struct { quern_real drag; } law;
 static const quern_param params[] = { QUERN_PARAM(law, drag, "N m s", "Couple per spin.", .def = 1e-9, .max = 1),
 	QUERN_END_PARAMS };
@@ -236,7 +324,7 @@ static void force(const void *self, const quern_contact_batch *b) {
 		for (uint32_t i = 0; i < b->n; i++) b->couple[k][i] -= b->overlap[i] > 0 ? ((const law *)self)->drag * b->spin[k][i] : 0;
 }
 static const quern_contact_ops ops = { .size = sizeof ops, .force = { force, force } };
-static const quern_plugin plugin = { .size = sizeof plugin, .kind = QUERN_CONTACT, .dims = 3, .id = "contact.rolling",
+static const quern_plugin plugin = { .size = sizeof plugin, .dims = 3, .id = "contact.rolling",
 	.brief = "Rolling.", .instance_size = sizeof(law), .params = params, .uses = uses, .ops = &ops };
 QUERN_LIBRARY(plugin, "1", "MIT");
 """
@@ -291,6 +379,75 @@ def check_crashes():
     print("crashes and endless loops are one sentence each, and the other tests go on")
 
 
+def check_outside():
+    """A kind that nobody has heard of, with its template and its conformance test in a folder on the path."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = workshop.pathlib.Path(name)
+        test = source("check").replace("mine", "glow")
+        kind = test[test.index("typedef struct"):test.index("enum { PLACE")]
+        template = f"""#include <quern/abi.h>
+{kind}
+typedef struct {{ quern_real size; }} lamp;
+static const quern_param params[] = {{ QUERN_PARAM(lamp, size, "m", "Size.", .def = 1, .min = 0.1, .max = 9),
+	QUERN_END_PARAMS }};
+static const quern_use uses[] = {{ QUERN_END_USES }};
+static void value(const void *self, const glow_batch *b) {{
+	for (uint32_t i = 0; i < b->n; i++) b->value[i] = ((const lamp *)self)->size * b->place[i] * b->place[i];
+}}
+static const glow_ops ops = {{ .size = sizeof ops, .value = value }};
+static const quern_plugin plugin = {{ .size = sizeof plugin, .dims = 3, .id = "my_kind.my_name", .brief = "A lamp.",
+	.instance_size = sizeof(lamp), .params = params, .uses = uses, .ops = &ops }};
+QUERN_LIBRARY(plugin, "1", "MIT");
+"""
+        (folder / "template.glow.c").write_text(template)
+        path = {"QUERN_PLUGIN_PATH": name}
+        assert "did you mean 'glow'?" in quern("new", "glwo", "bulb", status=1, **path)
+        assert "unknown kind 'glow'" in quern("new", "glow", "bulb", status=1)
+        quern("new", "glow", "bulb", "-o", folder / "bulb", status=0, **path)
+        text = (folder / "bulb/glow.bulb.c").read_text()
+        bulb = compile(text, "glow.bulb", folder)
+        said = quern("check", bulb, status=0, **path)
+        assert "note    check.glow is not installed" in said and "identity" in said and "set-up" not in said, said
+        compile(test, "check.glow", folder)
+        said = quern("check", bulb, status=0, **path)
+        assert "the same on both sides" in said and "batches" in said and "61 settings" not in said, said
+        assert "check.glow" in quern("list", "--all", status=0, **path)
+        assert "check.glow" not in quern("list", status=0, **path)
+        # nobody is offered a test in place of a plugin
+        assert "no plugin 'glow'" in quern("describe", "glow", status=2, **path)
+        scene = workshop.SOURCE / "configs/two_grains.yaml"
+        said = quern("plan", scene, "--set", "grains.contact=glow", status=2, **path)
+        assert "unknown contact 'glow'" in said and "check.glow" not in said, said
+        tilted = text.replace("b->place[i];", "b->place[i] + 0.1 * b->place[i];")
+        said = quern("check", compile(tilted, "glow.bulb", folder), status=2, **path)
+        assert failures(said) == {"the same on both sides"}, said
+        later = text.replace("uint32_t size, pad;", "uint32_t size, pad; void *later[2];")
+        assert "newer header" in quern("check", compile(later, "glow.bulb", folder), status=2, **path)
+        # a test that crashes, and one whose table is wrong
+        begin = "static void law(const quern_check *c) {"
+        bad = test.replace(begin, begin + " __builtin_trap();")
+        compile(text, "glow.bulb", folder), compile(bad, "check.glow", folder)
+        assert "FAILED  law: glow.bulb: crashed (SIGILL) in" in quern("check", bulb, status=2, **path)
+        compile(test.replace('"check.glow"', '"check.shine"'), "check.glow", folder)
+        assert "it checks the kind glow, so its id must be check.glow" in quern("check", bulb, status=2, **path)
+    print("a kind from outside brings its template and its conformance test")
+
+
+def check_places():
+    """Nothing of a plugin runs in the process that was started."""
+    start = '\n#include <stdio.h>\n#include <stdlib.h>\n#include <unistd.h>\n' \
+            '__attribute__((constructor)) static void start(void) { FILE *f = fopen(getenv("NOTES"), "a"); fprintf(f, "%d\\n", (int)getpid()); fclose(f); }\n'
+    with tempfile.TemporaryDirectory() as folder:
+        notes = workshop.pathlib.Path(folder) / "notes"
+        path = compile(source(LINEAR) + start, "contact.linear", folder)
+        process = workshop.subprocess.Popen([workshop.QUERN, "check", path], stdout=workshop.subprocess.DEVNULL,
+                                            env={**workshop.os.environ, "NOTES": str(notes)})
+        assert process.wait(300) == 0
+        loaded = [int(line) for line in notes.read_text().split()]
+        assert len(loaded) >= 5 and process.pid not in loaded, f"{process.pid} among {loaded}"
+    print(f"a plugin is loaded {len(loaded)} times, each time in a child")
+
+
 def check_options():
     elastic = PLUGINS / "material.elastic.so"
     assert "all ok" in quern("check", elastic, "--set", "poisson=0.2", status=0)
@@ -313,4 +470,6 @@ if __name__ == "__main__":
     check_legitimate()
     check_crashes()
     check_forbidden()
+    check_outside()
+    check_places()
     check_options()

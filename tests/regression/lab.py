@@ -18,6 +18,12 @@ SOURCE = pathlib.Path(os.environ["QUERN_SOURCE"])
 PLUGINS = pathlib.Path(os.environ["QUERN_PLUGINS_DIR"])
 
 
+def use(program, plugins):
+    """From now on all of this works with another program."""
+    global QUERN, PLUGINS
+    QUERN, PLUGINS = str(program), pathlib.Path(plugins)
+
+
 def sets(**values):
     """--set options; `__` in a name stands for a dot."""
     return [f"--set={key.replace('__', '.')}={value}" for key, value in values.items()]
@@ -47,11 +53,11 @@ def scene(name):
     return str(SOURCE / "configs" / (name + ".yaml"))
 
 
-def command(name, folder, *options, threads=1, program=QUERN):
-    return [program, "run", scene(name), "--quiet", "--threads", str(threads), "-o", str(folder), *options]
+def command(name, folder, *options, threads=1, program=None):
+    return [program or QUERN, "run", scene(name), "--quiet", "--threads", str(threads), "-o", str(folder), *options]
 
 
-def run(name, folder, *options, status=0, threads=1, program=QUERN, resume=False, timeout=3600, **environment):
+def run(name, folder, *options, status=0, threads=1, program=None, resume=False, timeout=3600, **environment):
     """A run to its end; returns what it says on the way."""
     words = command(name, folder, *options, *(["--resume"] if resume else []), threads=threads, program=program)
     done = subprocess.run(words, capture_output=True, text=True, timeout=timeout, env={**os.environ, **environment})

@@ -9,7 +9,7 @@ LINE = "SPDX-License-Identifier: MIT"
 files = [path for folder in ("core", "include", "plugins", "render", "studies", "tests", "tools") for path in (SOURCE / folder).rglob("*")
          if path.suffix in (".c", ".h", ".cc", ".py") or path.name == "meson.build" or path.parent.name == "tools" and path.suffix == ""]
 for path in files:
-    template = path.parent.name == "templates" and path.name not in ("embed.py", "meson.build")
+    template = path.name.startswith("template.")
     head = "".join(path.read_text().splitlines(keepends=True)[:2])
     assert (LINE in head) != template, f"{path}: {'a template says' if template else 'does not say'} {LINE}"
 print(f"{len(files)} files")

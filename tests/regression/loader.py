@@ -93,6 +93,8 @@ ENDLESS = f"[0 ... 1999] = {{ {ROW} }},"
 LIST = '{ .name = "l", .doc = "L.", .type = QUERN_T_LIST, .item_size = 16, .rows = %s },'
 OUTPUT = '{ .name = "%s", .unit = "1", .doc = "O." }, { .name = 0 }'
 # what is wrong with a table, and what the one sentence about it says
+LAW = "static void law(const quern_check *c) { (void)c; }\nQUERN_KIND(%s, quern_check_ops, \"K.\", QUERN_END_FUNCTIONS);\n"
+TESTED = ".kind = &quern_%s_kind, .law = law"
 TABLES = [
     (library(rows=ENDLESS), "more than 256 parameters, so the last row is no QUERN_END_PARAMS"),
     (library(rows=f"{{ {ROW}, .offset = 1000000 }},"), "'a' lies at bytes 1000000 to 1000008 of 64"),
@@ -174,6 +176,11 @@ TABLES = [
     (solver(stage=".run = 0"), "stage bad.go: phase 0 or flags 0 are unknown, or there is no run or no uses"),
     (solver(stage=".phase = 99"), "stage bad.go: phase 99 or flags 0 are unknown"),
     (library(kind="solver", table=RUN % ("s", "0", "", ""), ops=".sets = sets"), "a solver without stages"),
+    (library(kind="check", table=LAW % "bad", ops=".law = law"), "ops: there is no kind; use QUERN_KIND"),
+    (library(kind="check", table=LAW % "good", ops=TESTED % "good"), "it checks the kind good, so its id must be check.good"),
+    (library(kind="check", table=LAW % "bad", ops=".kind = &quern_bad_kind"), "ops lacks the function law"),
+    (library(kind="check", table="#include <quern/solver.h>\n" + LAW % "bad", ops=TESTED % "solver"),
+     "a solver has no conformance test of its kind"),
 ]
 
 
@@ -184,7 +191,7 @@ def check_tables(folder):
     small = "static const quern_param own[] = { { .name = \"k\", .type = QUERN_T_INT }, QUERN_END_PARAMS };"
     refused(library(rows=LIST.replace("16", "4") % "own", head=small), "contact.bad", folder, status=0)
     for text, expected in TABLES:
-        name = next(kind for kind in ("observer", "solver", "contact") if f'.id = "{kind}.bad"' in text) + ".bad"
+        name = next(kind for kind in ("observer", "solver", "check", "contact") if f'.id = "{kind}.bad"' in text) + ".bad"
         path = refused(text, name, folder, expected)
         if name == "contact.bad":
             one_sentence(quern("plan", SCENE, "--set", "grains.contact=bad", status=2, QUERN_PLUGIN_PATH=folder), path,

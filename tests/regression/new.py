@@ -9,7 +9,7 @@ import tempfile
 
 QUERN = pathlib.Path(os.environ["QUERN"])
 KINDS = ["contact", "neighbours", "integrator", "body", "material", "shape", "transfer", "coupling", "oracle", "packer",
-         "observer", "solver"]
+         "observer", "solver", "check"]
 
 HEAD = """
 quern: 1
@@ -115,7 +115,7 @@ def main():
                 print(f"{kind}.mine: made, built and checked")
         refusals(program, folder, environment)
         environment["QUERN_PLUGIN_PATH"] = ":".join(str(folder / f"{kind}.mine/build") for kind in KINDS)
-        listed = run(program, "list", env=environment)
+        listed = run(program, "list", "--all", env=environment)
         for kind in KINDS:
             assert f"{kind}.mine " in listed, f"quern list does not show {kind}.mine"
             assert f"{kind}.mine 0.1.0" in run(program, "describe", f"{kind}.mine", env=environment)
@@ -129,4 +129,5 @@ def main():
                 print(f"{scene}, {d}-D: runs with them")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -15,6 +15,7 @@ DOCUMENTED = {
     "output/summary.c": {"grains", "grain_steps", "points", "point_steps", "discrete_share", "observer.discrete_share",
                          "mass", "momentum", "energy", "elastic"},
     "output/checkpoint.c": {"mass"},
+    "check/check_scene.c": {"mass"},
     "run/run.c": {"mass"},
     "output/frame.c": {".position"},  # the first dataset of a group, by which programs place the others
     "store/field.c": {"cells"},  # the group of the host's own set "cell"

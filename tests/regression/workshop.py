@@ -28,11 +28,18 @@ def compile(text, name, folder, *link, beside=""):
     return f"{stem}.so"
 
 
+def template(kind):
+    """The template of a kind, where its other files are."""
+    found = [*SOURCE.glob(f"plugins/*/template.{kind}.c"), *SOURCE.glob(f"core/templates/template.{kind}.c")]
+    assert len(found) == 1, f"{kind}: {len(found)} templates"
+    return found[0]
+
+
 def source_of(path):
     """A plugin's source, or that of the template of a kind, whose plugin is called mine."""
     if "/" in path:
         return (SOURCE / "plugins" / path).read_text()
-    return (SOURCE / f"core/templates/{path}.c").read_text().replace("my_name", "mine")
+    return template(path).read_text().replace("my_name", "mine")
 
 
 def source(path, *changes):

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_body - geometry: unit normals, gaps that grow along them, surfaces that go with the pose */
-#include "check.h"
+/* check.body - geometry: unit normals, gaps that grow along them, surfaces that go with the pose */
 #include <math.h>
 #include <quern/body.h>
+#include <quern/check.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,78 +11,80 @@ enum { NODES, GRAINS, VARIANTS };
 
 static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
 
-static void call(const check_kernel *k, const check_batch *b) {
+static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	const quern_body_ops *ops = k->ops;
 	quern_body_batch batch = { .n = b->n, .cap = b->cap, .dim = k->dim, .pose = k->more };
-	CHECK_VECTOR(batch.position, k, b, POSITION, k->dim);
-	batch.radius = check_at(k, b, RADIUS, 0);
-	batch.feature = check_at(k, b, FEATURE, 0);
-	batch.gap = check_at(k, b, GAP, 0);
-	CHECK_VECTOR(batch.normal, k, b, NORMAL, k->dim);
-	CHECK_VECTOR(batch.velocity, k, b, SPEED, k->dim);
-	ops->closest(k->instance->self, &batch);
+	QUERN_CHECK_VECTOR(batch.position, k, b, POSITION, k->dim);
+	batch.radius = quern_check_at(k, b, RADIUS, 0);
+	batch.feature = quern_check_integers_at(k, b, FEATURE);
+	batch.gap = quern_check_at(k, b, GAP, 0);
+	QUERN_CHECK_VECTOR(batch.normal, k, b, NORMAL, k->dim);
+	QUERN_CHECK_VECTOR(batch.velocity, k, b, SPEED, k->dim);
+	ops->closest(k->self, &batch);
 }
 
 /* Bounded axes are covered with a margin of their own length, the others from -1 to 1. */
-static void range_of(const check_kernel *k, uint32_t a, double *low, double *high) {
+static void range_of(const quern_check_kernel *k, uint32_t a, double *low, double *high) {
 	quern_real lower[3] = { 0 }, upper[3] = { 0 };
 	const quern_body_ops *ops = k->ops;
 	*low = -1, *high = 1;
-	ops->bounds(k->instance->self, k->dim, lower, upper);
+	ops->bounds(k->self, k->dim, lower, upper);
 	if (!isfinite(lower[a]) || !isfinite(upper[a])) return;
 	*low = lower[a] - (upper[a] - lower[a]) - 1e-3;
 	*high = upper[a] + (upper[a] - lower[a]) + 1e-3;
 }
 
-static void create(
-	const check *c, const check_instance *it, const quern_pose *pose, uint32_t n, check_kernel *k) {
-	quern_check_kernel_init(k, c, it, "closest", n);
+static quern_check_kernel *create(
+	const quern_check *c, const quern_check_instance *it, const quern_pose *pose, uint32_t n) {
+	quern_check_kernel *k = c->host->kernel_create(c, it, "closest", n);
 	k->call = call;
 	k->more = pose;
-	quern_check_add(k, POSITION, "position", CHECK_IN, k->dim);
-	quern_check_add(k, RADIUS, "radius", CHECK_IN, 1);
-	quern_check_add(k, GAP, "gap", CHECK_OUT, 1);
-	quern_check_add(k, NORMAL, "normal", CHECK_OUT, k->dim);
-	quern_check_add(k, SPEED, "velocity", CHECK_OUT, k->dim);
+	c->host->add(k, POSITION, "position", QUERN_CHECK_IN, k->dim);
+	c->host->add(k, RADIUS, "radius", QUERN_CHECK_IN, 1);
+	c->host->add(k, GAP, "gap", QUERN_CHECK_OUT, 1);
+	c->host->add(k, NORMAL, "normal", QUERN_CHECK_OUT, k->dim);
+	c->host->add(k, SPEED, "velocity", QUERN_CHECK_OUT, k->dim);
 	for (uint32_t a = 0; a < k->dim; a++) {
 		double low, high;
 		range_of(k, a, &low, &high);
 		for (uint32_t i = 0; i < n; i++)
-			quern_check_given(k, POSITION, a)[i] = quern_check_uniform(130, (uint64_t)a << 32 | i, low, high);
+			quern_check_given(k, POSITION, a)[i] = c->host->uniform(130, (uint64_t)a << 32 | i, low, high);
 	}
+	return k;
 }
 
-static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
-	if (variant >= VARIANTS) return false;
-	create(c, it, &still, n, k);
-	if (variant == GRAINS) quern_check_fill(k, RADIUS, 1, 131, 1e-4, 1e-3);
-	return true;
+static quern_check_kernel *make(
+	const quern_check *c, const quern_check_instance *it, uint32_t variant, uint32_t n) {
+	if (variant >= VARIANTS) return NULL;
+	quern_check_kernel *k = create(c, it, &still, n);
+	if (variant == GRAINS) c->host->fill(k, RADIUS, 1, 131, 1e-4, 1e-3);
+	return k;
 }
 
 /* ---- what must hold ---- */
 
 typedef struct {
-	check_tally normals, gaps, radii, bounds, shifts, turns, features;
+	quern_check_tally normals, gaps, radii, bounds, shifts, turns, features;
 } tallies;
 
-static void check_surface(check_kernel *k, check_kernel *moved, tallies *t) {
+static void check_surface(quern_check_kernel *k, quern_check_kernel *moved, tallies *t) {
 	const double scale = 1e-4;
-	quern_check_run(k, 64, NULL);
+	k->host->run(k, 64, false);
 	for (uint32_t i = 0; i < k->n; i++) {
 		double length = 0;
 		for (uint32_t a = 0; a < k->dim; a++) length += pow(quern_check_found(k, NORMAL, a)[i], 2);
-		quern_check_measure(&t->normals, fabs(sqrt(length) - 1), 1e-12, "%u-D: a normal has the length %.15g",
+		k->host->measure(&t->normals, fabs(sqrt(length) - 1), 1e-12, "%u-D: a normal has the length %.15g",
 			k->dim, sqrt(length));
 		for (uint32_t a = 0; a < k->dim; a++)
 			quern_check_given(moved, POSITION, a)[i] =
 				quern_check_given(k, POSITION, a)[i] + scale * quern_check_found(k, NORMAL, a)[i];
 		quern_check_given(moved, RADIUS, 0)[i] = 2e-4;
 	}
-	quern_check_run(moved, 64, NULL);
+	k->host->run(moved, 64, false);
 	for (uint32_t i = 0; i < k->n; i++) {
 		const double was = quern_check_found(k, GAP, 0)[i], is = quern_check_found(moved, GAP, 0)[i] + 2e-4;
 		if (was <= 0 && is > 0) continue; /* through the surface a corner may be nearer */
-		quern_check_measure(&t->gaps, fabs(is - was - scale) / scale, 1e-9,
+		k->host->measure(&t->gaps, fabs(is - was - scale) / scale, 1e-9,
 			"%u-D: %.3g m along the normal change the gap from %.9g to %.9g m", k->dim, scale, was, is);
 	}
 	memcpy(
@@ -90,21 +92,21 @@ static void check_surface(check_kernel *k, check_kernel *moved, tallies *t) {
 	for (uint32_t a = 1; a < k->dim; a++)
 		memcpy(quern_check_given(moved, POSITION, a), quern_check_given(k, POSITION, a),
 			k->n * sizeof(quern_real));
-	quern_check_run(moved, 64, NULL);
+	k->host->run(moved, 64, false);
 	for (uint32_t i = 0; i < k->n; i++)
-		quern_check_measure(&t->radii,
+		k->host->measure(&t->radii,
 			fabs(quern_check_found(k, GAP, 0)[i] - quern_check_found(moved, GAP, 0)[i] - 2e-4), 1e-15,
 			"%u-D: a radius of 2e-4 m changes the gap from %.9g to %.9g m", k->dim,
 			quern_check_found(k, GAP, 0)[i], quern_check_found(moved, GAP, 0)[i]);
 }
 
-static void check_bounds(const check_kernel *k, tallies *t) {
+static void check_bounds(const quern_check_kernel *k, tallies *t) {
 	quern_real lower[3] = { 0 }, upper[3] = { 0 };
-	((const quern_body_ops *)k->ops)->bounds(k->instance->self, k->dim, lower, upper);
+	((const quern_body_ops *)k->ops)->bounds(k->self, k->dim, lower, upper);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t a = 0; a < k->dim; a++) {
 			const double x = quern_check_given(k, POSITION, a)[i];
-			quern_check_expect(&t->bounds,
+			k->host->expect(&t->bounds,
 				quern_check_found(k, GAP, 0)[i] > 0 || (x >= lower[a] && x <= upper[a]),
 				"%u-D: a place inside the body, at %.6g m along axis %u, lies outside bounds()", k->dim, x,
 				a);
@@ -119,8 +121,8 @@ static void pose_point(const quern_pose *p, uint32_t dim, const double x[3], dou
 	}
 }
 
-static void check_pose(
-	check_kernel *k, check_kernel *posed, const quern_pose *pose, bool spins, check_tally *t) {
+static void check_pose(quern_check_kernel *k, quern_check_kernel *posed, const quern_pose *pose, bool spins,
+	quern_check_tally *t) {
 	posed->more = pose;
 	for (uint32_t i = 0; i < k->n; i++) {
 		double x[3] = { 0 }, out[3];
@@ -129,10 +131,10 @@ static void check_pose(
 		for (uint32_t a = 0; a < k->dim; a++) quern_check_given(posed, POSITION, a)[i] = out[a];
 		quern_check_given(posed, RADIUS, 0)[i] = 0;
 	}
-	quern_check_run(posed, 64, NULL);
+	k->host->run(posed, 64, false);
 	for (uint32_t i = 0; i < k->n; i++) {
 		const double gap = quern_check_found(k, GAP, 0)[i], is = quern_check_found(posed, GAP, 0)[i];
-		quern_check_measure(t, fabs(gap - is), 1e-12,
+		k->host->measure(t, fabs(gap - is), 1e-12,
 			"%u-D: the gap to the body in its pose is %.9g m, should be %.9g", k->dim, is, gap);
 		if (fabs(gap) < 1e-9) continue;
 		double arm[3] = { 0 };
@@ -145,7 +147,7 @@ static void check_pose(
 			for (uint32_t e = 0; e < k->dim;
 				 e++) /* the surface's own, as that of a drum, turns with the pose */
 				v += pose->turn[3 * a + e] * quern_check_found(k, SPEED, e)[i];
-			quern_check_measure(t, fabs(quern_check_found(posed, SPEED, a)[i] - v), 1e-9,
+			k->host->measure(t, fabs(quern_check_found(posed, SPEED, a)[i] - v), 1e-9,
 				"%u-D: the surface moves with %.9g m/s, should with %.9g", k->dim,
 				quern_check_found(posed, SPEED, a)[i], v);
 		}
@@ -153,35 +155,32 @@ static void check_pose(
 }
 
 /* Every feature in reach is at least as far as the nearest one, which is among them. */
-static void check_features(const check_kernel *k, tallies *t) {
+static void check_features(const quern_check_kernel *k, tallies *t) {
 	const quern_body_ops *ops = k->ops;
-	check_kernel *one = malloc(sizeof *one);
-	if (!one) abort();
 	for (uint32_t i = 0; i < k->n && i < 100; i++) {
 		enum { MOST = 64 };
 		int32_t feature[MOST];
 		double x[3] = { 0 }, nearest = INFINITY;
 		const double gap = quern_check_found(k, GAP, 0)[i];
 		for (uint32_t a = 0; a < k->dim; a++) x[a] = quern_check_given(k, POSITION, a)[i];
-		quern_check_place(k->check, "features, %u-D", k->dim);
-		const uint32_t n = ops->features(k->instance->self, &still, x, fabs(gap) + 1e-6, MOST, feature);
+		k->host->place(k->check, "features, %u-D", k->dim);
+		const uint32_t n = ops->features(k->self, &still, x, fabs(gap) + 1e-6, MOST, feature);
 		for (uint32_t f = 0; f < n && f < MOST; f++) {
-			create(k->check, k->instance, &still, 1, one);
-			quern_check_add_integers(one, FEATURE, "feature", CHECK_IN);
-			((int32_t *)one->column[one->at[FEATURE]].given)[0] = feature[f];
+			quern_check_kernel *one = create(k->check, k->instance, &still, 1);
+			k->host->add_integers(one, FEATURE, "feature", QUERN_CHECK_IN);
+			*(int32_t *)k->host->column(one, one->at[FEATURE])->given = feature[f];
 			for (uint32_t a = 0; a < k->dim; a++) quern_check_given(one, POSITION, a)[0] = x[a];
-			quern_check_run(one, 8, NULL);
+			k->host->run(one, 8, false);
 			if (quern_check_found(one, GAP, 0)[0] < nearest) nearest = quern_check_found(one, GAP, 0)[0];
-			quern_check_kernel_finish(one);
+			k->host->kernel_destroy(one);
 		}
-		quern_check_expect(&t->features, n <= MOST && (gap < 0 || fabs(nearest - gap) < 1e-9),
+		k->host->expect(&t->features, n <= MOST && (gap < 0 || fabs(nearest - gap) < 1e-9),
 			"%u-D: the nearest surface is %.9g m away, the nearest of %u features %.9g", k->dim, gap, n,
 			nearest);
 	}
-	free(one);
 }
 
-static void try_dimension(const check *c, const check_instance *it, tallies *t) {
+static void try_dimension(const quern_check *c, const quern_check_instance *it, tallies *t) {
 	enum { PLACES = 1000 };
 	const double cosine = 0.8, sine = 0.6;
 	const quern_pose shifted = { .position = { 0.01, -0.02, it->dim == 3 ? 0.03 : 0 },
@@ -190,37 +189,44 @@ static void try_dimension(const check *c, const check_instance *it, tallies *t) 
 	const quern_pose turned = { .position = { 0.01, -0.02, 0 },
 		.turn = { cosine, -sine, 0, sine, cosine, 0, 0, 0, 1 },
 		.spin = { 0, 0, 2 } };
-	check_kernel *k = malloc(2 * sizeof *k);
-	if (!k) abort();
-	create(c, it, &still, PLACES, &k[0]);
-	create(c, it, &still, PLACES, &k[1]);
-	check_surface(&k[0], &k[1], t);
-	check_bounds(&k[0], t);
-	check_pose(&k[0], &k[1], &shifted, false, &t->shifts);
-	check_pose(&k[0], &k[1], &turned, true, &t->turns);
-	if (((const quern_body_ops *)c->ops)->features) check_features(&k[0], t);
-	quern_check_kernel_finish(&k[0]);
-	quern_check_kernel_finish(&k[1]);
-	free(k);
+	quern_check_kernel *k = create(c, it, &still, PLACES), *other = create(c, it, &still, PLACES);
+	check_surface(k, other, t);
+	check_bounds(k, t);
+	check_pose(k, other, &shifted, false, &t->shifts);
+	check_pose(k, other, &turned, true, &t->turns);
+	if (((const quern_body_ops *)c->ops)->features) check_features(k, t);
+	c->host->kernel_destroy(k);
+	c->host->kernel_destroy(other);
 }
 
-static void law(const check *c) {
+static void law(const quern_check *c) {
 	tallies t = { { .name = "unit normals" }, { .name = "gap along the normal" },
 		{ .name = "gap and radius" }, { .name = "bounds" }, { .name = "moved pose" },
 		{ .name = "turned pose" }, { .name = "features" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
-		check_instance it;
-		if (!check_has_dim(c, dim)) continue;
-		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, &t);
-		quern_check_instance_finish(c, &it);
+		quern_check_instance *it = c->host->instance_create(c, dim, 0);
+		if (it) try_dimension(c, it, &t);
+		c->host->instance_destroy(it);
 	}
-	quern_check_tell(c, &t.normals, NULL);
-	quern_check_tell(c, &t.gaps, NULL);
-	quern_check_tell(c, &t.radii, NULL);
-	quern_check_tell(c, &t.bounds, NULL);
-	quern_check_tell(c, &t.shifts, NULL);
-	quern_check_tell(c, &t.turns, NULL);
-	if (t.features.tried) quern_check_tell(c, &t.features, NULL);
+	c->host->tell(c, &t.normals, NULL);
+	c->host->tell(c, &t.gaps, NULL);
+	c->host->tell(c, &t.radii, NULL);
+	c->host->tell(c, &t.bounds, NULL);
+	c->host->tell(c, &t.shifts, NULL);
+	c->host->tell(c, &t.turns, NULL);
+	if (t.features.tried) c->host->tell(c, &t.features, NULL);
 }
 
-const check_kind quern_check_body = { .kind = &quern_body_kind, .make = make, .law = law };
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+static const quern_check_ops ops = { .size = sizeof ops, .kind = &quern_body_kind, .make = make, .law = law };
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.instance_size = 1,
+	.id = "check.body",
+	.brief = "Geometry: unit normals, gaps that grow along them, surfaces that go with the pose.",
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_packer - placing grains in a region: no overlap, nothing outside, the radius that waits, the same again */
-#include "check.h"
-#include "random.h"
-#include "text.h"
+/* check.packer - placing grains in a region: no overlap, nothing outside, the radius that waits, the same again */
 #include <math.h>
+#include <quern/check.h>
 #include <quern/packer.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +11,7 @@ enum { EMPTY, SEEDED, WALLED, ROUND, REGIONS };
 
 typedef struct {
 	quern_pack_job job; /* first, so that a job is its packing */
+	const quern_check_host *host;
 	uint32_t shape, n, limit;
 	quern_spot spot[MOST];
 	uint32_t overlaps, outside, other_radius, after_end, off_plane;
@@ -20,9 +19,7 @@ typedef struct {
 
 static const double mean = 1e-3, side = 12e-3;
 
-static double drawn(const packing *p) {
-	return mean * quern_check_uniform(150, p->n - p->job.n_seed, 0.8, 1.2);
-}
+static double drawn(const packing *p) { return mean * p->host->uniform(150, p->n - p->job.n_seed, 0.8, 1.2); }
 
 static quern_real radius(quern_pack_job *job) { return drawn((packing *)(void *)job); }
 
@@ -59,15 +56,15 @@ static bool place(quern_pack_job *job, const quern_spot *s) {
 	return p->n < p->limit;
 }
 
-static const quern_host host = { .abi = QUERN_ABI, .random = quern_random };
-
-static void begin(uint32_t dim, uint32_t shape, uint64_t key, uint32_t limit, packing *p) {
+static void begin(
+	const quern_check *c, uint32_t dim, uint32_t shape, uint64_t key, uint32_t limit, packing *p) {
 	memset(p, 0, sizeof *p);
+	p->host = c->host;
 	p->shape = shape;
 	p->job = (quern_pack_job) { .dim = dim,
 		.stream = 3,
 		.key = key,
-		.host = &host,
+		.host = c->init,
 		.radius = radius,
 		.inside = inside,
 		.free = is_free,
@@ -85,31 +82,31 @@ static void begin(uint32_t dim, uint32_t shape, uint64_t key, uint32_t limit, pa
 }
 
 /* The seeds stay where they were at the start while others are placed. */
-static void pack(const check *c, const check_instance *it, packing *p) {
+static void pack(const quern_check *c, const quern_check_instance *it, packing *p) {
 	const quern_packer_ops *ops = c->ops;
 	quern_spot seed[3];
 	memcpy(seed, p->spot, sizeof seed);
 	p->job.seed = seed;
-	quern_check_place(c, "pack, %u-D, in region %u", it->dim, p->shape);
+	c->host->place(c, "pack, %u-D, in region %u", it->dim, p->shape);
 	ops->pack[it->dim - 2](it->self, &p->job);
 	p->job.seed = NULL;
 }
 
 typedef struct {
-	check_tally overlap, inside, radius, end, again, grains, self;
+	quern_check_tally overlap, inside, radius, end, again, grains, self;
 } tallies;
 
 static void look(const packing *p, tallies *t) {
 	const uint32_t dim = p->job.dim, n = p->n - p->job.n_seed;
-	quern_check_expect(&t->overlap, !p->overlaps,
+	p->host->expect(&t->overlap, !p->overlaps,
 		"%u-D: %u of %u grains overlap others or a wall by more than 1e-9", dim, p->overlaps, n);
-	quern_check_expect(&t->inside, !p->outside && !p->off_plane,
+	p->host->expect(&t->inside, !p->outside && !p->off_plane,
 		"%u-D: %u of %u grains have their centre outside the region", dim, p->outside + p->off_plane, n);
-	quern_check_expect(&t->radius, !p->other_radius,
+	p->host->expect(&t->radius, !p->other_radius,
 		"%u-D: %u of %u grains have another radius than the one that waits", dim, p->other_radius, n);
-	quern_check_expect(&t->end, !p->after_end, "%u-D: %u grains are placed after place() has said enough",
-		dim, p->after_end);
-	quern_check_expect(&t->grains, n > 0, "%u-D: nothing is placed in an empty region", dim);
+	p->host->expect(&t->end, !p->after_end, "%u-D: %u grains are placed after place() has said enough", dim,
+		p->after_end);
+	p->host->expect(&t->grains, n > 0, "%u-D: nothing is placed in an empty region", dim);
 }
 
 static bool same(const packing *a, const packing *b) {
@@ -117,28 +114,27 @@ static bool same(const packing *a, const packing *b) {
 		   !memcmp(a->spot, b->spot, a->n * sizeof *a->spot);
 }
 
-static void try_dimension(const check *c, const check_instance *it, packing p[2], tallies *t) {
-	const uint32_t size = c->file->plugin.instance_size;
-	void *before = quern_take(1, size);
+static void try_dimension(const quern_check *c, const quern_check_instance *it, packing p[2], tallies *t) {
+	const uint32_t size = c->instance_size;
+	void *before = c->host->memory(1, size);
 	memcpy(before, it->self, size);
 	for (uint32_t shape = 0; shape < REGIONS; shape++)
 		for (uint64_t key = 0; key < 4; key++) {
 			for (int i = 0; i < 2; i++) {
-				begin(it->dim, shape, key, key == 3 ? 7 : MOST - 8, &p[i]);
+				begin(c, it->dim, shape, key, key == 3 ? 7 : MOST - 8, &p[i]);
 				pack(c, it, &p[i]);
 			}
 			look(&p[0], t);
-			quern_check_expect(&t->again, same(&p[0], &p[1]),
+			c->host->expect(&t->again, same(&p[0], &p[1]),
 				"%u-D: the same seed and counter give another packing", it->dim);
 		}
-	quern_check_expect(&t->self, !memcmp(before, it->self, size), "%u-D: self changes", it->dim);
+	c->host->expect(&t->self, !memcmp(before, it->self, size), "%u-D: self changes", it->dim);
 	free(before);
 }
 
-static bool sane(const check *c, const check_instance *it, const char **why) {
-	packing *p = malloc(sizeof *p);
-	if (!p) abort();
-	begin(it->dim, EMPTY, 5, 20, p);
+static bool sane(const quern_check *c, const quern_check_instance *it, const char **why) {
+	packing *p = c->host->memory(1, sizeof *p);
+	begin(c, it->dim, EMPTY, 5, 20, p);
 	pack(c, it, p);
 	const bool good = !p->overlaps && !p->outside && !p->other_radius && !p->after_end;
 	free(p);
@@ -146,26 +142,38 @@ static bool sane(const check *c, const check_instance *it, const char **why) {
 	return good;
 }
 
-static void law(const check *c) {
+static void law(const quern_check *c) {
 	tallies t = { { .name = "no overlap" }, { .name = "inside the region" },
 		{ .name = "the radius that waits" }, { .name = "enough is enough" }, { .name = "the same again" },
 		{ .name = "places grains" }, { .name = "self" } };
-	packing *p = malloc(2 * sizeof *p);
-	if (!p) abort();
+	packing *p = c->host->memory(2, sizeof *p);
 	for (uint32_t dim = 2; dim <= 3; dim++) {
-		check_instance it;
-		if (!check_has_dim(c, dim)) continue;
-		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, p, &t);
-		quern_check_instance_finish(c, &it);
+		quern_check_instance *it = c->host->instance_create(c, dim, 0);
+		if (it) try_dimension(c, it, p, &t);
+		c->host->instance_destroy(it);
 	}
 	free(p);
-	quern_check_tell(c, &t.grains, NULL);
-	quern_check_tell(c, &t.overlap, "none above 1e-9 of a radius");
-	quern_check_tell(c, &t.inside, NULL);
-	quern_check_tell(c, &t.radius, NULL);
-	quern_check_tell(c, &t.end, NULL);
-	quern_check_tell(c, &t.again, NULL);
-	quern_check_tell(c, &t.self, "self is left alone");
+	c->host->tell(c, &t.grains, NULL);
+	c->host->tell(c, &t.overlap, "none above 1e-9 of a radius");
+	c->host->tell(c, &t.inside, NULL);
+	c->host->tell(c, &t.radius, NULL);
+	c->host->tell(c, &t.end, NULL);
+	c->host->tell(c, &t.again, NULL);
+	c->host->tell(c, &t.self, "self is left alone");
 }
 
-const check_kind quern_check_packer = { .kind = &quern_packer_kind, .sane = sane, .law = law };
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+static const quern_check_ops ops = {
+	.size = sizeof ops, .kind = &quern_packer_kind, .sane = sane, .law = law
+};
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.instance_size = 1,
+	.id = "check.packer",
+	.brief = "Grains placed in a region: no overlap, nothing outside, the same again.",
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* quern_check_material - constitutive models: stress and history belong together, yield is obeyed, rotation does not matter */
-#include "check.h"
+/* check.material - constitutive models: stress and history belong together, yield is obeyed, rotation does not matter */
 #include <math.h>
+#include <quern/check.h>
 #include <quern/material.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,60 +13,61 @@ typedef struct {
 	quern_real bulk, shear, density;
 } moduli;
 
-static moduli moduli_of(const check_kernel *k) {
+static moduli moduli_of(const quern_check_kernel *k) {
 	moduli m = { 0 };
-	((const quern_material_ops *)k->ops)->moduli(k->instance->self, k->dim, &m.bulk, &m.shear, &m.density);
+	((const quern_material_ops *)k->ops)->moduli(k->self, k->dim, &m.bulk, &m.shear, &m.density);
 	return m;
 }
 
-static uint32_t stresses(const check_kernel *k) { return k->dim == 2 ? 3 : 6; }
+static uint32_t stresses(const quern_check_kernel *k) { return k->dim == 2 ? 3 : 6; }
 
-static void call(const check_kernel *k, const check_batch *b) {
+static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	const quern_material_ops *ops = k->ops;
-	quern_column use[CHECK_ROWS];
+	quern_column use[QUERN_MOST_USES];
 	const bool update = k->hook == QUERN_MATERIAL_UPDATE;
 	quern_material_batch batch = { .n = b->n, .cap = b->cap, .dt = update ? k->dt : 0, .use = use };
-	CHECK_VECTOR(batch.gradient, k, b, GRADIENT, k->dim * k->dim);
-	CHECK_VECTOR(batch.stress, k, b, STRESS, stresses(k));
-	batch.grid_density = check_at(k, b, GRID_DENSITY, 0);
-	batch.density = check_at(k, b, DENSITY, 0);
-	batch.wave_speed = check_at(k, b, WAVE, 0);
-	batch.energy = check_at(k, b, ENERGY, 0);
-	quern_check_columns(k, b, k->use, use);
-	(update ? ops->update : ops->assign)[k->dim - 2](k->instance->self, &batch);
+	QUERN_CHECK_VECTOR(batch.gradient, k, b, GRADIENT, k->dim * k->dim);
+	QUERN_CHECK_VECTOR(batch.stress, k, b, STRESS, stresses(k));
+	batch.grid_density = quern_check_at(k, b, GRID_DENSITY, 0);
+	batch.density = quern_check_at(k, b, DENSITY, 0);
+	batch.wave_speed = quern_check_at(k, b, WAVE, 0);
+	batch.energy = quern_check_at(k, b, ENERGY, 0);
+	k->host->columns(k, b, k->use, use);
+	(update ? ops->update : ops->assign)[k->dim - 2](k->self, &batch);
 }
 
-static void create(
-	const check *c, const check_instance *it, uint32_t hook, bool outputs, uint32_t n, check_kernel *k) {
+static quern_check_kernel *create(
+	const quern_check *c, const quern_check_instance *it, uint32_t hook, bool outputs, uint32_t n) {
 	const bool update = hook == QUERN_MATERIAL_UPDATE;
-	quern_check_kernel_init(k, c, it, update ? "update" : "assign", n);
+	quern_check_kernel *k = c->host->kernel_create(c, it, update ? "update" : "assign", n);
 	k->call = call;
 	if (update) {
-		quern_check_add(k, GRADIENT, "gradient", CHECK_IN, k->dim * k->dim);
-		quern_check_add(k, GRID_DENSITY, "grid_density", CHECK_IN, 1);
+		c->host->add(k, GRADIENT, "gradient", QUERN_CHECK_IN, k->dim * k->dim);
+		c->host->add(k, GRID_DENSITY, "grid_density", QUERN_CHECK_IN, 1);
 	}
-	quern_check_add(k, DENSITY, "density", CHECK_CHANGED, 1);
-	quern_check_add(k, STRESS, "stress", CHECK_CHANGED, stresses(k));
+	c->host->add(k, DENSITY, "density", QUERN_CHECK_CHANGED, 1);
+	c->host->add(k, STRESS, "stress", QUERN_CHECK_CHANGED, stresses(k));
 	if (outputs) {
-		quern_check_add(k, WAVE, "wave_speed", CHECK_OUT, 1);
-		quern_check_add(k, ENERGY, "energy", CHECK_OUT, 1);
+		c->host->add(k, WAVE, "wave_speed", QUERN_CHECK_OUT, 1);
+		c->host->add(k, ENERGY, "energy", QUERN_CHECK_OUT, 1);
 	}
-	quern_check_add_uses(k, hook, outputs, false);
+	c->host->add_uses(k, hook, outputs);
 	const quern_real density = moduli_of(k).density;
 	for (uint32_t i = 0; i < n; i++) {
 		quern_check_given(k, DENSITY, 0)[i] = density;
 		if (update) quern_check_given(k, GRID_DENSITY, 0)[i] = density;
 	}
+	return k;
 }
 
 /* Pressures up to `most` of the bulk modulus, with deviators up to `share` of the pressure. */
-static void fill_stress(const check_kernel *k, double most, double share, uint64_t key) {
+static void fill_stress(const quern_check_kernel *k, double most, double share, uint64_t key) {
 	const double bulk = moduli_of(k).bulk;
 	for (uint32_t i = 0; i < k->n; i++) {
-		const double p = quern_check_uniform(key, i, 0.1, 1) * most * bulk;
+		const double p = k->host->uniform(key, i, 0.1, 1) * most * bulk;
 		double mean = 0;
 		for (uint32_t c = 0; c < stresses(k); c++) {
-			const double x = quern_check_uniform(key + 1, c * 65536 + i, -share, share) * p;
+			const double x = k->host->uniform(key + 1, c * 65536 + i, -share, share) * p;
 			quern_check_given(k, STRESS, c)[i] = x;
 			if (c < k->dim) mean += x / k->dim;
 		}
@@ -75,48 +76,47 @@ static void fill_stress(const check_kernel *k, double most, double share, uint64
 }
 
 /* Stress, density and history as assign leaves them. */
-static void hand_over(const check_kernel *from, check_kernel *to) {
+static void hand_over(const quern_check_kernel *from, quern_check_kernel *to) {
 	const size_t n = from->n * sizeof(quern_real);
 	for (uint32_t c = 0; c < stresses(from); c++)
 		memcpy(quern_check_given(to, STRESS, c), quern_check_found(from, STRESS, c), n);
 	memcpy(quern_check_given(to, DENSITY, 0), quern_check_found(from, DENSITY, 0), n);
 	if (to->at[GRID_DENSITY] >= 0)
 		memcpy(quern_check_given(to, GRID_DENSITY, 0), quern_check_found(from, DENSITY, 0), n);
-	quern_check_carry(from, to);
+	from->host->carry(from, to);
 }
 
-static void start(const check *c, const check_instance *it, check_kernel *k, double most, double share) {
-	check_kernel *assign = malloc(sizeof *assign);
-	if (!assign) abort();
-	create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n, assign);
+static void start(
+	const quern_check *c, const quern_check_instance *it, quern_check_kernel *k, double most, double share) {
+	quern_check_kernel *assign = create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n);
 	fill_stress(assign, most, share, 60);
-	quern_check_run(assign, 512, NULL);
+	c->host->run(assign, 512, false);
 	hand_over(assign, k);
-	quern_check_kernel_finish(assign);
-	free(assign);
+	c->host->kernel_destroy(assign);
 }
 
-static bool make(const check *c, const check_instance *it, uint32_t variant, uint32_t n, check_kernel *k) {
-	if (variant >= VARIANTS) return false;
+static quern_check_kernel *make(
+	const quern_check *c, const quern_check_instance *it, uint32_t variant, uint32_t n) {
+	if (variant >= VARIANTS) return NULL;
 	const uint32_t hook = variant & ASSIGNS ? QUERN_MATERIAL_ASSIGN : QUERN_MATERIAL_UPDATE;
-	create(c, it, hook, variant & OUTPUTS, n, k);
+	quern_check_kernel *k = create(c, it, hook, variant & OUTPUTS, n);
 	if (hook == QUERN_MATERIAL_ASSIGN) {
 		fill_stress(k, 1e-3, 1.5, 61);
-		return true;
+		return k;
 	}
 	start(c, it, k, 1e-3, 1);
 	k->dt = 1e-5;
-	quern_check_fill(k, GRADIENT, k->dim * k->dim, 62, -30, 30);
+	c->host->fill(k, GRADIENT, k->dim * k->dim, 62, -30, 30);
 	for (uint32_t i = 0; i < n; i++) {
-		quern_check_given(k, DENSITY, 0)[i] *= quern_check_uniform(63, i, 0.998, 1.002);
-		quern_check_given(k, GRID_DENSITY, 0)[i] *= quern_check_uniform(64, i, 0.9, 1.05);
+		quern_check_given(k, DENSITY, 0)[i] *= c->host->uniform(63, i, 0.998, 1.002);
+		quern_check_given(k, GRID_DENSITY, 0)[i] *= c->host->uniform(64, i, 0.9, 1.05);
 	}
-	return true;
+	return k;
 }
 
 /* ---- what must hold ---- */
 
-static double stress_size(const check_kernel *k, uint32_t i, bool found) {
+static double stress_size(const quern_check_kernel *k, uint32_t i, bool found) {
 	double sum = 1e-30;
 	for (uint32_t c = 0; c < stresses(k); c++)
 		sum += fabs((found ? quern_check_found : quern_check_given)(k, STRESS, c)[i]);
@@ -124,51 +124,49 @@ static double stress_size(const check_kernel *k, uint32_t i, bool found) {
 }
 
 typedef struct {
-	check_tally moduli, again, held, yields, turned, violent;
+	quern_check_tally moduli, again, held, yields, turned, violent;
 } tallies;
 
-static void check_moduli(const check_kernel *assign, tallies *t) {
+static void check_moduli(const quern_check_kernel *assign, tallies *t) {
 	const moduli m = moduli_of(assign);
-	quern_check_expect(&t->moduli,
+	assign->host->expect(&t->moduli,
 		m.bulk > 0 && m.shear >= 0 && m.density > 0 && isfinite(m.bulk + m.shear + m.density),
 		"%u-D: bulk %.3g Pa, shear %.3g Pa, density %.3g kg/m^3", assign->dim, m.bulk, m.shear, m.density);
 }
 
 /* Assigned twice is assigned once; without stress the density is that of moduli(), and pressure raises it by 1/K. */
-static void check_assign(const check *c, const check_instance *it, check_kernel *k, tallies *t) {
-	check_kernel *again = malloc(sizeof *again);
-	if (!again) abort();
+static void check_assign(
+	const quern_check *c, const quern_check_instance *it, quern_check_kernel *k, tallies *t) {
 	const moduli m = moduli_of(k);
 	fill_stress(k, 1e-4, 2, 65);
-	quern_check_run(k, 512, NULL);
-	create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n, again);
+	c->host->run(k, 512, false);
+	quern_check_kernel *again = create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n);
 	hand_over(k, again);
-	quern_check_run(again, 512, NULL);
+	c->host->run(again, 512, false);
 	for (uint32_t i = 0; i < k->n; i++) {
 		double pressure = 0;
 		for (uint32_t s = 0; s < stresses(k); s++)
-			quern_check_measure(&t->again,
+			c->host->measure(&t->again,
 				fabs(quern_check_found(again, STRESS, s)[i] - quern_check_found(k, STRESS, s)[i]) /
 					stress_size(k, i, true),
 				1e-10, "%u-D: assign changes a stress that it has given back itself", k->dim);
 		for (uint32_t s = 0; s < k->dim; s++) pressure -= quern_check_found(k, STRESS, s)[i] / k->dim;
 		const double strain = log(quern_check_found(k, DENSITY, 0)[i] / m.density);
-		quern_check_measure(&t->moduli, fabs(strain * m.bulk - pressure) / (0.01 * pressure + 1e-12 * m.bulk),
-			1, "%u-D: a pressure of %.4g Pa goes with a density of %.6g kg/m^3, which moduli() does not say",
+		c->host->measure(&t->moduli, fabs(strain * m.bulk - pressure) / (0.01 * pressure + 1e-12 * m.bulk), 1,
+			"%u-D: a pressure of %.4g Pa goes with a density of %.6g kg/m^3, which moduli() does not say",
 			k->dim, pressure, quern_check_found(k, DENSITY, 0)[i]);
 	}
-	quern_check_kernel_finish(again);
-	free(again);
+	c->host->kernel_destroy(again);
 }
 
 /* A point that does not deform keeps what assign gave it. */
-static void check_rest(check_kernel *k, tallies *t) {
-	quern_check_fill(k, GRADIENT, k->dim * k->dim, 66, 0, 0);
+static void check_rest(quern_check_kernel *k, tallies *t) {
+	k->host->fill(k, GRADIENT, k->dim * k->dim, 66, 0, 0);
 	k->dt = 1e-12;
-	quern_check_run(k, 512, NULL);
+	k->host->run(k, 512, false);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t c = 0; c < stresses(k); c++)
-			quern_check_measure(&t->held,
+			k->host->measure(&t->held,
 				fabs(quern_check_found(k, STRESS, c)[i] - quern_check_given(k, STRESS, c)[i]) /
 					stress_size(k, i, false),
 				1e-9, "%u-D: a point at rest turns a stress of %.9g Pa into %.9g", k->dim,
@@ -176,7 +174,7 @@ static void check_rest(check_kernel *k, tallies *t) {
 }
 
 /* Volumes follow the gradient, V *= det(1 + dt L), before a material is asked. */
-static void follow_volume(const check_kernel *k) {
+static void follow_volume(const quern_check_kernel *k) {
 	for (uint32_t i = 0; i < k->n; i++) {
 		double f[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, det = 0;
 		for (uint32_t a = 0; a < k->dim; a++)
@@ -193,22 +191,20 @@ static void follow_volume(const check_kernel *k) {
 
 /* Whatever the strain, the stress is one that assign lets stand. */
 static void check_yield(
-	const check *c, const check_instance *it, check_kernel *k, double strain, tallies *t) {
-	check_kernel *assign = malloc(sizeof *assign);
+	const quern_check *c, const quern_check_instance *it, quern_check_kernel *k, double strain, tallies *t) {
+	quern_check_kernel *assign = create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n);
 	const char *column = "";
-	if (!assign) abort();
-	create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n, assign);
 	k->dt = 1e-4;
-	quern_check_fill(k, GRADIENT, k->dim * k->dim, 67, -strain / k->dt, strain / k->dt);
+	c->host->fill(k, GRADIENT, k->dim * k->dim, 67, -strain / k->dt, strain / k->dt);
 	follow_volume(k);
-	quern_check_run(k, 512, NULL);
-	quern_check_expect(&t->violent, quern_check_finite(k, &column),
+	c->host->run(k, 512, false);
+	c->host->expect(&t->violent, c->host->finite(k, &column),
 		"%u-D: %s is not finite after a strain of %.2g in one step", k->dim, column, strain);
 	hand_over(k, assign);
-	quern_check_run(assign, 512, NULL);
+	c->host->run(assign, 512, false);
 	for (uint32_t i = 0; i < k->n; i++)
 		for (uint32_t s = 0; s < stresses(k); s++)
-			quern_check_measure(&t->yields,
+			c->host->measure(&t->yields,
 				fabs(quern_check_found(assign, STRESS, s)[i] - quern_check_found(k, STRESS, s)[i]) /
 					(stress_size(k, i, true) + 1e-12 * moduli_of(k).bulk),
 				1e-9,
@@ -216,15 +212,14 @@ static void check_yield(
 				"%.6g",
 				k->dim, quern_check_found(k, STRESS, s)[i], quern_check_found(assign, STRESS, s)[i]);
 	for (uint32_t i = 0; i < k->n && k->at[WAVE] >= 0; i++)
-		quern_check_expect(&t->violent,
+		c->host->expect(&t->violent,
 			quern_check_found(k, WAVE, 0)[i] >= 0 && quern_check_found(k, ENERGY, 0)[i] >= 0,
 			"%u-D: wave speed %.3g m/s, energy %.3g J/kg", k->dim, quern_check_found(k, WAVE, 0)[i],
 			quern_check_found(k, ENERGY, 0)[i]);
-	quern_check_kernel_finish(assign);
-	free(assign);
+	c->host->kernel_destroy(assign);
 }
 
-static void unpack(const check_kernel *k, uint32_t i, bool found, double s[3][3]) {
+static void unpack(const quern_check_kernel *k, uint32_t i, bool found, double s[3][3]) {
 	static const int planar[] = { 0, 4, 1 }, spatial[] = { 0, 4, 8, 1, 5, 2 };
 	memset(s, 0, 9 * sizeof(double));
 	for (uint32_t c = 0; c < stresses(k); c++) {
@@ -235,12 +230,12 @@ static void unpack(const check_kernel *k, uint32_t i, bool found, double s[3][3]
 }
 
 /* After a small turn by an angle a, sigma + a (w sigma - sigma w), up to a^2. */
-static void check_rotation(check_kernel *k, tallies *t) {
+static void check_rotation(quern_check_kernel *k, tallies *t) {
 	const double angle = 1e-5, scale = moduli_of(k).bulk + moduli_of(k).shear;
 	k->dt = 1e-6;
 	for (uint32_t i = 0; i < k->n; i++) {
 		double axis[3], w[3][3];
-		quern_check_direction(3, 68, i, axis);
+		k->host->direction(3, 68, i, axis);
 		if (k->dim == 2) axis[0] = axis[1] = 0, axis[2] = 1;
 		for (int a = 0; a < 3; a++)
 			for (int b = 0; b < 3; b++) w[a][b] = a == b ? 0 : (b == (a + 1) % 3 ? -1 : 1) * axis[3 - a - b];
@@ -248,7 +243,7 @@ static void check_rotation(check_kernel *k, tallies *t) {
 			for (uint32_t b = 0; b < k->dim; b++)
 				quern_check_given(k, GRADIENT, a * k->dim + b)[i] = w[a][b] * angle / k->dt;
 	}
-	quern_check_run(k, 512, NULL);
+	k->host->run(k, 512, false);
 	for (uint32_t i = 0; i < k->n; i++) {
 		double s[3][3], now[3][3], w[3][3] = { { 0 } };
 		unpack(k, i, false, s);
@@ -260,22 +255,20 @@ static void check_rotation(check_kernel *k, tallies *t) {
 			for (int b = 0; b < 3; b++) {
 				double turned = s[a][b];
 				for (int c = 0; c < 3; c++) turned += w[a][c] * s[c][b] - s[a][c] * w[c][b];
-				quern_check_measure(&t->turned, fabs(now[a][b] - turned), 10 * angle * angle * scale,
+				k->host->measure(&t->turned, fabs(now[a][b] - turned), 10 * angle * angle * scale,
 					"%u-D: after a turn by %.0e a stress of %.9g Pa should be %.9g, is %.9g", k->dim, angle,
 					s[a][b], turned, now[a][b]);
 			}
 	}
 }
 
-static void try_dimension(const check *c, const check_instance *it, tallies *t) {
+static void try_dimension(const quern_check *c, const quern_check_instance *it, tallies *t) {
 	enum { POINTS = 300 };
-	check_kernel *k = malloc(sizeof *k);
-	if (!k) abort();
-	create(c, it, QUERN_MATERIAL_ASSIGN, false, POINTS, k);
+	quern_check_kernel *k = create(c, it, QUERN_MATERIAL_ASSIGN, false, POINTS);
 	check_moduli(k, t);
 	check_assign(c, it, k, t);
-	quern_check_kernel_finish(k);
-	create(c, it, QUERN_MATERIAL_UPDATE, true, POINTS, k);
+	c->host->kernel_destroy(k);
+	k = create(c, it, QUERN_MATERIAL_UPDATE, true, POINTS);
 	start(c, it, k, 1e-2, 0.1);
 	check_rest(k, t);
 	check_rotation(k, t);
@@ -283,26 +276,38 @@ static void try_dimension(const check *c, const check_instance *it, tallies *t) 
 		start(c, it, k, 1e-3, 0.1);
 		check_yield(c, it, k, 0.3 * pow(10, e), t);
 	}
-	quern_check_kernel_finish(k);
-	free(k);
+	c->host->kernel_destroy(k);
 }
 
-static void law(const check *c) {
+static void law(const quern_check *c) {
 	tallies t = { { .name = "moduli and density" }, { .name = "assign twice" },
 		{ .name = "assign and read back" }, { .name = "yield" }, { .name = "rotation" },
 		{ .name = "large gradients" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
-		check_instance it;
-		if (!check_has_dim(c, dim)) continue;
-		if (quern_check_instance_create(c, dim, 0, &it) == CHECK_READY) try_dimension(c, &it, &t);
-		quern_check_instance_finish(c, &it);
+		quern_check_instance *it = c->host->instance_create(c, dim, 0);
+		if (it) try_dimension(c, it, &t);
+		c->host->instance_destroy(it);
 	}
-	quern_check_tell(c, &t.moduli, NULL);
-	quern_check_tell(c, &t.again, NULL);
-	quern_check_tell(c, &t.held, NULL);
-	quern_check_tell(c, &t.yields, NULL);
-	quern_check_tell(c, &t.turned, NULL);
-	quern_check_tell(c, &t.violent, "strains of 3e-6 to 0.3 in one step");
+	c->host->tell(c, &t.moduli, NULL);
+	c->host->tell(c, &t.again, NULL);
+	c->host->tell(c, &t.held, NULL);
+	c->host->tell(c, &t.yields, NULL);
+	c->host->tell(c, &t.turned, NULL);
+	c->host->tell(c, &t.violent, "strains of 3e-6 to 0.3 in one step");
 }
 
-const check_kind quern_check_material = { .kind = &quern_material_kind, .make = make, .law = law };
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+static const quern_check_ops ops = {
+	.size = sizeof ops, .kind = &quern_material_kind, .make = make, .law = law
+};
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.instance_size = 1,
+	.id = "check.material",
+	.brief = "Constitutive models: stress and history belong together, yield, rotation.",
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

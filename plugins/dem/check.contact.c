@@ -1,0 +1,538 @@
+/* SPDX-License-Identifier: MIT */
+/* check.contact - laws between two grains: action and reaction, silence when apart, no energy out of nothing */
+#include <math.h>
+#include <quern/check.h>
+#include <quern/contact.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+	OVERLAP,
+	NORMAL,
+	VELOCITY,
+	SPIN,
+	TURN,
+	RADIUS,
+	MASS,
+	FORCE,
+	COUPLE,
+	DASHPOT,
+	STORED,
+	SHEARED,
+	RUBBED,
+	DRAG_COUPLE
+};
+
+static void call(const quern_check_kernel *k, const quern_check_batch *b) {
+	const quern_contact_ops *ops = k->ops;
+	const uint32_t dim = k->dim, turns = quern_check_axial(dim);
+	quern_column use[QUERN_MOST_USES], use_second[QUERN_MOST_USES];
+	quern_contact_batch batch = {
+		.n = b->n, .cap = b->cap, .dt = k->dt, .use = use, .use_second = use_second
+	};
+	batch.overlap = quern_check_at(k, b, OVERLAP, 0);
+	batch.radius = quern_check_at(k, b, RADIUS, 0);
+	batch.mass = quern_check_at(k, b, MASS, 0);
+	QUERN_CHECK_VECTOR(batch.normal, k, b, NORMAL, dim);
+	QUERN_CHECK_VECTOR(batch.velocity, k, b, VELOCITY, dim);
+	QUERN_CHECK_VECTOR(batch.spin, k, b, SPIN, turns);
+	QUERN_CHECK_VECTOR(batch.turn, k, b, TURN, dim == 3 ? 3u : 0u);
+	QUERN_CHECK_VECTOR(batch.force, k, b, FORCE, dim);
+	QUERN_CHECK_VECTOR(batch.couple, k, b, COUPLE, turns);
+	QUERN_CHECK_VECTOR(batch.dashpot, k, b, DASHPOT, dim);
+	batch.stored = quern_check_at(k, b, STORED, 0);
+	batch.sheared = quern_check_at(k, b, SHEARED, 0);
+	batch.rubbed = quern_check_at(k, b, RUBBED, 0);
+	QUERN_CHECK_VECTOR(batch.drag_couple, k, b, DRAG_COUPLE, turns);
+	k->host->columns(k, b, k->use, use);
+	k->host->columns(k, b, k->use_second, use_second);
+	ops->force[dim - 2](k->self, &batch);
+}
+
+static bool uses_field(const quern_check *c, const quern_check_instance *it, const char *field) {
+	for (const quern_use *row = c->uses; row->field; row++)
+		if (!strcmp(row->field, field) && c->host->counts(c, it, row)) return true;
+	return false;
+}
+
+static quern_real step_of(const quern_check_kernel *k) {
+	const quern_contact_ops *ops = k->ops;
+	const quern_real period = ops->period ? ops->period(k->self, k->dim, quern_check_given(k, MASS, 0)[0],
+												quern_check_given(k, RADIUS, 0)[0])
+										  : 0;
+	return period > 0 && isfinite(period) ? period / 50 : 1e-6;
+}
+
+/* Pairs of discs or spheres of 0.5 to 1.5 mm; every fifth is open. */
+static void fill_pairs(const quern_check_kernel *k, uint64_t key) {
+	for (uint32_t i = 0; i < k->n; i++) {
+		double m[2], r[2], n[3];
+		for (uint32_t s = 0; s < 2; s++) {
+			r[s] = k->host->uniform(key, 2 * i + s, 0.5e-3, 1.5e-3);
+			m[s] = 2500 * 3.141592653589793 * r[s] * r[s] * (k->dim == 3 ? 4.0 / 3 * r[s] : 1);
+		}
+		quern_check_given(k, RADIUS, 0)[i] = r[0] * r[1] / (r[0] + r[1]);
+		quern_check_given(k, MASS, 0)[i] = m[0] * m[1] / (m[0] + m[1]);
+		quern_check_given(k, OVERLAP, 0)[i] = (i % 5 ? 1 : -1) * k->host->uniform(key + 1, i, 0, 0.01) * r[0];
+		k->host->direction(k->dim, key + 2, i, n);
+		for (uint32_t c = 0; c < k->dim; c++) quern_check_given(k, NORMAL, c)[i] = n[c];
+	}
+	k->host->fill(k, VELOCITY, k->dim, key + 3, -0.1, 0.1);
+}
+
+static quern_real *row_given(const quern_check_kernel *k, int32_t first, uint32_t component) {
+	return k->host->column(k, first + (int32_t)component)->given;
+}
+
+/* Relative and mean spin, from each body's where the law reads it. */
+static void fill_spins(const quern_check_kernel *k, uint64_t key) {
+	const uint32_t turns = quern_check_axial(k->dim);
+	const quern_use *rows = k->check->uses;
+	for (uint32_t c = 0; c < turns; c++)
+		for (uint32_t i = 0; i < k->n; i++) {
+			double first = k->host->uniform(key, c * 65536 + i, -20, 20),
+				   second = k->host->uniform(key + 1, c * 65536 + i, -20, 20);
+			for (uint32_t r = 0; rows[r].field && r < QUERN_MOST_USES; r++) {
+				if (k->use[r] < 0 || k->use_second[r] < 0 || strcmp(rows[r].field, "grain.spin") != 0)
+					continue;
+				row_given(k, k->use[r], c)[i] = first;
+				row_given(k, k->use_second[r], c)[i] = second;
+			}
+			quern_check_given(k, SPIN, c)[i] = first - second;
+			if (k->dim == 3) quern_check_given(k, TURN, c)[i] = 0.5 * (first + second);
+		}
+}
+
+enum { WITH_SPIN = 1, WITH_ENERGY = 2, VARIANTS = 4 };
+
+/* Fields of grains stand on both sides, histories of the pair once, and the couple comes with the batch, beside the
+ * force. */
+static void add_uses(quern_check_kernel *k, bool optional) {
+	const quern_use *rows = k->check->uses;
+	for (uint32_t r = 0; rows[r].field && r < QUERN_MOST_USES; r++) {
+		const bool hangs = rows[r].with || rows[r].flags & (QUERN_OPTIONAL | QUERN_WANTED);
+		if (!strcmp(rows[r].field, "contact.couple") || (hangs && !optional)) continue;
+		k->host->add_use(k, r, false);
+		if (strncmp(rows[r].field, "contact.", 8) != 0) k->host->add_use(k, r, true);
+	}
+}
+
+static quern_check_kernel *create(
+	const quern_check *c, const quern_check_instance *it, uint32_t variant, const char *name, uint32_t n) {
+	quern_check_kernel *k = c->host->kernel_create(c, it, name, n);
+	k->call = call;
+	const uint32_t dim = it->dim, turns = quern_check_axial(dim);
+	c->host->add(k, OVERLAP, "overlap", QUERN_CHECK_IN, 1);
+	c->host->add(k, NORMAL, "normal", QUERN_CHECK_IN, dim);
+	c->host->add(k, VELOCITY, "velocity", QUERN_CHECK_IN, dim);
+	c->host->add(k, RADIUS, "radius", QUERN_CHECK_IN, 1);
+	c->host->add(k, MASS, "mass", QUERN_CHECK_IN, 1);
+	c->host->add(k, FORCE, "force", QUERN_CHECK_CHANGED, dim);
+	add_uses(k, variant & WITH_SPIN);
+	if (variant & WITH_SPIN || uses_field(c, it, "grain.spin")) {
+		c->host->add(k, SPIN, "spin", QUERN_CHECK_IN, turns);
+		if (dim == 3) c->host->add(k, TURN, "turn", QUERN_CHECK_IN, 3);
+		fill_spins(k, 40);
+	}
+	if (uses_field(c, it, "contact.couple")) c->host->add(k, COUPLE, "couple", QUERN_CHECK_CHANGED, turns);
+	if (!(variant & WITH_ENERGY)) return k;
+	if (k->at[COUPLE] >= 0) c->host->add(k, DRAG_COUPLE, "drag_couple", QUERN_CHECK_CHANGED, turns);
+	c->host->add(k, DASHPOT, "dashpot", QUERN_CHECK_CHANGED, dim);
+	c->host->add(k, STORED, "stored", QUERN_CHECK_CHANGED, 1);
+	c->host->add(k, SHEARED, "sheared", QUERN_CHECK_CHANGED, 1);
+	c->host->add(k, RUBBED, "rubbed", QUERN_CHECK_CHANGED, 1);
+	return k;
+}
+
+/* Forces and energies are added to; between steps they begin at zero again, while histories go on. */
+static void clear_sums(const quern_check_kernel *k) {
+	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED, DRAG_COUPLE };
+	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++) {
+		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT        ? k->dim
+							   : sums[s] == COUPLE || sums[s] == DRAG_COUPLE ? quern_check_axial(k->dim)
+																			 : 1;
+		for (uint32_t c = 0; k->at[sums[s]] >= 0 && c < count; c++)
+			memset(quern_check_given(k, sums[s], c), 0, k->n * sizeof(quern_real));
+	}
+}
+
+static void next_step(quern_check_kernel *k) {
+	k->host->run(k, 512, false);
+	k->host->advance(k);
+	clear_sums(k);
+}
+
+static quern_check_kernel *make(
+	const quern_check *c, const quern_check_instance *it, uint32_t variant, uint32_t n) {
+	if (variant >= VARIANTS) return NULL;
+	quern_check_kernel *k = create(c, it, variant, "force", n);
+	fill_pairs(k, 20);
+	k->dt = step_of(k);
+	for (int step = 0; step < 3; step++) next_step(k);
+	return k;
+}
+
+/* ---- what must hold ---- */
+
+static double size_of(const quern_check_kernel *k, int name, uint32_t count, uint32_t i) {
+	double sum = 0;
+	for (uint32_t c = 0; k->at[name] >= 0 && c < count; c++) sum += pow(quern_check_found(k, name, c)[i], 2);
+	return sqrt(sum);
+}
+
+static void negate(const quern_check_kernel *k, int name, uint32_t count) {
+	for (uint32_t c = 0; k->at[name] >= 0 && c < count; c++)
+		for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, name, c)[i] *= -1;
+}
+
+/* The same pairs named the other way round. */
+static void exchange(quern_check_kernel *k) {
+	negate(k, NORMAL, k->dim);
+	negate(k, VELOCITY, k->dim);
+	negate(k, SPIN, quern_check_axial(k->dim));
+	for (int r = 0; r < QUERN_MOST_USES; r++)
+		if (k->use[r] >= 0 && k->use_second[r] >= 0) {
+			const int32_t first = k->use[r];
+			k->use[r] = k->use_second[r];
+			k->use_second[r] = first;
+		}
+}
+
+static void reaction(quern_check_kernel *k, quern_check_kernel *other, quern_check_tally *t) {
+	exchange(other);
+	for (int step = 0; step < 8; step++) {
+		k->host->run(k, 512, false);
+		k->host->run(other, 512, false);
+		for (uint32_t i = 0; i < k->n; i++) {
+			const double force = size_of(k, FORCE, k->dim, i) + 1e-30,
+						 couple = size_of(k, COUPLE, quern_check_axial(k->dim), i) + 1e-30;
+			for (uint32_t c = 0; c < k->dim; c++)
+				k->host->measure(t,
+					fabs(quern_check_found(k, FORCE, c)[i] + quern_check_found(other, FORCE, c)[i]) / force,
+					1e-10,
+					"%u-D: the force on the second body is not minus that on the first: %.9g and %.9g N",
+					k->dim, quern_check_found(k, FORCE, c)[i], quern_check_found(other, FORCE, c)[i]);
+			for (uint32_t c = 0; k->at[COUPLE] >= 0 && c < quern_check_axial(k->dim); c++)
+				k->host->measure(t,
+					fabs(quern_check_found(k, COUPLE, c)[i] + quern_check_found(other, COUPLE, c)[i]) /
+						couple,
+					1e-10, "%u-D: the couple on the second body is not minus that on the first", k->dim);
+		}
+		k->host->advance(k), clear_sums(k);
+		k->host->advance(other), clear_sums(other);
+	}
+}
+
+/* A law adds: what stood there stays. */
+static void addition(quern_check_kernel *k, quern_check_tally *t) {
+	k->host->run(k, 512, false);
+	quern_real *alone = k->host->memory(k->n, sizeof(quern_real));
+	memcpy(alone, quern_check_found(k, FORCE, 0), k->n * sizeof(quern_real));
+	for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, FORCE, 0)[i] = 3;
+	k->host->run(k, 512, false);
+	for (uint32_t i = 0; i < k->n; i++)
+		k->host->measure(t, fabs(quern_check_found(k, FORCE, 0)[i] - alone[i] - 3) / (fabs(alone[i]) + 3),
+			1e-14, "%u-D: the force is written over what another law has added", k->dim);
+	clear_sums(k);
+	free(alone);
+}
+
+static void apart(quern_check_kernel *k, quern_check_tally *t) {
+	const quern_contact_ops *ops = k->ops;
+	const quern_use *rows = k->check->uses;
+	for (uint32_t i = 0; i < k->n; i++) {
+		const quern_real radius = quern_check_given(k, RADIUS, 0)[i];
+		const quern_real reach = ops->reach ? ops->reach(k->self, radius) : 0;
+		quern_check_given(k, OVERLAP, 0)[i] = -reach - (i % 3 ? 1e-3 * radius : 0);
+	}
+	next_step(k);
+	k->host->run(k, 512, false);
+	for (uint32_t i = 0; i < k->n; i++) {
+		const bool silent =
+			size_of(k, FORCE, k->dim, i) == 0 && size_of(k, COUPLE, quern_check_axial(k->dim), i) == 0;
+		k->host->expect(t, silent,
+			"%u-D: a force of %.3g N, a couple of %.3g N m between bodies that are apart", k->dim,
+			size_of(k, FORCE, k->dim, i), size_of(k, COUPLE, quern_check_axial(k->dim), i));
+		const double energy = size_of(k, STORED, 1, i) + size_of(k, SHEARED, 1, i) + size_of(k, RUBBED, 1, i);
+		k->host->expect(
+			t, energy == 0, "%u-D: an energy of %.3g J between bodies that are apart", k->dim, energy);
+	}
+	for (uint32_t r = 0; rows[r].field && r < QUERN_MOST_USES; r++) {
+		if (k->use[r] < 0 || rows[r].access == QUERN_READ || strncmp(rows[r].field, "contact.", 8) != 0)
+			continue;
+		for (uint32_t c = 0; c < k->host->components(rows[r].shape, k->dim); c++)
+			for (uint32_t i = 0; i < k->n; i++) {
+				const quern_real is =
+					((const quern_real *)k->host->column(k, k->use[r] + (int32_t)c)->found)[i];
+				k->host->expect(t, is == rows[r].initial || (c && is == 0),
+					"%u-D: %s of bodies apart is %.3g, not as new", k->dim, rows[r].field, is);
+			}
+	}
+}
+
+static void losses(quern_check_kernel *k, quern_check_tally *t) {
+	for (int step = 0; step < 8; step++) {
+		k->host->run(k, 512, false);
+		for (uint32_t i = 0; i < k->n; i++) {
+			double power = 0, scale = 1e-300, speed = 0;
+			for (uint32_t c = 0; c < k->dim; c++) {
+				power += quern_check_found(k, DASHPOT, c)[i] * quern_check_given(k, VELOCITY, c)[i];
+				speed += fabs(quern_check_given(k, VELOCITY, c)[i]);
+			}
+			scale += speed * (size_of(k, FORCE, k->dim, i) + size_of(k, DASHPOT, k->dim, i));
+			k->host->measure(
+				t, power / scale, 1e-12, "%u-D: the dashpot drives the bodies, with %.3g W", k->dim, power);
+			/* what a normal spring stores may be negative: grains that attract each other */
+			k->host->expect(t, quern_check_found(k, SHEARED, 0)[i] >= 0,
+				"%u-D: a tangential spring stores %.3g J", k->dim, quern_check_found(k, SHEARED, 0)[i]);
+		}
+		k->host->advance(k), clear_sums(k);
+	}
+}
+
+/* ---- whole impacts ---- */
+
+typedef struct {
+	double x[3], v[3], w[2][3], r[2], m[2];
+	double energy, lost, most; /* J: at the start; to dashpots and sliding so far; in the books at most */
+} impact;
+
+static double motion_energy(const quern_check_kernel *k, const impact *p) {
+	const double m = p->m[0] * p->m[1] / (p->m[0] + p->m[1]), share = k->dim == 2 ? 0.5 : 0.4;
+	double sum = 0;
+	for (uint32_t c = 0; c < k->dim; c++) sum += 0.5 * m * p->v[c] * p->v[c];
+	for (uint32_t s = 0; s < 2; s++)
+		for (uint32_t c = 0; c < 3; c++)
+			sum += 0.5 * share * p->m[s] * p->r[s] * p->r[s] * p->w[s][c] * p->w[s][c];
+	return sum;
+}
+
+static void cross(const double a[3], const double b[3], double out[3]) {
+	for (int c = 0; c < 3; c++) out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+}
+
+static void begin_impact(const quern_check_kernel *k, uint32_t i, impact *p) {
+	double n[3];
+	*p = (impact) { .energy = 0 };
+	k->host->direction(k->dim, 70, i, n);
+	for (uint32_t s = 0; s < 2; s++) {
+		p->r[s] = k->host->uniform(71 + s, i, 0.5e-3, 1.5e-3);
+		p->m[s] = 2500 * 3.141592653589793 * p->r[s] * p->r[s] * (k->dim == 3 ? 4.0 / 3 * p->r[s] : 1);
+		for (uint32_t c = k->dim == 3 ? 0 : 2; c < 3 && k->at[SPIN] >= 0; c++)
+			p->w[s][c] = k->host->uniform(73 + s, c * 65536 + i, -50, 50);
+	}
+	for (uint32_t c = 0; c < k->dim; c++) {
+		p->x[c] = n[c] * (p->r[0] + p->r[1]) * (1 + 1e-9);
+		p->v[c] = -0.1 * n[c] + k->host->uniform(75, c * 65536 + i, -0.05, 0.05);
+	}
+	p->energy = motion_energy(k, p);
+}
+
+/* First minus second; b = -arm n for the first, +arm n for the second. Returns the overlap. */
+static void give_impact(
+	const quern_check_kernel *k, uint32_t i, const impact *p, double n[3], double arm[2]) {
+	double length = 0, spin[3], drift[3];
+	for (uint32_t c = 0; c < 3; c++) length += p->x[c] * p->x[c];
+	length = sqrt(length);
+	const double overlap = p->r[0] + p->r[1] - length;
+	for (uint32_t c = 0; c < 3; c++) n[c] = p->x[c] / length;
+	for (uint32_t s = 0; s < 2; s++) arm[s] = p->r[s] - 0.5 * overlap;
+	for (uint32_t c = 0; c < 3; c++) spin[c] = -arm[0] * p->w[0][c] - arm[1] * p->w[1][c];
+	cross(spin, n, drift);
+	quern_check_given(k, OVERLAP, 0)[i] = overlap;
+	quern_check_given(k, RADIUS, 0)[i] = p->r[0] * p->r[1] / (p->r[0] + p->r[1]);
+	quern_check_given(k, MASS, 0)[i] = p->m[0] * p->m[1] / (p->m[0] + p->m[1]);
+	for (uint32_t c = 0; c < k->dim; c++) {
+		quern_check_given(k, NORMAL, c)[i] = n[c];
+		quern_check_given(k, VELOCITY, c)[i] = p->v[c] + drift[c];
+	}
+	const uint32_t from = k->dim == 3 ? 0 : 2;
+	for (uint32_t c = from; c < 3 && k->at[SPIN] >= 0; c++) {
+		quern_check_given(k, SPIN, c - from)[i] = p->w[0][c] - p->w[1][c];
+		if (k->dim == 3) quern_check_given(k, TURN, c)[i] = 0.5 * (p->w[0][c] + p->w[1][c]);
+	}
+}
+
+static void take_impact(
+	const quern_check_kernel *k, uint32_t i, impact *p, const double n[3], const double arm[2]) {
+	const double m = p->m[0] * p->m[1] / (p->m[0] + p->m[1]), share = k->dim == 2 ? 0.5 : 0.4;
+	const uint32_t from = k->dim == 3 ? 0 : 2;
+	double f[3] = { 0 }, torque[3];
+	for (uint32_t c = 0; c < k->dim; c++) f[c] = quern_check_found(k, FORCE, c)[i];
+	cross(f, n, torque); /* b x f = -arm n x f */
+	for (uint32_t s = 0; s < 2; s++)
+		for (uint32_t c = from; c < 3 && k->at[SPIN] >= 0; c++) {
+			const double couple =
+				k->at[COUPLE] < 0 ? 0 : (s ? -1 : 1) * quern_check_found(k, COUPLE, c - from)[i];
+			p->w[s][c] += k->dt * (arm[s] * torque[c] + couple) / (share * p->m[s] * p->r[s] * p->r[s]);
+		}
+	for (uint32_t c = 0; c < k->dim; c++) {
+		p->v[c] += k->dt * f[c] / m;
+		p->x[c] += k->dt * p->v[c];
+	}
+}
+
+/* Motion, springs, and what dashpots and sliding say that they have taken: together never more than at the start. */
+static void keep_books(const quern_check_kernel *k, uint32_t i, impact *p) {
+	const double held = motion_energy(k, p) + quern_check_found(k, STORED, 0)[i] +
+						quern_check_found(k, SHEARED, 0)[i] + p->lost;
+	for (uint32_t c = 0; c < k->dim; c++)
+		p->lost -= k->dt * quern_check_found(k, DASHPOT, c)[i] * quern_check_given(k, VELOCITY, c)[i];
+	p->lost += quern_check_found(k, RUBBED, 0)[i];
+	if (!(held <= p->most)) p->most = held;
+}
+
+/* Impacts at all angles, from touching to apart: motion must not gain energy. */
+static void impacts(
+	const quern_check *c, const quern_check_instance *it, quern_check_tally *t, quern_check_tally *books) {
+	enum { PAIRS = 128, STEPS = 3000 };
+	quern_check_kernel *k = create(c, it, WITH_ENERGY, "force in an impact", PAIRS);
+	impact *p = c->host->memory(PAIRS, sizeof *p);
+	double(*n)[3] = c->host->memory(PAIRS, sizeof *n), (*arm)[2] = c->host->memory(PAIRS, sizeof *arm);
+	for (uint32_t i = 0; i < PAIRS; i++) begin_impact(k, i, &p[i]), give_impact(k, i, &p[i], n[i], arm[i]);
+	k->dt = step_of(k) / 10;
+	for (uint32_t step = 0; step < STEPS; step++) {
+		for (uint32_t i = 0; i < PAIRS; i++) give_impact(k, i, &p[i], n[i], arm[i]);
+		next_step(k);
+		for (uint32_t i = 0; i < PAIRS; i++) {
+			keep_books(k, i, &p[i]);
+			take_impact(k, i, &p[i], n[i], arm[i]);
+		}
+	}
+	for (uint32_t i = 0; i < PAIRS; i++) {
+		c->host->measure(t, motion_energy(k, &p[i]) / p[i].energy - 1, 5e-3,
+			"%u-D: an impact ends with %.4f of its energy", it->dim, motion_energy(k, &p[i]) / p[i].energy);
+		c->host->measure(books, p[i].most / p[i].energy - 1, 0.02,
+			"%u-D: during an impact the books hold %.4f of its energy", k->dim, p[i].most / p[i].energy);
+	}
+	c->host->kernel_destroy(k);
+	free(p), free(n), free(arm);
+}
+
+/* A law of couples or of adhesion alone has no spring, and then it may be without a period. */
+static void constants(const quern_check_kernel *k, quern_check_tally *t) {
+	const quern_contact_ops *ops = k->ops;
+	const void *self = k->self;
+	const quern_real mass = quern_check_given(k, MASS, 0)[0], radius = quern_check_given(k, RADIUS, 0)[0];
+	const quern_real stiffness = ops->stiffness ? ops->stiffness(self, k->dim, radius, 1) : 0;
+	const quern_real period = ops->period ? ops->period(self, k->dim, mass, radius) : INFINITY;
+	const quern_real reach = ops->reach ? ops->reach(self, radius) : 0;
+	k->host->expect(
+		t, stiffness >= 0 && isfinite(stiffness), "%u-D: stiffness is %.3g N/m", k->dim, stiffness);
+	k->host->expect(t, period > 0, "%u-D: period is %.3g s", k->dim, period);
+	k->host->expect(t, !(stiffness > 0) || isfinite(period),
+		"%u-D: there is a spring of %.3g N/m and no period, so nothing limits the step", k->dim, stiffness);
+	k->host->expect(t, reach >= 0 && isfinite(reach), "%u-D: reach is %.3g m", k->dim, reach);
+}
+
+/* ---- the same with all masses, stiffnesses and other parameters that contain a mass in another proportion ---- */
+
+enum { FACTOR = 64 }; /* its square and cube roots are whole, so that only a law's own roundings differ */
+
+static void scale_masses(const quern_check_kernel *k) {
+	const quern_use *rows = k->check->uses;
+	for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, MASS, 0)[i] *= FACTOR;
+	for (uint32_t r = 0; rows[r].field && r < QUERN_MOST_USES; r++) {
+		const double factor = pow(FACTOR, k->host->mass_power(k->check, rows[r].unit));
+		const int32_t *uses[] = { k->use, k->use_second };
+		for (int side = 0; side < 2; side++)
+			for (uint32_t c = 0; uses[side][r] >= 0 && c < k->host->components(rows[r].shape, k->dim); c++) {
+				const quern_check_column *column = k->host->column(k, uses[side][r] + (int32_t)c);
+				for (uint32_t i = 0; i < k->n && !column->integer; i++)
+					((quern_real *)column->given)[i] *= factor;
+			}
+	}
+}
+
+static void compare_scaled(const quern_check_kernel *k, const quern_check_kernel *big, quern_check_tally *t) {
+	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED };
+	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++) {
+		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT ? k->dim
+							   : sums[s] == COUPLE                    ? quern_check_axial(k->dim)
+																	  : 1;
+		for (uint32_t i = 0; k->at[sums[s]] >= 0 && i < k->n; i++) {
+			const double size = size_of(k, sums[s], count, i) + 1e-30;
+			for (uint32_t c = 0; c < count; c++) {
+				const double is = quern_check_found(big, sums[s], c)[i] / FACTOR,
+							 was = quern_check_found(k, sums[s], c)[i];
+				k->host->measure(t, fabs(is - was) / size, 1e-9,
+					"%u-D: with %d times all masses and stiffnesses %s is %.9g times as large", k->dim,
+					FACTOR, k->host->column(k, k->at[sums[s]])->name, FACTOR * is / was);
+			}
+		}
+	}
+}
+
+static void homogeneous(const quern_check *c, const quern_check_instance *it, quern_check_tally *t) {
+	quern_check_instance *scaled = c->host->instance_scaled(c, it, FACTOR);
+	if (!scaled) return;
+	quern_check_kernel *k = create(c, it, WITH_SPIN | WITH_ENERGY, "force", 500),
+					   *big = create(c, scaled, WITH_SPIN | WITH_ENERGY, "force", 500);
+	fill_pairs(k, 30), fill_pairs(big, 30);
+	k->dt = big->dt = step_of(k);
+	scale_masses(big);
+	for (int step = 0; step < 3; step++) {
+		next_step(k), next_step(big);
+		compare_scaled(k, big, t);
+	}
+	c->host->kernel_destroy(k), c->host->kernel_destroy(big);
+	c->host->instance_destroy(scaled);
+}
+
+typedef struct {
+	quern_check_tally reacts, adds, silent, lost, whole, limits, books, scaled;
+} tallies;
+
+static void try_instance(const quern_check *c, const quern_check_instance *it, tallies *t) {
+	quern_check_kernel *k[2]; /* from the first touch on, since a history need not turn round with the pair */
+	for (int i = 0; i < 2; i++) {
+		k[i] = create(c, it, WITH_ENERGY, "force", 500);
+		fill_pairs(k[i], 30);
+		k[i]->dt = step_of(k[i]);
+	}
+	constants(k[0], &t->limits);
+	reaction(k[0], k[1], &t->reacts);
+	addition(k[0], &t->adds);
+	losses(k[0], &t->lost);
+	apart(k[0], &t->silent);
+	c->host->kernel_destroy(k[0]), c->host->kernel_destroy(k[1]);
+	impacts(c, it, &t->whole, &t->books);
+	homogeneous(c, it, &t->scaled);
+}
+
+static void law(const quern_check *c) {
+	tallies t = { { .name = "action and reaction" }, { .name = "laws add up" },
+		{ .name = "silence when apart" }, { .name = "dashpots only take" },
+		{ .name = "impacts gain no energy" }, { .name = "period, stiffness, reach" },
+		{ .name = "books of energy" }, { .name = "homogeneous in (stiffness, mass)" } };
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		quern_check_instance *it = c->host->instance_create(c, dim, 0);
+		if (it) try_instance(c, it, &t);
+		c->host->instance_destroy(it);
+	}
+	c->host->tell(c, &t.limits, NULL);
+	c->host->tell(c, &t.reacts, NULL);
+	c->host->tell(c, &t.adds, NULL);
+	c->host->tell(c, &t.silent, NULL);
+	c->host->tell(c, &t.lost, NULL);
+	c->host->tell(c, &t.whole, NULL);
+	c->host->tell(c, &t.books, NULL);
+	c->host->tell(c, &t.scaled,
+		t.scaled.tried ? NULL : "not tried: init refuses the parameters of %d times the mass", FACTOR);
+}
+
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+static const quern_check_ops ops = {
+	.size = sizeof ops, .kind = &quern_contact_kind, .make = make, .law = law
+};
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.instance_size = 1,
+	.id = "check.contact",
+	.brief = "Laws between two grains: action and reaction, silence when apart, no energy out of nothing.",
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");

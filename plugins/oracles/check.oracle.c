@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT */
+/* check.oracle - marks and wishes of cells: local, finite, and one of the three zones */
+#include <math.h>
+#include <quern/check.h>
+#include <quern/oracle.h>
+#include <stdlib.h>
+
+enum { CENTRE, DISTANCE, ZONE, LEVEL, WISH };
+enum { MARKS, DECIDES, VARIANTS };
+
+static void call(const quern_check_kernel *k, const quern_check_batch *b) {
+	const quern_oracle_ops *ops = k->ops;
+	quern_column use[QUERN_MOST_USES];
+	quern_cell_batch batch = { .n = b->n, .cap = b->cap, .dim = k->dim, .cell = 4e-3, .use = use };
+	QUERN_CHECK_VECTOR(batch.centre, k, b, CENTRE, k->dim);
+	batch.distance = quern_check_at(k, b, DISTANCE, 0);
+	batch.zone = quern_check_integers_at(k, b, ZONE);
+	batch.level = quern_check_at(k, b, LEVEL, 0);
+	batch.wish = quern_check_integers_at(k, b, WISH);
+	k->host->columns(k, b, k->use, use);
+	(k->pass == MARKS ? ops->mark : ops->decide)(k->self, &batch);
+}
+
+static quern_check_kernel *make(
+	const quern_check *c, const quern_check_instance *it, uint32_t variant, uint32_t n) {
+	if (variant >= VARIANTS) return NULL;
+	quern_check_kernel *k = c->host->kernel_create(c, it, variant == MARKS ? "mark" : "decide", n);
+	k->call = call;
+	k->pass = variant;
+	c->host->add(k, CENTRE, "centre", QUERN_CHECK_IN, k->dim);
+	c->host->fill(k, CENTRE, k->dim, 110, 0, 1);
+	c->host->add_integers(k, ZONE, "zone", QUERN_CHECK_IN);
+	int32_t *zone = c->host->column(k, k->at[ZONE])->given;
+	for (uint32_t i = 0; i < n; i++) zone[i] = (int32_t)c->host->uniform(111, i, 0, 2.999);
+	/* rows are the cells' fields in both calls, whatever their hook */
+	c->host->add_uses(k, 0, true);
+	c->host->add_uses(k, 1, true);
+	if (variant == MARKS) {
+		c->host->add(k, LEVEL, "level", QUERN_CHECK_OUT, 1);
+		return k;
+	}
+	c->host->add(k, DISTANCE, "distance", QUERN_CHECK_IN, 1);
+	c->host->fill(k, DISTANCE, 1, 112, -20e-3, 60e-3);
+	c->host->add_integers(k, WISH, "wish", QUERN_CHECK_OUT);
+	return k;
+}
+
+static void look(const quern_check_kernel *k, quern_check_tally *level, quern_check_tally *wish) {
+	const int32_t *w = k->pass == DECIDES ? k->host->column(k, k->at[WISH])->found : NULL;
+	for (uint32_t i = 0; i < k->n && k->pass == MARKS; i++)
+		k->host->expect(
+			level, isfinite(quern_check_found(k, LEVEL, 0)[i]), "%u-D: a level is not finite", k->dim);
+	for (uint32_t i = 0; i < k->n && w; i++)
+		k->host->expect(wish, w[i] >= QUERN_DISCRETE && w[i] <= QUERN_CONTINUUM,
+			"%u-D: a wish is %d, no zone", k->dim, w[i]);
+}
+
+static void law(const quern_check *c) {
+	quern_check_tally level = { .name = "levels are numbers" }, wish = { .name = "wishes are zones" };
+	quern_check_kernel *k;
+	for (uint32_t dim = 2; dim <= 3; dim++)
+		for (uint64_t setting = 0; setting < c->host->settings(c) + 20; setting++) {
+			quern_check_instance *it = c->host->instance_create(c, dim, setting);
+			for (uint32_t variant = 0; it && (k = make(c, it, variant, 500)); variant++) {
+				c->host->run(k, 64, false);
+				look(k, &level, &wish);
+				c->host->kernel_destroy(k);
+			}
+			c->host->instance_destroy(it);
+		}
+	c->host->tell(c, &level, NULL);
+	c->host->tell(c, &wish, NULL);
+}
+
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+static const quern_check_ops ops = {
+	.size = sizeof ops, .kind = &quern_oracle_kind, .make = make, .law = law
+};
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.instance_size = 1,
+	.id = "check.oracle",
+	.brief = "Marks and wishes of cells: finite, and one of the zones.",
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");
