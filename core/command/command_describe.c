@@ -157,6 +157,12 @@ static void print_uses(const quern_use *row) {
 	}
 }
 
+static void print_sums(const quern_output *o) {
+	if (o && o->name) puts("\nsums in summary.json");
+	for (; o && o->name; o++)
+		printf("  %-16s %-8s %s\n", o->name, o->unit ? o->unit : "1", o->doc ? o->doc : "");
+}
+
 static void print_sections(const char *what, const char *const *names) {
 	if (!names) return;
 	printf("%-10s", what);
@@ -182,6 +188,7 @@ static void print_solver(const quern_solver_ops *ops) {
 	puts("\nstages");
 	for (const quern_stage *s = ops->stages; s && s->name; s++)
 		printf("  %-20s %s\n", s->name, s->doc ? s->doc : "");
+	print_sums(ops->sums);
 }
 
 static void print_outputs(const quern_observer_ops *ops) {

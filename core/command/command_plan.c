@@ -166,7 +166,7 @@ static void print(json_t *root) {
 		printf("  %-32s %s\n", text_of(one, "id"), text_of(one, "file"));
 	print_stages(root);
 	print_sets(root);
-	printf("\nleft out:");
+	printf("\nleft out:%s", json_array_size(json_object_get(root, "skipped")) ? "" : " nothing");
 	json_array_foreach(json_object_get(root, "skipped"), i, one) printf(" %s", json_string_value(one));
 	puts("");
 	json_object_foreach(json_object_get(root, "entries"), name, one)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "order.h"
 #include "text.h"
+#include <quern/columns.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -199,7 +200,7 @@ static quern_field *add_field(quern_plan *p, const quern_plan_use *u) {
 		.set = set_of(p, u->field),
 		.target = -1,
 		.shape = u->row->shape,
-		.n_components = quern_components(u->row->shape, (uint32_t)p->scene->general.dimension),
+		.n_components = (uint8_t)quern_shape_size(u->row->shape, (uint32_t)p->scene->general.dimension),
 		.initial = u->row->initial };
 	snprintf(field->name, sizeof field->name, "%s", u->field);
 	return field;
