@@ -29,14 +29,14 @@ static inline void *quern_component(const quern_column *c, uint8_t shape, uint32
 	return c->real[k];
 }
 static inline void quern_set_component(quern_column *c, uint8_t shape, uint32_t k, void *column) {
-	if (shape == QUERN_INDEX) c->index = column;
-	else if (shape == QUERN_ID) c->id = column;
-	else c->real[k] = column;
+	if (shape == QUERN_INDEX) c->index = (int32_t *)column;
+	else if (shape == QUERN_ID) c->id = (int64_t *)column;
+	else c->real[k] = (quern_real *)column;
 }
 
 /* to[q] = from[begin + at[q]] */
 static inline void quern_gather(
-	uint8_t shape, void *to, const void *from, uint32_t begin, const int32_t *restrict at, uint32_t n) {
+	uint8_t shape, void *to, const void *from, uint32_t begin, const int32_t *__restrict at, uint32_t n) {
 	if (shape == QUERN_INDEX) {
 		const int32_t *whole = (const int32_t *)from + begin;
 		for (uint32_t q = 0; q < n; q++) ((int32_t *)to)[q] = whole[at[q]];
@@ -44,20 +44,20 @@ static inline void quern_gather(
 		const int64_t *whole = (const int64_t *)from + begin;
 		for (uint32_t q = 0; q < n; q++) ((int64_t *)to)[q] = whole[at[q]];
 	} else {
-		const quern_real *restrict whole = (const quern_real *)from + begin;
-		quern_real *restrict mine = to;
+		const quern_real *__restrict whole = (const quern_real *)from + begin;
+		quern_real *__restrict mine = (quern_real *)to;
 		for (uint32_t q = 0; q < n; q++) mine[q] = whole[at[q]];
 	}
 }
 /* to[begin + at[q]] = from[q]; an ID is the host's to give. */
 static inline void quern_scatter(
-	uint8_t shape, void *to, const void *from, uint32_t begin, const int32_t *restrict at, uint32_t n) {
+	uint8_t shape, void *to, const void *from, uint32_t begin, const int32_t *__restrict at, uint32_t n) {
 	if (shape == QUERN_INDEX) {
 		int32_t *whole = (int32_t *)to + begin;
 		for (uint32_t q = 0; q < n; q++) whole[at[q]] = ((const int32_t *)from)[q];
 	} else if (shape != QUERN_ID) {
-		quern_real *restrict whole = (quern_real *)to + begin;
-		const quern_real *restrict mine = from;
+		quern_real *__restrict whole = (quern_real *)to + begin;
+		const quern_real *__restrict mine = (const quern_real *)from;
 		for (uint32_t q = 0; q < n; q++) whole[at[q]] = mine[q];
 	}
 }
