@@ -282,6 +282,32 @@ static const char *read_text(
 	return kept;
 }
 
+/* A list whose items have but one key, a vector, takes the vector alone for an item: [[0, 0], [1, 0]]. */
+static const quern_param *bare_vector(const quern_param *rows) {
+	return rows && rows->name && !rows[1].name && rows->type == QUERN_T_VECTOR ? rows : NULL;
+}
+
+static void read_item(const quern_reading *r, const char *owner, const quern_param *rows,
+	const quern_node *item, const char *const *also, void *instance) {
+	const quern_param *bare = bare_vector(rows);
+	if (bare && item->kind == QUERN_NODE_LIST) {
+		quern_entry one = {
+			.key = (char *)(uintptr_t)bare->name, .value = (quern_node *)(uintptr_t)item, .mark = item->mark
+		};
+		const quern_node map = { .kind = QUERN_NODE_MAP, .mark = item->mark, .entries = &one, .n = 1 };
+		quern_params_read(r, owner, rows, &map, item->mark, also, instance);
+	} else quern_params_read(r, owner, rows, item, item->mark, also, instance);
+}
+
+static void check_length(
+	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node, uint32_t n) {
+	char range[96];
+	if (!node || in_range(row, n)) return;
+	quern_param_range(row, range);
+	quern_report_add(r->report, node->mark, "%s: %s has %u item%s, must have %s", owner, row->name, n,
+		n == 1 ? "" : "s", range);
+}
+
 static void read_list(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, const char *const *also, quern_list *list) {
 	const bool many = node && node->kind == QUERN_NODE_LIST;
@@ -293,10 +319,10 @@ static void read_list(const quern_reading *r, const char *owner, const quern_par
 	list->n = !node ? 0 : many ? (uint32_t)node->n : 1;
 	list->item_size = row->item_size;
 	list->items = quern_take(list->n, row->item_size);
+	check_length(r, owner, row, node, list->n);
 	for (uint32_t i = 0; i < list->n; i++) {
 		const quern_node *item = many ? node->entries[i].value : node;
-		quern_params_read(
-			r, name, row->rows, item, item->mark, inner, (char *)list->items + (size_t)i * row->item_size);
+		read_item(r, name, row->rows, item, inner, (char *)list->items + (size_t)i * row->item_size);
 	}
 	free(name);
 }

@@ -72,7 +72,7 @@ typedef enum {
 	QUERN_T_BOOL,     /* bool */
 	QUERN_T_TEXT,     /* const char *, owned by the host for the length of the run */
 	QUERN_T_VECTOR,   /* quern_real[3]; the scene gives one number per dimension, the rest are zero */
-	QUERN_T_LIST      /* quern_list of structs described by `rows` */
+	QUERN_T_LIST /* quern_list of structs described by `rows`; where that is one vector, the scene may give it bare */
 } quern_type;
 
 enum {
@@ -95,7 +95,7 @@ typedef struct quern_param {
 	                     `def` if that is not 0, else the scene must give the value, or may leave out a MAYBE */
 	const struct quern_param *rows; /* T_LIST: the rows of one item */
 	quern_real def, planar;
-	quern_real min, max;        /* inclusive unless *_OPEN; min == max: unbounded */
+	quern_real min, max;        /* inclusive unless *_OPEN; min == max: unbounded. T_LIST: how many items */
 	uint32_t offset, item_size; /* into the instance; T_LIST: bytes of one item */
 	uint8_t type, flags;
 	uint16_t pad;
