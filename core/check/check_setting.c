@@ -116,7 +116,7 @@ static void put_rows(const check *, uint32_t dim, const quern_param *rows, uint6
 
 /* Corners of something: on a circle, none like another. */
 static void put_corner(const check *c, uint32_t dim, const quern_param *row, double turn, quern_node *item) {
-	const double size = quern_check_ordinary(c, row->unit);
+	const double size = quern_check_ordinary(&c->open, row->unit);
 	quern_node *vector = quern_node_put_list(item, row->name);
 	for (uint32_t k = 0; k < dim; k++) {
 		char text[32];

@@ -113,7 +113,9 @@ static json_t *words_schema(const quern_param *row) {
 
 static json_t *value_schema(const quern_param *row) {
 	switch (row->type) {
-	case QUERN_T_INT: return row->choices ? words_schema(row) : number_schema(row);
+	case QUERN_T_INT:
+		if (row->text) return json_pack("{s:[o, {s:s}]}", "anyOf", number_schema(row), "type", "string");
+		return row->choices ? words_schema(row) : number_schema(row);
 	case QUERN_T_BOOL: return defined("switch");
 	case QUERN_T_TEXT: return text_schema(row);
 	case QUERN_T_VECTOR:

@@ -208,9 +208,57 @@ static bool read_number(const quern_reading *r, const char *owner, const quern_p
 	return false;
 }
 
+/* The names that somebody has published as "SET.NAME", NULL-terminated. */
+static const char **names_of(const quern_reading *r, const char *set, size_t *n) {
+	const char **names = NULL;
+	size_t capacity = 0;
+	*n = 0;
+	for (size_t i = 0; i < r->n_published; i++)
+		if (is_prefix(set, r->published[i].name)) {
+			names = quern_grow(names, *n + 1, &capacity, sizeof *names);
+			names[(*n)++] = r->published[i].name + strlen(set) + 1;
+		}
+	names = quern_grow(names, *n, &capacity, sizeof *names);
+	names[*n] = NULL;
+	return names;
+}
+
+static void refuse_name(
+	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node) {
+	size_t n;
+	const char **names = names_of(r, row->text, &n);
+	const char *near = quern_nearest(node->text, names);
+	quern_text cure = { 0 };
+	if (near) quern_text_add(&cure, "did you mean '%s'?", near);
+	else if (!n) quern_text_add(&cure, "give one this name, or its number here");
+	for (size_t i = 0; i < n && !near; i++)
+		quern_text_add(&cure, "%s%s", i ? ", " : "these have a name: ", names[i]);
+	/* whoever has that name may have stopped at a fault of its own */
+	quern_report_follow(r->report, node->mark, "%s: %s: no %s is called '%s'; %s", owner, row->name,
+		row->text, node->text, quern_text_string(&cure));
+	quern_text_finish(&cure);
+	free(names);
+}
+
+/* A word in the place of a number: what somebody has published under it. False if there is no word. */
+static bool read_name(const quern_reading *r, const char *owner, const quern_param *row,
+	const quern_node *node, int32_t *member) {
+	if (!row->text || node->kind != QUERN_NODE_SCALAR || !quern_is_name(node->text)) return false;
+	for (size_t i = 0; i < r->n_published; i++) {
+		const quern_published *p = &r->published[i];
+		if (!is_prefix(row->text, p->name) || strcmp(p->name + strlen(row->text) + 1, node->text) != 0)
+			continue;
+		*member = (int32_t)p->value;
+		return true;
+	}
+	refuse_name(r, owner, row, node);
+	return true;
+}
+
 static void read_int(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, int32_t *member) {
 	double value;
+	if (read_name(r, owner, row, node, member)) return;
 	if (row->choices) {
 		int32_t k = 0;
 		char say[64];

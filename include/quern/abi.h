@@ -90,7 +90,9 @@ typedef struct quern_param {
 	const char *name;           /* scene key; a dot opens a map: "radius.mean" */
 	const char *unit, *doc;     /* SI: "Pa", "kg/m^3", "1" */
 	const char *const *choices; /* NULL-terminated, or NULL */
-	const char *text;           /* default of a T_TEXT */
+	const char
+		*text; /* default of a T_TEXT; of a T_INT, a word: "body" lets the scene say a name instead of the
+	                     number, where somebody has published that number as "body.NAME" */
 	const char *from; /* default taken from this published quantity, see publish(); where nobody publishes it,
 	                     `def` if that is not 0, else the scene must give the value, or may leave out a MAYBE */
 	const struct quern_param *rows; /* T_LIST: the rows of one item */
