@@ -338,7 +338,7 @@ static const quern_param *bare_vector(const quern_param *rows) {
 static void read_item(const quern_reading *r, const char *owner, const quern_param *rows,
 	const quern_node *item, const char *const *also, void *instance) {
 	const quern_param *bare = bare_vector(rows);
-	if (bare && item->kind == QUERN_NODE_LIST) {
+	if (bare && item->kind != QUERN_NODE_MAP) {
 		quern_entry one = {
 			.key = (char *)(uintptr_t)bare->name, .value = (quern_node *)(uintptr_t)item, .mark = item->mark
 		};

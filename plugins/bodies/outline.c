@@ -42,9 +42,9 @@ static outline_fault look_at(uint32_t n, const quern_real (*corner)[2], uint32_t
 		what[0] = i, what[1] = next;
 		if (!(dx * dx + dy * dy > 1e-280)) return OUTLINE_DOUBLE;
 	}
-	quern_real whole = 0;
-	for (uint32_t i = 1; i + 1 < n; i++) whole += area(corner[0], corner[i], corner[i + 1]);
-	if (whole == 0) return OUTLINE_FLAT;
+	bool flat = true;
+	for (uint32_t i = 2; i < n; i++) flat = flat && area(corner[0], corner[1], corner[i]) == 0;
+	if (flat) return OUTLINE_FLAT;
 	for (uint32_t i = 0; i < n; i++)
 		for (uint32_t j = i + 1; j < n; j++) {
 			place *a = &corner[i], *b = &corner[(i + 1) % n], *c = &corner[j], *d = &corner[(j + 1) % n];
