@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* body.box - a solid rectangle or cuboid, along the axes of its pose or turned about its middle. docs/theory/bodies.md */
+/* body.box - a solid rectangle or cuboid, along the axes of its pose or turned. docs/theory/bodies.md */
 #include <math.h>
 #include <quern/body.h>
 #include <quern/math.h>

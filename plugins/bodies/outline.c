@@ -86,7 +86,8 @@ static void set_between(const outline_edge *before, outline_edge *e) {
 static const quern_real slight = 0.017453292519943295; /* rad, a degree */
 static const quern_real half_turn = 3.14159265358979;  /* and a little less */
 
-/* Corners where a chain ends, by the number of the edge that begins there; the first is one. The outline of one chain is convex, but for a degree, and turns by less than half a turn: no place has two nearest points on it. */
+/* Corners where a chain ends, by the number of the edge that begins there; the first is one. The outline of one chain is
+ * convex, but for a degree, and turns by less than half a turn: no place has two nearest points on it. */
 static void cut(const outline *o, uint32_t first, bool *ends) {
 	quern_real turned = 0, most = 0;
 	for (uint32_t k = 0; k < o->n; k++) {

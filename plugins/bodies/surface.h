@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* surface - how bodies that are bounded by more than one face speak of the place nearest to a point: docs/theory/bodies.md */
+/* surface - the nearest place of a body's surface, between the scene and the body's own frame. docs/theory/bodies.md */
 #pragma once
 #include <quern/body.h>
 #include <quern/vec.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Bodies against closed forms and against a dense sampling of their surfaces; grains that rebound from them, roll over their
- * corners, rest in their inner corners and swing in a drum. */
+/* Bodies against closed forms and against a dense sampling of their surfaces; grains that rebound from them, roll over
+ * their corners, rest in their inner corners and swing in a drum. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -503,7 +503,8 @@ static passing pass(double angle, double friction) {
 	return p;
 }
 
-/* Of turning about the corner: R phi' = sqrt(v^2 + 2 b g R (1 - cos phi)), b = 1 sliding, 2/3 rolling; by Simpson's rule. */
+/* Of turning about the corner: R phi' = sqrt(v^2 + 2 b g R (1 - cos phi)), b = 1 sliding, 2/3 rolling; by Simpson's
+ * rule. */
 static double time_about(double angle, double share) {
 	enum { N = 1000 };
 	double sum = 0;
@@ -589,8 +590,8 @@ static void inner_corners(void **state) {
 	assert_true(good);
 }
 
-/* Discs that roll with friction into an inner corner, up its wall and out again, on one polygon and on two planes: what the
- * touches remember is theirs, so that both move alike. */
+/* Discs that roll with friction into an inner corner, up its wall and out again, on one polygon and on two planes: what
+ * the touches remember is theirs, so that both move alike. */
 static quern_run *roll(const char *bodies) {
 	return harness_open(1,
 		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [-0.01, -0.01], upper: [0.05, 0.05]}, "
