@@ -96,7 +96,7 @@ static quern_real sphere_volume(const quern_real low[3], const quern_real high[3
 	quern_real cut[18] = { from };
 	int n = 1;
 	for (int k = 0; k < 8 && to > from; k++) {
-		const quern_real x = k % 2 ? low[0] : high[0], y = k / 2 % 2 ? low[1] : high[1];
+		const quern_real x = k % 2 ? low[0] : high[0], y = (k < 6 ? k / 2 : k) % 2 ? low[1] : high[1];
 		const quern_real d2 = k < 4 ? x * x + y * y : k < 6 ? x * x : y * y;
 		const quern_real z = __builtin_sqrt(quern_max(1 - d2, 0));
 		if (z < to && z > from) cut[n++] = z;

@@ -120,7 +120,9 @@ static void add_tops(const observer *o, const quern_observer_batch *b, bool poin
 			!point ? size[i] : 0.5 * (b->dim == 2 ? __builtin_sqrt(size[i]) : quern_cbrt(size[i]));
 		const quern_real top =
 			(t->down ? b->upper[t->up] - x[t->up][i] : x[t->up][i] - b->lower[t->up]) + half;
-		if (t->at[place].taken && !(top > t->at[place].top)) continue;
+		const column *old =
+			&t->at[place]; /* of equals the one with the lower coordinate, whatever the order */
+		if (old->taken && (top < old->top || (top == old->top && x[o->axis][i] >= old->x))) continue;
 		t->at[place] = (column) { x[o->axis][i], top, true };
 	}
 }
