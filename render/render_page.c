@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render.h"
-#include <quern/oracle.h>
 #include <math.h>
+#include <quern/oracle.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "param.h"
 #include "render.h"
-#include <quern/body.h>
 #include <math.h>
+#include <quern/body.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -105,7 +105,12 @@ typedef struct {
 	sigset_t mask;
 } errand;
 
+static bool is_one; /* set once, when such a child begins */
+
+bool quern_child_is_one(void) { return is_one; }
+
 _Noreturn static void live(const errand *e) {
+	is_one = true;
 	setsid();
 	prctl(PR_SET_PDEATHSIG, SIGKILL);
 	sigprocmask(SIG_SETMASK, &e->mask, NULL);

@@ -4,6 +4,7 @@
  * The child has a session of its own, which ends with it, and limits: time, memory, open files, the size of files. It
  * cannot start a process; it dies of the attempt. What it finds out goes through memory that both see. */
 #pragma once
+#include <stdbool.h>
 #include <stddef.h>
 
 typedef enum {
@@ -25,6 +26,9 @@ quern_child quern_child_run(void (*work)(void *), void *arg, unsigned seconds);
 /* "crashed (SIGSEGV)", "did not come back within 3 s": what befell it, for a sentence that goes on with "in ...". */
 void quern_child_say(const quern_child *, unsigned seconds, char out[80]);
 const char *quern_signal_name(int number);
+
+/* Whether this process is such a child, which may have none of its own. */
+bool quern_child_is_one(void);
 
 /* Zeroed memory that a child and its parent both see; NULL if there is none. */
 void *quern_shared_take(size_t bytes);

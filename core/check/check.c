@@ -5,6 +5,7 @@
 #include "random.h"
 #include "text.h"
 #include <math.h>
+#include <quern/columns.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -194,14 +195,11 @@ static void fill(
 			quern_check_given(k, name, c)[i] = quern_check_uniform(key, (uint64_t)c << 32 | i, low, high);
 }
 
-static uint32_t components(uint32_t shape, uint32_t dim) {
-	static const uint8_t planar[] = { 0, 1, 2, 1, 3, 4, 1, 1 }, spatial[] = { 0, 1, 3, 3, 6, 9, 1, 1 };
-	return shape > QUERN_ID ? 0 : (dim == 2 ? planar : spatial)[shape];
-}
+static uint32_t components_of(uint32_t shape, uint32_t dim) { return quern_shape_size((uint8_t)shape, dim); }
 
 /* Fields that are read: of ordinary size, a unit vector where the unit is 1. Those that are changed: as new. */
 static void fill_row(check_kernel *k, const quern_use *row, int first, uint64_t key) {
-	const uint32_t dim = k->open.dim, count = components(row->shape, dim);
+	const uint32_t dim = k->open.dim, count = quern_shape_size((uint8_t)row->shape, dim);
 	const bool fresh = row->access != QUERN_READ;
 	const bool unit = row->shape == QUERN_VECTOR && (!row->unit || !strcmp(row->unit, "1"));
 	const double size = quern_check_ordinary(k->open.check, row->unit);
@@ -241,7 +239,7 @@ static void add_use(quern_check_kernel *open, uint32_t r, bool second) {
 	use[r] = same_field(k, row, use);
 	if (use[r] >= 0) return;
 	use[r] = (int32_t)open->n_columns;
-	for (uint32_t c = 0; c < components(row->shape, open->dim); c++)
+	for (uint32_t c = 0; c < quern_shape_size((uint8_t)row->shape, open->dim); c++)
 		add_column(k, row->field, roles[row->access], row->shape == QUERN_INDEX);
 	fill_row(k, row, use[r], 1000 + r * 2 + second);
 }
@@ -264,7 +262,7 @@ static void columns_at(
 		if (use[r] < 0) continue;
 		if (rows[r].shape == QUERN_INDEX) out[r].index = (int32_t *)at[use[r]] + begin;
 		else
-			for (uint32_t c = 0; c < components(rows[r].shape, k->dim); c++)
+			for (uint32_t c = 0; c < quern_shape_size(rows[r].shape, k->dim); c++)
 				out[r].real[c] = (quern_real *)at[use[r] + (int)c] + begin;
 	}
 }
@@ -398,7 +396,7 @@ static void carry(const quern_check_kernel *from, quern_check_kernel *to) {
 	for (uint32_t r = 0; rows[r].field && r < CHECK_ROWS; r++)
 		for (uint32_t q = 0; rows[q].field && q < CHECK_ROWS; q++) {
 			if (from->use[r] < 0 || to->use[q] < 0 || strcmp(rows[r].field, rows[q].field) != 0) continue;
-			for (uint32_t c = 0; c < components(rows[r].shape, from->dim); c++) {
+			for (uint32_t c = 0; c < quern_shape_size(rows[r].shape, from->dim); c++) {
 				const quern_check_column *a = column(from, from->use[r] + (int)c),
 										 *b = column(to, to->use[q] + (int)c);
 				if (a->found) memcpy(b->given, a->found, from->n * quern_check_entry_bytes(a));
@@ -449,5 +447,5 @@ const quern_check_host quern_check_services = {
 	.finite = quern_check_finite,
 	.columns = columns,
 	.given_columns = given_columns,
-	.components = components,
+	.components = components_of,
 };

@@ -41,6 +41,7 @@ typedef struct check_task {
 
 typedef struct check {
 	quern_check open; /* first, so that one leads to the other */
+	quern_loader *loader;
 	const check_task *task;
 	const quern_plugin_file *file;
 	const quern_check_ops *test; /* of its kind; NULL: there is none */

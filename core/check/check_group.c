@@ -18,7 +18,8 @@ typedef struct {
 	const check_task *task;
 	check_shared *shared;
 	quern_environment *home;
-	group *group; /* NULL: looks what the plugin is, and says so in `shared` */
+	quern_loader *loader; /* which has asked all solvers; every child has its own copy */
+	group *group;         /* NULL: looks what the plugin is, and says so in `shared` */
 } errand;
 
 /* ---- in the child ---- */
@@ -83,9 +84,11 @@ static void look(const check *c) {
 
 static void in_child(void *arg) {
 	const errand *e = arg;
-	quern_loader *loader = quern_loader_create();
+	quern_loader *loader = e->loader;
 	quern_report *report = quern_report_create();
-	check c = { .task = e->task, .shared = e->shared, .home = e->home, .units = quern_units_create() };
+	check c = {
+		.task = e->task, .loader = loader, .shared = e->shared, .home = e->home, .units = quern_units_create()
+	};
 	if (begin(&c, loader, report)) {
 		enum { WORKERS = 4 };
 		c.pool = quern_pool_create(WORKERS);
@@ -97,7 +100,6 @@ static void in_child(void *arg) {
 	free((void *)(uintptr_t)c.open.uses);
 	quern_units_destroy(c.units);
 	quern_report_destroy(report);
-	quern_loader_destroy(loader);
 }
 
 static void law(const check *c) { c->test->law(&c->open); }
@@ -186,11 +188,14 @@ int quern_check_plugin(const check_task *task) {
 	quern_environment home = quern_environment_take();
 	int status = QUERN_EXIT_SCENE;
 	e.home = &home;
+	e.loader = quern_loader_create();
+	quern_loader_catalogue(e.loader); /* a child may have no child of its own to ask */
 	if (look_first(&e)) {
 		printf("%s, %s\n", e.shared->id, task->path);
 		run_groups(&e);
 		status = sum_up(&e);
 	}
+	quern_loader_destroy(e.loader);
 	quern_environment_drop(&home);
 	quern_shared_drop(e.shared, sizeof *e.shared);
 	return status;

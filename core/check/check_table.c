@@ -113,22 +113,23 @@ static void compare_particle(
 	}
 }
 
+/* Those that could be asked: what is wrong with another one is no fault of this plugin. */
 static void compare_with_solvers(const check *c, quern_check_tally *t) {
-	quern_loader *loader = quern_loader_create();
+	const quern_catalogue *known = quern_loader_catalogue(c->loader);
 	quern_report *report = quern_report_create();
-	char **ids = quern_loader_ids(loader);
-	for (size_t i = 0; ids[i]; i++) {
-		if (strncmp(ids[i], "solver.", 7) != 0 || !strcmp(ids[i], c->file->plugin.id)) continue;
+	for (size_t i = 0; i < known->n_solvers; i++) {
+		const char *name = known->solvers[i].solver;
+		if (!strcmp(quern_id_name(c->file->plugin.id), name) &&
+			quern_id_is_of(c->file->plugin.id, quern_solver_kind.name))
+			continue;
 		const quern_plugin_file *solver =
-			quern_loader_find(loader, quern_solver_kind.name, ids[i] + 7, report, (quern_mark) { 0 });
+			quern_loader_find(c->loader, quern_solver_kind.name, name, report, (quern_mark) { 0 });
 		for (const quern_use *row = c->file->uses; solver && row->field; row++) {
 			compare_rows(c, t, row->field, row, solver);
 			if (!strncmp(row->field, "particle.", 9)) compare_particle(c, t, row, solver);
 		}
 	}
-	quern_loader_free_ids(ids);
 	quern_report_destroy(report);
-	quern_loader_destroy(loader);
 }
 
 void quern_check_table(const check *c) {

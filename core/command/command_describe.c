@@ -5,6 +5,7 @@
 #include "options.h"
 #include "param.h"
 #include "scene.h"
+#include "sections.h"
 #include "text.h"
 #include <jansson.h>
 #include <math.h>
@@ -157,6 +158,12 @@ static void print_uses(const quern_use *row) {
 	}
 }
 
+static void print_sums(const quern_output *o) {
+	if (o && o->name) puts("\nsums in summary.json");
+	for (; o && o->name; o++)
+		printf("  %-16s %-8s %s\n", o->name, o->unit ? o->unit : "1", o->doc ? o->doc : "");
+}
+
 static void print_sections(const char *what, const char *const *names) {
 	if (!names) return;
 	printf("%-10s", what);
@@ -182,6 +189,7 @@ static void print_solver(const quern_solver_ops *ops) {
 	puts("\nstages");
 	for (const quern_stage *s = ops->stages; s && s->name; s++)
 		printf("  %-20s %s\n", s->name, s->doc ? s->doc : "");
+	print_sums(ops->sums);
 }
 
 static void print_outputs(const quern_observer_ops *ops) {
@@ -216,14 +224,15 @@ static void print_plugin(const quern_plugin_file *f) {
 
 /* The keys of a scene that belong to no section. */
 static void print_scene(quern_loader *loader) {
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(loader, &n);
+	const quern_catalogue *known = quern_loader_catalogue(loader);
 	puts("scene - the keys of a scene that belong to no section\n\nkeys");
 	for (const quern_param *row = quern_general_rows; row->name; row++) print_param(row, 2);
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		printf("  %-24s  list of %s\n      %s\n", l->name, l->item, l->doc);
 	puts("\nsections");
-	for (size_t i = 0; i < n; i++) printf("  %-24s  quern describe %s\n", known[i].section, known[i].section);
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]))
+			printf("  %-24s  quern describe %s\n", known->solvers[i].section, known->solvers[i].section);
 	printf("  %-24s  observers, one or a list; each takes `label`\n", quern_observe_slot.name);
 }
 
@@ -280,14 +289,15 @@ static void put_solver(json_t *all, const quern_solver_ops *ops) {
 }
 
 static json_t *scene_json(quern_loader *loader) {
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(loader, &n);
+	const quern_catalogue *known = quern_loader_catalogue(loader);
 	json_t *keys = params_json(quern_general_rows), *sections = json_object();
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		json_array_append_new(keys, json_pack("{s:s, s:s+, s:s, s:b, s:b}", "name", l->name, "type",
 										"list of ", l->item, "doc", l->doc, "required", 0, "advanced", 0));
-	for (size_t i = 0; i < n; i++)
-		json_object_set_new(sections, known[i].section, json_sprintf("solver.%s", known[i].solver));
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]))
+			json_object_set_new(
+				sections, known->solvers[i].section, json_sprintf("solver.%s", known->solvers[i].solver));
 	return json_pack("{s:s, s:o, s:o, s:o}", "id", "scene", "params", keys, "sections", sections, "observe",
 		params_json(quern_observe_slot.rows));
 }
@@ -307,10 +317,10 @@ static json_t *plugin_json(const quern_plugin_file *f) {
 
 /* The section's solver, or NULL. */
 static const char *solver_of(quern_loader *loader, const char *section) {
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(loader, &n);
-	for (size_t i = 0; i < n; i++)
-		if (!strcmp(known[i].section, section)) return known[i].solver;
+	const quern_catalogue *known = quern_loader_catalogue(loader);
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]) && !strcmp(known->solvers[i].section, section))
+			return known->solvers[i].solver;
 	return NULL;
 }
 

@@ -5,6 +5,7 @@
 #include "estimate.h"
 #include "options.h"
 #include "run.h"
+#include "sections.h"
 #include "text.h"
 #include "watch.h"
 #include <jansson.h>
@@ -70,11 +71,11 @@ static json_t *sets_of(const quern_run *run) {
 /* Parts of the vocabulary that this scene does without. */
 static json_t *skipped(const quern_run *run) {
 	json_t *list = json_array();
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(run->scene->loader, &n);
-	for (size_t i = 0; i < n; i++)
-		if (!quern_scene_section(run->scene, known[i].section))
-			json_array_append_new(list, json_string(known[i].section));
+	const quern_catalogue *known = quern_loader_catalogue(run->scene->loader);
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]) &&
+			!quern_scene_section(run->scene, known->solvers[i].section))
+			json_array_append_new(list, json_string(known->solvers[i].section));
 	if (!run->has_grid) json_array_append_new(list, json_string("grid"));
 	return list;
 }
@@ -166,14 +167,16 @@ static void print(json_t *root) {
 		printf("  %-32s %s\n", text_of(one, "id"), text_of(one, "file"));
 	print_stages(root);
 	print_sets(root);
-	printf("\nleft out:");
+	printf("\nleft out:%s", json_array_size(json_object_get(root, "skipped")) ? "" : " nothing");
 	json_array_foreach(json_object_get(root, "skipped"), i, one) printf(" %s", json_string_value(one));
 	puts("");
 	json_object_foreach(json_object_get(root, "entries"), name, one)
 		printf("%s %.0f, ", name, json_number_value(one));
 	printf("%.3g MB\n", number_of(root, "bytes") * 1e-6);
 	printf("step %.4g s, set by %s\n", number_of(root, "step"), text_of(root, "step_set_by"));
-	printf("unstable beyond %.4g s: %s\n", number_of(root, "step_limit"), text_of(root, "step_limit_set_by"));
+	if (json_is_number(json_object_get(root, "step_limit")))
+		printf("unstable beyond %.4g s: %s\n", number_of(root, "step_limit"),
+			text_of(root, "step_limit_set_by"));
 	char settling[32], running[32];
 	quern_estimate_time(number_of(root, "estimated_settling_core_seconds"), settling);
 	quern_estimate_time(number_of(root, "estimated_core_seconds"), running);

@@ -4,6 +4,7 @@
 #include "h5.h"
 #include "options.h"
 #include "scene.h"
+#include "sections.h"
 #include "text.h"
 #include <jansson.h>
 #include <math.h>
@@ -240,9 +241,10 @@ static json_t *scene_schema(const context *c) {
 		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out: SET.NAME.", "type", "array",
 			"items", "type", "string"),
 		false);
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(c->loader, &n);
-	for (size_t i = 0; i < n; i++) put(scene, known[i].section, section_schema(c, known[i].solver), false);
+	const quern_catalogue *known = quern_loader_catalogue(c->loader);
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]))
+			put(scene, known->solvers[i].section, section_schema(c, known->solvers[i].solver), false);
 	put(scene, "observe", slot_schema(c, quern_observer_kind.name, true, &quern_observe_slot), false);
 	json_object_set_new(scene, "$schema", json_string("http://json-schema.org/draft-07/schema#"));
 	json_object_set_new(scene, "title", json_string("Quern scene"));

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <quern/columns.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -160,17 +161,6 @@ typedef struct {
 	double *partial;     /* by leaf, by output */
 } asking;
 
-static quern_column from(quern_column column, uint8_t shape, uint32_t begin) {
-	if (shape == QUERN_INDEX) {
-		if (column.index) column.index += begin;
-	} else if (shape == QUERN_ID) {
-		if (column.id) column.id += begin;
-	} else
-		for (int k = 0; k < 9; k++)
-			if (column.real[k]) column.real[k] += begin;
-	return column;
-}
-
 static void ask_leaf(void *arg, uint32_t leaf, uint32_t worker) {
 	const asking *a = arg;
 	const uint32_t begin = leaf * LEAF, n_uses = a->bound->n_uses;
@@ -178,8 +168,8 @@ static void ask_leaf(void *arg, uint32_t leaf, uint32_t worker) {
 	quern_observer_batch b = a->batch;
 	b.n = a->n - begin < LEAF ? a->n - begin : LEAF;
 	for (uint32_t r = 0; r < n_uses; r++)
-		own[r] =
-			a->along[r] ? from(a->bound->column[r], a->bound->uses[r].shape, begin) : a->bound->column[r];
+		own[r] = a->along[r] ? quern_column_from(a->bound->column[r], a->bound->uses[r].shape, begin)
+							 : a->bound->column[r];
 	b.use = own;
 	a->ops->map(a->bound->self, &b, a->partial + (size_t)leaf * a->n_outputs);
 }

@@ -71,6 +71,22 @@ static bool is_meant(const quern_run *run, int set) {
 	return false;
 }
 
+/* Read by a stage that settles, or by a plugin that it calls, and set up by a section that the key does not hold. */
+static bool is_given(const quern_run *run, int field) {
+	const quern_plan *plan = run->plan;
+	bool read = false, given = false;
+	for (size_t i = 0; i < plan->n_uses; i++) {
+		const quern_plan_use *u = &plan->uses[i];
+		if (u->target != field || u->stage < 0) continue;
+		const quern_plan_stage *stage = &plan->stages[u->stage];
+		const bool reads = u->row->access == QUERN_READ || u->row->access == QUERN_UPDATE;
+		const bool writes = stage->phase == QUERN_SETUP && u->row->access != QUERN_READ;
+		read = read || (stage->settles && reads);
+		given = given || (writes && stage->section && !concerns(run, stage->section));
+	}
+	return read && given;
+}
+
 /* Whoever has had a hand in the set-up: what settles begins with these numbers. */
 static uint64_t beginning(const quern_run *run) {
 	const quern_store *store = &run->plan->store;
@@ -79,7 +95,8 @@ static uint64_t beginning(const quern_run *run) {
 		const quern_field *field = &store->fields[k];
 		const quern_set_store *set = &store->sets[field->set];
 		const bool begins = field->shape == QUERN_ID || (field->settles && field->state);
-		if (!begins || field->local || set->rows || !is_meant(run, field->set)) continue;
+		if (field->local || set->rows || !(is_given(run, (int)k) || (begins && is_meant(run, field->set))))
+			continue;
 		hash = quern_hash_more(hash, field->name, strlen(field->name));
 		for (uint8_t c = 0; c < field->n_components; c++)
 			hash = quern_hash_more(hash, field->data[field->now][c], set->n * quern_field_bytes(field));

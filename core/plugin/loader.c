@@ -41,10 +41,7 @@ struct quern_loader {
 	char *own; /* the program's; NULL: there is none */
 	quern_plugin_file **files;
 	size_t n_files, files_capacity;
-	quern_section_of *sections; /* of all solvers that can be found, once somebody has asked */
-	size_t n_sections, sections_capacity;
-	quern_kind **kinds; /* that they call; all that hangs on one is in its own memory */
-	size_t n_kinds, kinds_capacity;
+	quern_catalogue catalogue; /* once somebody has asked */
 	int level;
 	bool wary, asked; /* for sections */
 };
@@ -96,13 +93,6 @@ quern_loader *quern_loader_create(void) {
 	return loader;
 }
 
-static void section_of_finish(quern_section_of *s) {
-	for (size_t k = 0; k < s->n_sets; k++) free(s->sets[k]);
-	free(s->sets);
-	free(s->section);
-	free(s->solver);
-}
-
 static void file_destroy(quern_plugin_file *file) {
 	if (!file) return;
 	for (size_t i = 0; i < file->n_views; i++) free(file->views[i].ops);
@@ -117,10 +107,7 @@ void quern_loader_destroy(quern_loader *loader) {
 	if (!loader) return;
 	for (size_t i = 0; i < loader->n_files; i++) file_destroy(loader->files[i]);
 	for (size_t i = 0; i < loader->n_folders; i++) free(loader->folders[i]);
-	for (size_t i = 0; i < loader->n_sections; i++) section_of_finish(&loader->sections[i]);
-	free(loader->sections);
-	for (size_t i = 0; i < loader->n_kinds; i++) free(loader->kinds[i]);
-	free(loader->kinds);
+	quern_catalogue_finish(&loader->catalogue);
 	free(loader->files);
 	free(loader->own);
 	free(loader->folders);
@@ -485,8 +472,7 @@ const void *quern_loader_ops(quern_loader *loader, const quern_plugin_file *of, 
 	for (size_t i = 0; i < loader->n_files; i++)
 		if (loader->files[i] == of) file = loader->files[i];
 	for (size_t i = 0; file && i < file->n_views; i++)
-		if (file->views[i].kind == kind || file->views[i].kind->ops_size == kind->ops_size)
-			return file->views[i].ops;
+		if (file->views[i].kind == kind) return file->views[i].ops;
 	void *ops = file ? quern_table_ops_for(&file->table, kind, &why) : NULL;
 	if (!ops) refuse(report, mark, of->path, quern_text_string(&why));
 	quern_text_finish(&why);
@@ -504,121 +490,46 @@ bool quern_solver_steps(const quern_solver_ops *ops) {
 	return false;
 }
 
-static char **names_of(const quern_set *sets, size_t *n) {
-	char **names = NULL;
-	size_t capacity = 0;
-	for (*n = 0; sets->name; sets++) {
-		names = quern_grow(names, *n, &capacity, sizeof *names);
-		names[(*n)++] = quern_copy(sets->name);
-	}
-	return names;
-}
-
-/* One block: the kind, its functions, all names. */
-static quern_kind *copy_kind(const quern_kind *kind) {
-	size_t n = 0, letters = strlen(kind->name) + 1;
-	while (kind->functions[n].name) letters += strlen(kind->functions[n++].name) + 1;
-	quern_kind *own = quern_take(1, sizeof *own + (n + 1) * sizeof(quern_function) + letters);
-	quern_function *functions = (quern_function *)(void *)(own + 1);
-	char *names = (char *)(functions + n + 1);
-	*own = *kind;
-	own->functions = functions;
-	own->doc = NULL;
-	own->name = strcpy(names, kind->name);
-	names += strlen(names) + 1;
-	for (size_t i = 0; i < n; i++) {
-		functions[i] = kind->functions[i];
-		functions[i].name = strcpy(names, kind->functions[i].name);
-		names += strlen(names) + 1;
-	}
-	return own;
-}
-
-/* The longest table of a kind that any solver knows. */
-static void note_kind(quern_loader *loader, const quern_kind *kind) {
-	for (size_t i = 0; i < loader->n_kinds; i++) {
-		if (strcmp(loader->kinds[i]->name, kind->name) != 0) continue;
-		if (loader->kinds[i]->ops_size >= kind->ops_size) return;
-		free(loader->kinds[i]);
-		loader->kinds[i] = copy_kind(kind);
-		return;
-	}
-	loader->kinds =
-		quern_grow(loader->kinds, loader->n_kinds, &loader->kinds_capacity, sizeof *loader->kinds);
-	loader->kinds[loader->n_kinds++] = copy_kind(kind);
-}
-
-static void note_section(quern_loader *loader, const quern_library *lib) {
-	quern_table table;
-	quern_text why = { 0 };
-	if (quern_table_read(&table, lib, &why)) { /* what is wrong with it is said when somebody asks for it */
-		const quern_solver_ops *ops = table.plugin.ops;
-		const bool solver = !strcmp(table.kind, quern_solver_kind.name);
-		for (const quern_slot *slot = solver ? ops->slots : NULL; slot && slot->name; slot++)
-			note_kind(loader, slot->kind);
-		if (solver && ops->section) {
-			loader->sections = quern_grow(
-				loader->sections, loader->n_sections, &loader->sections_capacity, sizeof *loader->sections);
-			quern_section_of *s = &loader->sections[loader->n_sections++];
-			*s = (quern_section_of) { .section = quern_copy(ops->section),
-				.solver = quern_copy(quern_id_name(table.plugin.id)) };
-			s->sets = names_of(ops->sets, &s->n_sets);
-			s->steps = quern_solver_steps(ops);
-		}
-	}
-	quern_table_finish(&table);
-	quern_text_finish(&why);
-}
-
-/* Mapped for a moment only: a scene maps what it asks for and no more. */
-static void ask_solver(quern_loader *loader, const char *id, quern_report *nobody) {
-	int level = 1;
-	char *path = find_object(loader, id, &level, nobody, (quern_mark) { 0 });
-	if (path && (!loader->wary || quern_loader_survives(path, nobody, (quern_mark) { 0 }))) {
-		quern_watch_enter(path, "its start-up code");
-		void *handle = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
-		quern_watch_leave();
-		const quern_library *lib = handle ? dlsym(handle, QUERN_LIBRARY_SYMBOL) : NULL;
-		if (lib) note_section(loader, lib);
-		if (handle) dlclose(handle);
-	}
-	free(path);
-}
-
-static int by_section(const void *a, const void *b) {
-	const quern_section_of *x = a, *y = b;
-	const int order = strcmp(x->section, y->section);
-	return order ? order : strcmp(x->solver, y->solver);
-}
-
+/* Objects that are offered twice are nobody's until they are asked for by their name. */
 static void ask_solvers(quern_loader *loader) {
-	if (!loader->asked) {
-		quern_report *nobody = quern_report_create();
-		char **ids = quern_loader_ids(loader);
-		for (size_t i = 0; ids[i]; i++)
-			if (quern_id_is_of(ids[i], quern_solver_kind.name)) ask_solver(loader, ids[i], nobody);
-		if (loader->n_sections)
-			qsort(loader->sections, loader->n_sections, sizeof *loader->sections, by_section);
-		quern_loader_free_ids(ids);
-		quern_report_destroy(nobody);
-		loader->asked = true;
+	if (loader->asked) return;
+	quern_report *nobody = quern_report_create();
+	char **ids = quern_loader_ids(loader), **paths = NULL, **solvers = NULL;
+	size_t n = 0, capacity = 0, also = 0;
+	for (size_t i = 0; ids[i]; i++) {
+		int level = 1;
+		if (!quern_id_is_of(ids[i], quern_solver_kind.name)) continue;
+		char *path = find_object(loader, ids[i], &level, nobody, (quern_mark) { 0 });
+		if (!path) continue;
+		paths = quern_grow(paths, n, &capacity, sizeof *paths);
+		solvers = quern_grow(solvers, n, &also, sizeof *solvers);
+		paths[n] = path;
+		solvers[n++] = ids[i];
 	}
+	if (n) quern_catalogue_ask(&loader->catalogue, solvers, paths, n);
+	for (size_t i = 0; i < n; i++) free(paths[i]);
+	free(paths);
+	free(solvers);
+	quern_loader_free_ids(ids);
+	quern_report_destroy(nobody);
+	loader->asked = true;
 }
 
-const quern_section_of *quern_loader_sections(quern_loader *loader, size_t *n) {
+const quern_catalogue *quern_loader_catalogue(quern_loader *loader) {
 	ask_solvers(loader);
-	*n = loader->n_sections;
-	return loader->sections;
+	return &loader->catalogue;
 }
 
 const quern_kind *quern_loader_kind(quern_loader *loader, const char *name) {
 	static const quern_kind *const own[] = { &quern_solver_kind, &quern_observer_kind, &quern_check_kind };
 	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
 		if (!strcmp(own[i]->name, name)) return own[i];
-	ask_solvers(loader);
-	for (size_t i = 0; i < loader->n_kinds; i++)
-		if (!strcmp(loader->kinds[i]->name, name)) return loader->kinds[i];
-	return NULL;
+	return quern_catalogue_kind(quern_loader_catalogue(loader), name);
+}
+
+void quern_loader_report_unreadable(quern_loader *loader, quern_report *report, quern_mark mark) {
+	const quern_catalogue *c = quern_loader_catalogue(loader);
+	for (size_t i = 0; i < c->n_unreadable; i++) quern_report_add(report, mark, "%s", c->unreadable[i].why);
 }
 
 /* ---- other files ---- */

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* loader - finds plugins by kind and name, maps exactly the object that is asked for, and never unmaps it */
+/* loader - finds plugins by kind and name, maps exactly the object that is asked for, and never unmaps it; what the installed
+ * solvers say of themselves is asked elsewhere, see catalogue.h */
 #pragma once
-#include "plugin_table.h"
+#include "catalogue.h"
 #include "report.h"
 
 /* The ops of a plugin in the eyes of one caller. */
@@ -25,13 +26,6 @@ typedef struct quern_plugin_file {
 	size_t n_views, views_capacity;
 	quern_table table;
 } quern_plugin_file;
-
-/* A solver that reads a section unless the scene names another, and the sets that it makes. */
-typedef struct quern_section_of {
-	char *section, *solver, **sets;
-	size_t n_sets;
-	bool steps; /* it has something to do in a step */
-} quern_section_of;
 
 typedef struct quern_loader quern_loader;
 
@@ -59,8 +53,10 @@ const quern_plugin_file *quern_loader_open(quern_loader *, const char *path, que
 const void *quern_loader_ops(
 	quern_loader *, const quern_plugin_file *, const quern_kind *, quern_report *, quern_mark);
 
-/* All sections that an installed solver reads by itself, sorted. Asks every solver once, and keeps none of them mapped. */
-const quern_section_of *quern_loader_sections(quern_loader *, size_t *n);
+/* What the installed solvers say of themselves; asked once. */
+const quern_catalogue *quern_loader_catalogue(quern_loader *);
+/* A sentence for each solver that could not be asked. */
+void quern_loader_report_unreadable(quern_loader *, quern_report *, quern_mark);
 /* Whether any of its stages runs in a step. */
 bool quern_solver_steps(const quern_solver_ops *);
 /* A kind by its name, as whoever calls such plugins describes it; NULL if no installed solver does. */

@@ -250,7 +250,8 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 	size_t n_sets, n_slots, n_stages, n_sums = 0;
 	if (ops->section && !is_short_name(ops->section))
 		return quern_table_refuse(r, "the section '%.60s' is no word", ops->section);
-	if (ops->bound_size < sizeof(void *) || ops->bound_size > LARGEST_ENTRY || ops->bound_size % 8)
+	if (ops->bound_size < offsetof(quern_bound, path) + sizeof(char *) || ops->bound_size > LARGEST_ENTRY ||
+		ops->bound_size % 8)
 		return quern_table_refuse(
 			r, "bound_size is %u: set the sizes of ops by QUERN_SOLVER_SIZES", ops->bound_size);
 	if (!sections(r, "needs", ops->needs) || !sections(r, "with", ops->with) ||
@@ -262,6 +263,14 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 		!outputs(r, "sums", &ops->sums, ops->output_size, QUERN_MOST_SUMS, &n_sums))
 		return false;
 	if (!n_stages) return quern_table_refuse(r, "a solver without stages");
+	bool settles = !ops->settled;
+	for (size_t i = 0; i < n_stages; i++) {
+		quern_stage s = { .name = NULL };
+		memcpy(&s, (const char *)ops->stages + i * ops->stage_size,
+			ops->stage_size < sizeof s ? ops->stage_size : sizeof s);
+		settles = settles || s.flags & QUERN_SETTLES;
+	}
+	if (!settles) return quern_table_refuse(r, "settled is there, and no stage has QUERN_SETTLES");
 	if (!n_sums != !ops->account) return quern_table_refuse(r, "sums and account go together");
 	quern_set *own_sets = copy(r, ops->sets, ops->set_size, sizeof *own_sets, n_sets);
 	quern_slot *own_slots = copy(r, ops->slots, ops->slot_size, sizeof *own_slots, n_slots);

@@ -70,7 +70,10 @@ static double grid_cell(const quern_scene *scene) {
 	double cell = 0;
 	for (size_t i = 0; i < scene->n_sections; i++) {
 		const quern_section *s = &scene->sections[i];
-		const double wish = s->ops->cell ? s->ops->cell(s->solver->self) : 0;
+		if (!s->ops->cell) continue;
+		quern_watch_enter(s->solver->file->plugin.id, "cell");
+		const double wish = s->ops->cell(s->solver->self);
+		quern_watch_leave();
 		if (!(wish > 0)) continue;
 		if (first && wish != cell) {
 			quern_report_add(scene->report, s->mark,
@@ -82,6 +85,39 @@ static double grid_cell(const quern_scene *scene) {
 	}
 	if (!first) quern_report_add(scene->report, (quern_mark) { 0 }, "the grid has no cell size");
 	return cell;
+}
+
+static uint32_t substeps_of(const quern_section *);
+
+static void check_substeps(const quern_scene *scene) {
+	const quern_section *first = NULL;
+	uint32_t n = 0;
+	for (size_t i = 0; i < scene->n_sections; i++) {
+		const uint32_t wish = substeps_of(&scene->sections[i]);
+		if (first && wish && wish != n)
+			quern_report_add(scene->report, scene->sections[i].mark,
+				"%s wants %u substeps in a step, and %s %u", scene->sections[i].name, wish, first->name, n);
+		if (wish && !first) first = &scene->sections[i], n = wish;
+	}
+}
+
+/* By name: a sum that several give is one. */
+static void check_sums(const quern_scene *scene) {
+	const char *names[QUERN_MOST_SUMS];
+	size_t n = 0;
+	for (size_t i = 0; i < scene->n_sections; i++)
+		for (const quern_output *row = scene->sections[i].ops->sums; row && row->name; row++) {
+			size_t k = 0;
+			while (k < n && strcmp(names[k], row->name) != 0) k++;
+			if (k < n) continue;
+			if (n == QUERN_MOST_SUMS) {
+				quern_report_add(scene->report, scene->sections[i].mark,
+					"%s and the sections before it give more than %d sums", scene->sections[i].name,
+					QUERN_MOST_SUMS);
+				return;
+			}
+			names[n++] = row->name;
+		}
 }
 
 static bool needs_grid(const quern_store *store) {
@@ -105,6 +141,8 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	run->plugins = quern_plugin_hashes(scene->loader);
 	run->pool = quern_pool_create(workers);
 	if (!run->pool) return give_up(run);
+	check_substeps(scene);
+	check_sums(scene);
 	run->plan = quern_plan_create(scene, run->pool);
 	run->has_grid = needs_grid(&run->plan->store);
 	if (run->has_grid && !quern_report_errors(scene->report)) {
@@ -193,16 +231,19 @@ void quern_run_frame(quern_run *run) {
 	run->clock.frame++;
 }
 
-uint32_t quern_run_substeps(const quern_run *run) {
-	uint32_t n = 1;
-	for (size_t i = 0; i < run->scene->n_sections; i++) {
-		const quern_section *s = &run->scene->sections[i];
-		if (!s->ops->substeps) continue;
-		quern_watch_enter(s->solver->file->plugin.id, "substeps");
-		n = s->ops->substeps(s->solver->self);
-		quern_watch_leave();
-	}
+static uint32_t substeps_of(const quern_section *s) {
+	if (!s->ops->substeps) return 0;
+	quern_watch_enter(s->solver->file->plugin.id, "substeps");
+	const uint32_t n = s->ops->substeps(s->solver->self);
+	quern_watch_leave();
 	return n;
+}
+
+/* Wishes are one, see check_substeps. */
+uint32_t quern_run_substeps(const quern_run *run) {
+	uint32_t n = 0;
+	for (size_t i = 0; i < run->scene->n_sections && !n; i++) n = substeps_of(&run->scene->sections[i]);
+	return n ? n : 1;
 }
 
 static size_t section_index(const quern_run *run, const quern_section *section) {
@@ -355,7 +396,7 @@ static void zero(quern_run *run, const int *fields) {
 static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt) {
 	if (!stage->stage) return QUERN_OK;
 	const double begin = quern_wall();
-	zero(run, stage->zeros);
+	zero(run, run->clock.settled ? stage->zeros : stage->zeros_settling);
 	quern_plan_refresh(run->plan);
 	quern_step step = quern_run_record(run, stage->section);
 	step.dt = dt;
@@ -519,6 +560,7 @@ static void add_section(quern_account *a, const quern_section *s, const quern_st
 		const quern_output *row = &s->ops->sums[k];
 		double *sum = sum_named(a, row);
 		if (!sum) return;
+		if (isnan(*sum)) continue;
 		if (row->combine == QUERN_SUM) *sum += value[k];
 		else if (row->combine == QUERN_MAX ? !(value[k] <= *sum) : !(value[k] >= *sum)) *sum = value[k];
 	}
@@ -567,7 +609,9 @@ bool quern_run_accept(quern_run *run, quern_text *why) {
 		good = s->ops->accept(s->solver->self, &step) == QUERN_OK && run->status == QUERN_OK;
 		quern_watch_leave();
 		if (good) continue;
-		quern_text_add(why, "%s", run->message ? run->message : s->name);
+		if (run->message) quern_text_add(why, "%s", run->message);
+		else quern_text_add(why, "%s cannot go on from this state", s->name);
+		run->fault = (quern_mark) { 0 };
 		free(run->message);
 		run->message = NULL;
 		run->status = QUERN_OK;

@@ -19,6 +19,7 @@ typedef struct quern_instance {
 /* One entry of a slot: a plugin, the slot's own rows, and instances with another entry's overrides. */
 typedef struct quern_filling {
 	quern_instance *instance;
+	const void *ops; /* as the solver of this slot knows them */
 	void *item;
 	quern_instance **variant; /* by entry of the overriding slot; NULL where nothing is overridden */
 	size_t n_variant;
@@ -27,7 +28,7 @@ typedef struct quern_filling {
 typedef struct quern_slot_use {
 	const quern_slot *slot;
 	char *path;             /* SECTION.SLOT */
-	quern_filling *filling; /* same_as: those of that slot */
+	quern_filling *filling; /* same_as: instances, items and variants are that slot's */
 	size_t n, capacity;
 	bool borrowed;
 } quern_slot_use;

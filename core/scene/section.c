@@ -174,7 +174,7 @@ static void add_filling(quern_scene *s, quern_slot_use *use, const choice *c) {
 	it->ops = ops;
 	use->filling = quern_grow(use->filling, use->n, &use->capacity, sizeof(quern_filling));
 	quern_filling *f = &use->filling[use->n++];
-	*f = (quern_filling) { .instance = it };
+	*f = (quern_filling) { .instance = it, .ops = ops };
 	const size_t before = quern_report_errors(s->report);
 	read_entry(s, use->slot, f);
 	instance_init(s, f->instance, before);
@@ -194,6 +194,23 @@ static const quern_slot_use *find_slot(const quern_scene *s, const char *path) {
 		for (size_t k = 0; k < s->sections[i].n_slots; k++)
 			if (!strcmp(s->sections[i].slots[k].path, path)) return &s->sections[i].slots[k];
 	return NULL;
+}
+
+/* The plugins of another section's slot, called from here too, as this solver knows their kind. */
+static void borrow(quern_scene *s, quern_slot_use *use, const quern_slot_use *same, quern_mark mark) {
+	const quern_kind *kind = use->slot->kind;
+	if (strcmp(kind->name, same->slot->kind->name) != 0) {
+		quern_report_add(s->report, mark, "%s: slot %s holds %s, and this solver takes %s there", use->path,
+			same->path, same->slot->kind->name, kind->name);
+		return;
+	}
+	use->filling = quern_take(same->n, sizeof *use->filling);
+	for (size_t i = 0; i < same->n; i++) {
+		use->filling[i] = same->filling[i];
+		use->filling[i].ops =
+			quern_loader_ops(s->loader, same->filling[i].instance->file, kind, s->report, mark);
+	}
+	use->n = same->n;
 }
 
 void quern_slot_fill(quern_scene *s, quern_slot_use *use, quern_node *node, quern_mark mark) {
@@ -312,7 +329,7 @@ static void *bind_slot(const quern_section *section, const quern_slot_use *use) 
 		for (size_t v = 0; v < f->n_variant; v++)
 			variant[v] = f->variant[v] ? f->variant[v]->self : f->instance->self;
 		const quern_bound own = { .self = f->instance->self,
-			.ops = f->instance->ops,
+			.ops = f->ops,
 			.item = f->item,
 			.variant = variant,
 			.uses = quern_table_uses_for(&file->table, section->solver->file->library),
@@ -357,6 +374,21 @@ static void section_ready(quern_scene *s, quern_section *section) {
 	free(counts);
 }
 
+/* Of a section that is itself a list: what is left of a map once `solver` has been read. */
+static quern_node *without_solver(quern_scene *s, quern_node *node) {
+	const quern_node *named = quern_node_find(node, "solver");
+	if (!named || named->kind != QUERN_NODE_SCALAR) return node;
+	quern_tree *keep = quern_take(1, sizeof *keep);
+	s->defaults = quern_grow(s->defaults, s->n_defaults, &s->defaults_capacity, sizeof(keep));
+	s->defaults[s->n_defaults++] = keep;
+	keep->root = quern_node_create(QUERN_NODE_MAP);
+	keep->root->mark = node->mark;
+	for (size_t i = 0; i < node->n; i++)
+		if (strcmp(node->entries[i].key, "solver") != 0)
+			quern_node_merge_entry(keep->root, &node->entries[i]);
+	return keep->root;
+}
+
 void quern_section_read(quern_scene *s, const quern_plugin_file *file, const quern_entry *entry) {
 	quern_node *node = entry->value;
 	const bool map = node->kind == QUERN_NODE_MAP;
@@ -390,6 +422,7 @@ void quern_section_read(quern_scene *s, const quern_plugin_file *file, const que
 	const char **also = section_also(section->ops, &n);
 	const size_t before = quern_report_errors(s->report);
 	if (is_list) section->solver->map = NULL;
+	quern_node *rest = is_list && map ? without_solver(s, node) : node;
 	instance_read(s, section->solver, also);
 	instance_init(s, section->solver, before);
 	free(also);
@@ -399,8 +432,8 @@ void quern_section_read(quern_scene *s, const quern_plugin_file *file, const que
 		if (slot->same_as) {
 			const quern_slot_use *same = find_slot(s, slot->same_as);
 			use->borrowed = true;
-			if (same) use->filling = same->filling, use->n = same->n;
-		} else if (!*slot->name) quern_slot_fill(s, use, node, section->mark);
+			if (same) borrow(s, use, same, section->mark);
+		} else if (!*slot->name) quern_slot_fill(s, use, rest, section->mark);
 		else if (strchr(slot->name, '.')) fill_items(s, section, use);
 		else quern_slot_fill(s, use, quern_node_find(node, slot->name), section->mark);
 		if (!slot->same_as) fill_variants(s, use);
@@ -410,7 +443,10 @@ void quern_section_read(quern_scene *s, const quern_plugin_file *file, const que
 
 void quern_slot_finish(quern_slot_use *use) {
 	free(use->path);
-	if (use->borrowed) return;
+	if (use->borrowed) {
+		free(use->filling);
+		return;
+	}
 	for (size_t i = 0; i < use->n; i++) {
 		free(use->filling[i].variant);
 		if (use->slot->rows && use->filling[i].item)

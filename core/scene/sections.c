@@ -27,20 +27,25 @@ static const char *named_solver(const quern_node *section) {
 	return solver && solver->kind == QUERN_NODE_SCALAR ? solver->text : NULL;
 }
 
+bool quern_section_is_claimed(const quern_section_of *s) {
+	const size_t n = s->section ? strlen(s->section) : 0;
+	for (const quern_param *row = quern_general_rows; n && row->name; row++)
+		if (!strncmp(row->name, s->section, n) && (!row->name[n] || row->name[n] == '.')) return false;
+	return n && strcmp(s->section, quern_observe_slot.name) != 0;
+}
+
 static bool is_key_of_scene(const char *key) {
-	const size_t n = strlen(key);
-	for (const quern_param *row = quern_general_rows; row->name; row++)
-		if (!strncmp(row->name, key, n) && (!row->name[n] || row->name[n] == '.')) return true;
-	return !strcmp(key, quern_observe_slot.name);
+	const quern_section_of one = { .section = (char *)(uintptr_t)key };
+	return !quern_section_is_claimed(&one);
 }
 
 static bool is_section(quern_scene *s, const quern_entry *e) {
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(s->loader, &n);
+	const quern_catalogue *known = quern_loader_catalogue(s->loader);
 	if (is_key_of_scene(e->key)) return false;
 	if (named_solver(e->value)) return true;
-	for (size_t i = 0; i < n; i++)
-		if (!strcmp(known[i].section, e->key)) return true;
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]) && !strcmp(known->solvers[i].section, e->key))
+			return true;
 	return false;
 }
 
@@ -53,12 +58,14 @@ static const char **append(const char **list, size_t *n, size_t *capacity, const
 
 const char **quern_sections_known(quern_scene *s, const quern_node *root) {
 	const char **also = NULL;
-	size_t n = 0, capacity = 0, n_known;
-	const quern_section_of *known = quern_loader_sections(s->loader, &n_known);
+	size_t n = 0, capacity = 0;
+	const quern_catalogue *known = quern_loader_catalogue(s->loader);
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		also = append(also, &n, &capacity, l->name);
 	also = append(also, &n, &capacity, quern_observe_slot.name);
-	for (size_t i = 0; i < n_known; i++) also = append(also, &n, &capacity, known[i].section);
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]))
+			also = append(also, &n, &capacity, known->solvers[i].section);
 	for (size_t i = 0; i < root->n; i++)
 		if (!is_key_of_scene(root->entries[i].key) && named_solver(root->entries[i].value))
 			also = append(also, &n, &capacity, root->entries[i].key);
@@ -88,17 +95,17 @@ static part *find(parts *p, const char *name) {
 /* The one that claims the section; NULL after one sentence if several do. */
 static const char *default_solver(quern_scene *s, const part *it) {
 	const char *found = NULL;
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(s->loader, &n);
-	for (size_t i = 0; i < n; i++) {
-		if (strcmp(known[i].section, it->entry->key) != 0) continue;
+	const quern_catalogue *known = quern_loader_catalogue(s->loader);
+	for (size_t i = 0; i < known->n_solvers; i++) {
+		const quern_section_of *one = &known->solvers[i];
+		if (!one->section || strcmp(one->section, it->entry->key) != 0) continue;
 		if (found) {
 			quern_report_add(s->report, it->entry->mark,
 				"section %s is claimed by solver.%s and solver.%s: say which, %s: {solver: %s, ...}",
-				it->entry->key, found, known[i].solver, it->entry->key, found);
+				it->entry->key, found, one->solver, it->entry->key, found);
 			return NULL;
 		}
-		found = known[i].solver;
+		found = one->solver;
 	}
 	return found;
 }
@@ -158,12 +165,12 @@ static void choose(parts *p, const quern_node *root) {
 
 /* ---- in which order ---- */
 
-static bool waits_for(parts *p, const char *const *names) {
+static part *waited_for(parts *p, const char *const *names) {
 	for (; names && *names; names++) {
-		const part *other = find(p, *names);
-		if (other && other->kept && other->file && !other->read) return true;
+		part *other = find(p, *names);
+		if (other && other->kept && other->file && !other->read) return other;
 	}
-	return false;
+	return NULL;
 }
 
 /* The first by name of those that wait for nobody, so that the order in the file does not matter. */
@@ -175,10 +182,21 @@ static part *next(parts *p, part **stuck) {
 		if (!it->kept || !it->file || it->read) continue;
 		const quern_solver_ops *ops = it->file->plugin.ops;
 		*stuck = it;
-		if (waits_for(p, ops->needs) || waits_for(p, ops->with) || waits_for(p, ops->after)) continue;
+		if (waited_for(p, ops->needs) || waited_for(p, ops->after)) continue;
 		if (!best || strcmp(it->entry->key, best->entry->key) < 0) best = it;
 	}
 	return best;
+}
+
+/* Following who waits for whom, as often as there are sections, one ends in the circle. */
+static part *in_circle(parts *p, part *it) {
+	for (size_t k = 0; k < p->n; k++) {
+		const quern_solver_ops *ops = it->file->plugin.ops;
+		part *next = waited_for(p, ops->needs);
+		if (!next) next = waited_for(p, ops->after);
+		if (next) it = next;
+	}
+	return it;
 }
 
 /* Without what it lives on, only the absence of that is worth a message. */
@@ -200,6 +218,7 @@ static bool lacks(const parts *p, const part *it) {
 static void read_all(parts *p) {
 	for (part *it, *stuck; (it = next(p, &stuck)) || stuck;) {
 		if (!it) {
+			stuck = in_circle(p, stuck);
 			quern_report_add(p->scene->report, stuck->entry->mark,
 				"section %s waits for another one that waits for it: their solvers contradict each other",
 				stuck->entry->key);
@@ -216,16 +235,23 @@ static void read_all(parts *p) {
 /* ---- what is left ---- */
 
 static void refuse_stillness(quern_scene *s, quern_mark mark) {
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(s->loader, &n);
+	const quern_catalogue *known = quern_loader_catalogue(s->loader);
 	quern_text names = { 0 };
 	for (size_t i = 0; i < s->n_sections; i++)
 		if (quern_solver_steps(s->sections[i].ops)) return;
-	for (size_t i = 0; i < n; i++)
-		if (known[i].steps) quern_text_add(&names, "%s%s", names.length ? ", " : "", known[i].section);
+	for (size_t i = 0; i < known->n_solvers; i++)
+		if (quern_section_is_claimed(&known->solvers[i]) && known->solvers[i].steps)
+			quern_text_add(&names, "%s%s", names.length ? ", " : "", known->solvers[i].section);
 	quern_report_add(s->report, mark, "scene: nothing to simulate: add a section of these: %s",
 		names.length ? names.data : "none, since no solver is installed");
 	quern_text_finish(&names);
+}
+
+/* A key that nobody knows may be that of a solver which cannot be asked. */
+static bool has_strange_key(quern_scene *s, const quern_node *root) {
+	for (size_t i = 0; i < root->n; i++)
+		if (!is_key_of_scene(root->entries[i].key) && !is_section(s, &root->entries[i])) return true;
+	return false;
 }
 
 void quern_sections_read(quern_scene *s, quern_node *root) {
@@ -234,4 +260,5 @@ void quern_sections_read(quern_scene *s, quern_node *root) {
 	choose(&p, root);
 	read_all(&p);
 	if (!p.failed) refuse_stillness(s, root->mark);
+	if (has_strange_key(s, root)) quern_loader_report_unreadable(s->loader, s->report, root->mark);
 }

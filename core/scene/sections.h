@@ -4,6 +4,9 @@
 #pragma once
 #include "scene.h"
 
+/* Whether a solver has a section of its own that is no key of the scene's. */
+bool quern_section_is_claimed(const quern_section_of *);
+
 /* Keys of the scene's root that are sections, or lists that rows do not describe, or observers; NULL-terminated, free() it. */
 const char **quern_sections_known(quern_scene *, const quern_node *root);
 

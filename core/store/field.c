@@ -6,11 +6,6 @@
 
 enum { CHUNK = 4096 };
 
-uint8_t quern_components(uint8_t shape, uint32_t dim) {
-	static const uint8_t planar[] = { 0, 1, 2, 1, 3, 4, 1, 1 }, spatial[] = { 0, 1, 3, 3, 6, 9, 1, 1 };
-	return shape > QUERN_ID ? 0 : (dim == 2 ? planar : spatial)[shape];
-}
-
 size_t quern_field_bytes(const quern_field *field) { return field->shape == QUERN_INDEX ? 4 : 8; }
 
 const char *quern_set_plural(const quern_set_store *set) {

@@ -44,7 +44,6 @@ typedef struct quern_store {
 	uint64_t version; /* grows whenever a column may have moved */
 } quern_store;
 
-uint8_t quern_components(uint8_t shape, uint32_t dim);
 size_t quern_field_bytes(const quern_field *); /* of one component of one entry */
 
 /* A set as people call it: its plural. */

@@ -184,13 +184,20 @@ static void mark_settles(quern_plan *p) {
 	}
 }
 
+/* Until the release a step consists of the stages that settle; the set-up and what is made for frames come as ever. */
+static bool acts_before_release(const quern_plan_stage *stage) {
+	return stage->settles || stage->phase == QUERN_SETUP || stage->phase == QUERN_OUTPUT;
+}
+
 static void mark_swaps_and_zeros(quern_plan *p) {
-	bool *zeroed = quern_take(p->store.n_fields, sizeof(bool));
+	bool *zeroed = quern_take(p->store.n_fields, sizeof(bool)),
+		 *settled = quern_take(p->store.n_fields, sizeof(bool));
 	for (size_t o = 0; o < p->n_stages; o++) {
 		quern_plan_stage *stage = &p->stages[p->order[o]];
 		stage->swaps = quern_take(p->store.n_fields + 1, sizeof(int));
 		stage->zeros = quern_take(p->store.n_fields + 1, sizeof(int));
-		size_t swaps = 0, zeros = 0;
+		stage->zeros_settling = quern_take(p->store.n_fields + 1, sizeof(int));
+		size_t swaps = 0, zeros = 0, n = 0;
 		for (size_t k = 0; k < p->store.n_fields; k++) {
 			const quern_field *field = &p->store.fields[k];
 			const int s = p->order[o], f = (int)k;
@@ -198,10 +205,13 @@ static void mark_swaps_and_zeros(quern_plan *p) {
 				stage->swaps[swaps++] = f;
 			if (!field->local && !zeroed[k] && stage_has(p, s, f, adds))
 				stage->zeros[zeros++] = f, zeroed[k] = true;
+			if (acts_before_release(stage) && !field->local && !settled[k] && stage_has(p, s, f, adds))
+				stage->zeros_settling[n++] = f, settled[k] = true;
 		}
-		stage->swaps[swaps] = stage->zeros[zeros] = -1;
+		stage->swaps[swaps] = stage->zeros[zeros] = stage->zeros_settling[n] = -1;
 	}
 	free(zeroed);
+	free(settled);
 }
 
 void quern_plan_order(quern_plan *p) {

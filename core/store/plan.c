@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "order.h"
 #include "text.h"
+#include <quern/columns.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,6 +14,19 @@ static bool slot_filled(const quern_section *section, const char *slot) {
 	for (size_t k = 0; k < section->n_slots; k++)
 		if (!strcmp(section->slots[k].slot->name, slot)) return section->slots[k].n > 0;
 	return false;
+}
+
+/* Names of groups in frames and checkpoints: each is there once, and checkpoints have two of their own. */
+static void check_name(const quern_plan *p, const quern_section *section, const char *name) {
+	static const char *const own[] = { "plugins", "stepped", NULL };
+	bool taken = false;
+	for (size_t k = 0; own[k]; k++) taken = taken || !strcmp(own[k], name);
+	for (size_t k = 0; k < p->store.n_sets; k++)
+		taken = taken || !strcmp(p->store.sets[k].name, name) ||
+				!strcmp(quern_set_plural(&p->store.sets[k]), name);
+	if (taken)
+		quern_report_add(p->scene->report, section->mark, "%s: there is another set that is called %s",
+			section->name, name);
 }
 
 static void add_set(quern_plan *p, const char *name, const quern_set *table, bool grid) {
@@ -28,8 +42,12 @@ static void gather_sets(quern_plan *p) {
 	add_set(p, "cell", NULL, true);
 	for (size_t i = 0; i < p->scene->n_sections; i++) {
 		const quern_section *section = &p->scene->sections[i];
-		for (const quern_set *set = section->ops->sets; set && set->name; set++)
-			if (!set->slot || slot_filled(section, set->slot)) add_set(p, set->name, set, set->rows != 0);
+		for (const quern_set *set = section->ops->sets; set && set->name; set++) {
+			if (set->slot && !slot_filled(section, set->slot)) continue;
+			check_name(p, section, set->name);
+			if (set->plural && strcmp(set->plural, set->name) != 0) check_name(p, section, set->plural);
+			add_set(p, set->name, set, set->rows != 0);
+		}
 	}
 }
 
@@ -122,7 +140,7 @@ static quern_plan_bound *add_bound(quern_plan *p, const quern_slot *slot, const 
 	const quern_instance *it = f->instance;
 	b->uses = caller ? quern_table_uses_for(&it->file->table, caller->library) : NULL;
 	b->bound = (quern_bound) { .self = it->self,
-		.ops = it->ops,
+		.ops = f->ops,
 		.item = f->item,
 		.uses = b->uses ? b->uses : it->file->uses,
 		.n_uses = (uint32_t)it->file->n_uses,
@@ -199,7 +217,7 @@ static quern_field *add_field(quern_plan *p, const quern_plan_use *u) {
 		.set = set_of(p, u->field),
 		.target = -1,
 		.shape = u->row->shape,
-		.n_components = quern_components(u->row->shape, (uint32_t)p->scene->general.dimension),
+		.n_components = (uint8_t)quern_shape_size(u->row->shape, (uint32_t)p->scene->general.dimension),
 		.initial = u->row->initial };
 	snprintf(field->name, sizeof field->name, "%s", u->field);
 	return field;
@@ -207,13 +225,14 @@ static quern_field *add_field(quern_plan *p, const quern_plan_use *u) {
 
 /* A field of a section that this scene goes without, as one does that keeps one model alone. */
 static bool section_left_out(const quern_plan *p, const char *field) {
-	size_t n;
-	const quern_section_of *known = quern_loader_sections(p->scene->loader, &n);
+	const quern_catalogue *known = quern_loader_catalogue(p->scene->loader);
 	const size_t length = strcspn(field, ".");
 	bool usual = !strncmp(field, "cell.", 5); /* the host's own, where there is a grid */
-	for (size_t i = 0; i < n; i++)
-		for (size_t k = 0; k < known[i].n_sets; k++)
-			usual = usual || (!strncmp(known[i].sets[k], field, length) && !known[i].sets[k][length]);
+	for (size_t i = 0; i < known->n_solvers; i++)
+		for (size_t k = 0; k < known->solvers[i].n_sets; k++) {
+			const char *set = known->solvers[i].sets[k];
+			usual = usual || (!strncmp(set, field, length) && !set[length]);
+		}
 	return usual && (set_of(p, field) < 0 || !quern_scene_is_whole(p->scene));
 }
 
@@ -445,6 +464,7 @@ void quern_plan_destroy(quern_plan *p) {
 		free(p->stages[i].column);
 		free(p->stages[i].swaps);
 		free(p->stages[i].zeros);
+		free(p->stages[i].zeros_settling);
 	}
 	free(p->bounds);
 	free(p->observers);

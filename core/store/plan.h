@@ -24,7 +24,8 @@ typedef struct quern_plan_stage {
 	bool sometimes, settles;
 	size_t first_use, n_uses; /* its own rows in plan->uses */
 	quern_column *column;
-	int *swaps, *zeros; /* fields to swap after, to zero before; -1 ends */
+	int *swaps, *zeros;  /* fields to swap after, to zero before; -1 ends */
+	int *zeros_settling; /* to zero before, until the release */
 	double seconds;
 } quern_plan_stage;
 

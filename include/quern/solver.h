@@ -26,7 +26,8 @@ typedef enum {
 } quern_phase;
 
 /* rows: 0 for struct of arrays; 8 for one 64-byte row per grid node, whose lanes are the components of the set's
- * fields in the order in which the owner's stages first name them. A set may hang on a slot: then it exists only
+ * fields in the order in which the owner's stages first name them; column.real[0] of such a field is where its first lane
+ * of entry 0 lies, and the next entry's is 8 numbers on. A set may hang on a slot: then it exists only
  * while that slot is filled. Sets "total" (one entry) and, on the grid, "cell" belong to the host. */
 typedef struct quern_set {
 	const char *name, *doc, *slot;
@@ -107,8 +108,9 @@ typedef struct quern_solver_ops {
 	const char *section;
 	const char *const *needs; /* sections without which this one has nothing to do */
 	const char *const *with;  /* sections that `model` keeps beside this one where the scene has them */
-	const char *const *after; /* other sections that are read first: what they publish is there */
-	const quern_set *sets;    /* NULL-name terminated, like what follows */
+	const char *const
+		*after; /* sections that are read first, as those of `needs` are: what they publish is there */
+	const quern_set *sets; /* NULL-name terminated, like what follows */
 	const quern_slot *slots;
 	const quern_stage *stages;
 	const quern_output *sums; /* what `account` gives; solvers that give the same name mean the same */

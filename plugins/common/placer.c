@@ -50,12 +50,9 @@ static int32_t wrapped(const placer *p, uint32_t k, int32_t c) {
 }
 static int32_t cell_of(const placer *p, uint32_t k, quern_real x) { return wrapped(p, k, cell_at(p, k, x)); }
 
-/* Whoever places a grain may have gone round a periodic domain. */
-static quern_spot at_home(const placer *p, const quern_spot *s) {
-	quern_spot home = *s;
-	for (uint32_t k = 0; k < p->dim; k++)
-		if (p->periodic[k]) home.x[k] = quern_brought_back(s->x[k], p->lower[k], p->lower[k] + p->length[k]);
-	return home;
+/* Of any image: whoever places a grain may have gone round a periodic domain. */
+static quern_real nearest_image(const placer *p, uint32_t k, quern_real d) {
+	return p->periodic[k] ? d - p->length[k] * floor(d / p->length[k] + 0.5) : d;
 }
 
 static void link_spot(placer *p, uint32_t i) {
@@ -85,7 +82,7 @@ static void grow(placer *p) {
 void quern_placer_add(placer *p, const quern_spot *s) {
 	if (p->n == p->cap) grow(p);
 	if (p->failed) return;
-	p->spot[p->n] = at_home(p, s);
+	p->spot[p->n] = *s;
 	link_spot(p, p->n++);
 }
 
@@ -93,7 +90,7 @@ void quern_placer_add(placer *p, const quern_spot *s) {
 static quern_real distance2(const placer *p, const quern_spot *a, const quern_spot *b) {
 	quern_real d2 = 0;
 	for (uint32_t k = 0; k < p->dim; k++) {
-		const quern_real d = quern_image(a->x[k] - b->x[k], p->half[k], p->length[k]);
+		const quern_real d = nearest_image(p, k, a->x[k] - b->x[k]);
 		d2 += d * d;
 	}
 	return d2;
@@ -120,9 +117,8 @@ static bool meets_body(const placer *p, const quern_spot *s) {
  * axis two offsets may name the same cell; looking twice does no harm. */
 bool quern_placer_free(const placer *p, const quern_spot *s) {
 	const int depth = p->dim == 3 ? 1 : 0;
-	const quern_spot home = at_home(p, s);
 	int32_t middle[3] = { 0 };
-	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, home.x[k]);
+	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, s->x[k]);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
@@ -130,7 +126,7 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 				int32_t c[3] = { 0 };
 				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i])
-					if (overlaps(p, &home, &p->spot[i])) return false;
+					if (overlaps(p, s, &p->spot[i])) return false;
 			}
 	return !meets_body(p, s);
 }
@@ -138,10 +134,9 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real share,
 	bool (*counts)(const void *arg, int32_t), const void *arg, quern_real *by) {
 	const int depth = p->dim == 3 ? 1 : 0;
-	const quern_spot home = at_home(p, s);
 	int32_t middle[3] = { 0 }, worst = -1;
 	*by = share;
-	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, home.x[k]);
+	for (uint32_t k = 0; k < p->dim; k++) middle[k] = cell_at(p, k, s->x[k]);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
@@ -149,7 +144,7 @@ int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real shar
 				int32_t c[3] = { 0 };
 				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i]) {
-					const quern_real overlap = overlap_of(p, &home, &p->spot[i]);
+					const quern_real overlap = overlap_of(p, s, &p->spot[i]);
 					if (overlap > *by && (!counts || counts(arg, i))) *by = overlap, worst = i;
 				}
 			}
@@ -177,7 +172,7 @@ uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const que
 					for (uint32_t k = 0; k < p->dim; k++) {
 						if (cell_of(p, k, s.x[k]) != c[k]) near = false; /* another cell of the same hash */
 						const quern_real middle = 0.5 * (lower[k] + upper[k]);
-						s.x[k] = middle + quern_image(s.x[k] - middle, p->half[k], p->length[k]);
+						s.x[k] = middle + nearest_image(p, k, s.x[k] - middle);
 						near = near && s.x[k] >= lower[k] - reach && s.x[k] <= upper[k] + reach;
 					}
 					if (!near) continue;

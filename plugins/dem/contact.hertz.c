@@ -40,14 +40,6 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
-/* The kept force, laid into the tangent plane of now; in 2-D its part along the tangent (-n_y, n_x) is kept. */
-QUERN_INLINE quern_vec force_before(const int dim, const quern_contact_batch *b, quern_real *const *history,
-	uint32_t i, quern_vec n, quern_real dt) {
-	if (dim == 2) return QUERN_VALUE(quern_vec, -n.y * history[0][i], n.x * history[0][i], 0);
-	const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { history[0][i], history[1][i], history[2][i] };
-	return quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
-}
-
 QUERN_INLINE void kernel(
 	const int dim, const bool rough, const bool energy, const hertz *self, const quern_contact_batch *b) {
 	const hertz law = *self;
@@ -59,7 +51,9 @@ QUERN_INLINE void kernel(
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim);
 		const quern_real vn = quern_vec_dot(v, n, dim);
-		const quern_real d = overlap[i] > 0 ? overlap[i] : 0, root = __builtin_sqrt(d);
+		/* "touches" is written d > 0 below: one truth value for all of it is what gcc does not vectorise */
+		const bool touching = overlap[i] > 0;
+		const quern_real d = touching ? overlap[i] : 0, root = __builtin_sqrt(d);
 		const quern_real r = __builtin_sqrt(radius[i]), k = 4.0 / 3 * law.modulus * r, elastic = k * d * root;
 		const quern_onset onset = quern_first_touch(overlap[i], -vn, dt, 0.25);
 		/* f_n = max(0, k d^(3/2) - sqrt 5 zeta sqrt(m k) d^(1/4) v_n) */
@@ -77,12 +71,17 @@ QUERN_INLINE void kernel(
 			const quern_real shrink = kt < kt_before ? kt / (kt_before > 0 ? kt_before : 1) : 1;
 			const quern_real stiffness = 0.5 * (kt + kt_before);
 			const quern_real loss = tangential_loss * __builtin_sqrt(kt * mass[i]) * onset.weight;
-			const quern_vec was = force_before(dim, b, history, i, n, dt);
+			quern_vec was, now, drag;
+			if (dim == 3) {
+				const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3),
+								old = { history[0][i], history[1][i], history[2][i] };
+				was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
+			} else was = (quern_vec) { -n.y * history[0][i], n.x * history[0][i], 0 };
 			const quern_vec trial = quern_vec_axpy(onset.time * stiffness, vt, quern_vec_scale(shrink, was));
 			const quern_vec g = quern_vec_scale(loss, vt);
 			const quern_cone cone = quern_cone_shares(trial, g, law.friction * fn);
-			const quern_vec now = quern_vec_scale(d > 0 ? cone.spring : 0, trial);
-			const quern_vec drag = quern_vec_scale(d > 0 ? cone.damper : 0, g);
+			now = quern_vec_scale(d > 0 ? cone.spring : 0, trial);
+			drag = quern_vec_scale(d > 0 ? cone.damper : 0, g);
 			if (dim == 3) QUERN_VEC_PUT(history, i, now, 3);
 			else history[0][i] = n.x * now.y - n.y * now.x;
 			f = quern_vec_sub(f, quern_vec_add(now, drag));

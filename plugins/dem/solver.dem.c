@@ -431,8 +431,8 @@ static quern_status accept(const void *self, const quern_step *s) {
 
 static const char *const with[] = { "bodies", NULL };
 
-static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .with = with, .sets = sets,
-	.slots = slots, .stages = stages, .sums = sums, .ready = ready, .limit = limit,
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .with = with, .after = with,
+	.sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready, .limit = limit,
 	.settled = quern_dem_settled, .account = account, .settling = quern_dem_settling, .accept = accept };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,

@@ -39,7 +39,9 @@ static void geometry(const forces_shared *sh, forces_work *w, const contact_chun
 		.velocity = { w->velocity[0], w->velocity[1], w->velocity[2] } };
 	ops->closest(bound->self, &batch);
 	for (uint32_t q = 0; q < c->n; q++) {
-		w->overlap[q] = -w->overlap[q];
+		const quern_real gap =
+			w->overlap[q]; /* a feature that is elsewhere may say infinity: no arm is as long */
+		w->overlap[q] = gap < 1e100 ? -gap : -1e100;
 		w->arm[0][q] = w->radius[q] - 0.5 * w->overlap[q];
 	}
 }

@@ -164,8 +164,8 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 static const char *const needs[] = { "grains", "continuum", NULL }, *const with[] = { "bodies", NULL };
 
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "hybrid", .needs = needs, .with = with,
-	.sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready, .substeps = substeps,
-	.account = account };
+	.after = with, .sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready,
+	.substeps = substeps, .account = account };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -202,7 +202,7 @@ static quern_status accept(const void *self, const quern_step *s) {
 		s->run, QUERN_E_NUMERIC, NULL, -1, "point.position holds a position far outside of the domain");
 }
 
-static const char *const with[] = { "bodies", NULL }, *const after[] = { "grains", NULL };
+static const char *const with[] = { "bodies", NULL }, *const after[] = { "bodies", "grains", NULL };
 
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum", .with = with,
 	.after = after, .sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready,

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no
- * tension. docs/theory/materials.md, section 4 What is kept is small where strains are, J - 1 and dev b of the
- * isochoric strain b, so that the yield stress is met to round-off at any pressure; b = dev b + t I follows from det
- * b = 1. */
+ * tension. docs/theory/materials.md, section 4
+ *
+ * What is kept is small where strains are, J - 1 and dev b of the isochoric strain b, so that the yield stress is met to
+ * round-off at any pressure; b = dev b + t I follows from det b = 1. */
 #include "../common/rotation.h"
 #include <quern/material.h>
 #include <quern/math.h>

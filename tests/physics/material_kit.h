@@ -2,9 +2,9 @@
 /* material_kit - materials without a scene: points in columns, tensors in long double to check them with, and random
  * states that are the same everywhere */
 #pragma once
-#include <quern/material.h>
 #include "plugin_alone.h"
 #include "table.h"
+#include <quern/material.h>
 
 enum { POINTS = 10000, COLUMNS = 19, FIELDS = 4 };
 enum { MU_I, DRUCKER_PRAGER, ELASTIC, MATERIALS };

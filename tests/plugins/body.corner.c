@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* body.corner - two planes that meet, feature 0 and feature 1: what lies behind either is inside. For tests. */
-#include <quern/body.h>
 #include <math.h>
+#include <quern/body.h>
 #include <quern/vec.h>
 
 typedef struct {

@@ -62,8 +62,8 @@ static void put(
 	const quern_account a = quern_run_account(h->run);
 	beyond_row("%s | %d | %s | %.1e | %.2f ... %.2f | %+.2f | %+.4f | %+.4f | %.3f | %.0e | %u, %u", packer,
 		seed, when, b->kinetic, b->lowest, b->highest, (held_top(h) - top) / diameter, b->carried,
-		quern_account_of(&a, "mass") / mass - 1, b->entries, quern_account_of(&a, "defect"), harness_count(h->run, "grain"),
-		harness_count(h->run, "point"));
+		quern_account_of(&a, "mass") / mass - 1, b->entries, quern_account_of(&a, "defect"),
+		harness_count(h->run, "grain"), harness_count(h->run, "point"));
 }
 
 static void judge(const limits *l, const book *b, double lost, double defect) {

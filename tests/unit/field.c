@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Sets and fields: reordering carries every column, indices follow their target, and who lost it goes. */
+#include <quern/columns.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -29,7 +30,7 @@ static void add_field(quern_store *s, const char *name, int set, uint8_t shape, 
 	*f = (quern_field) { .set = set,
 		.target = target,
 		.shape = shape,
-		.n_components = quern_components(shape, 2),
+		.n_components = (uint8_t)quern_shape_size(shape, 2),
 		.initial = initial };
 	snprintf(f->name, sizeof f->name, "%s", name);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Memory that runs out while a set is reordered: whichever allocation fails, the store can still be looked at. */
+#include <quern/columns.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -70,7 +71,8 @@ static void open_store(quern_store *s) {
 	};
 	memcpy(s->fields, fields, sizeof fields);
 	s->n_fields = FIELDS;
-	for (int f = 0; f < FIELDS; f++) s->fields[f].n_components = quern_components(s->fields[f].shape, 2);
+	for (int f = 0; f < FIELDS; f++)
+		s->fields[f].n_components = (uint8_t)quern_shape_size(s->fields[f].shape, 2);
 }
 
 static void close_store(quern_store *s) {

@@ -132,6 +132,18 @@ typedef struct quern_list {
 	{ .name = NULL }
 #define QUERN_END_USES                                                                                       \
 	{ .field = NULL }
+/* A table of uses and the numbers of its rows, from one list: LIST(X) is a macro of lines
+ *   X(NAME, field, unit, access, shape, and designated members as wanted)
+ * QUERN_USE_ENUM(LIST); makes NAME the number of its row, and LIST_ROWS how many there are; QUERN_USE_ENUM_FROM counts
+ * on from the rows of another list. QUERN_USE_ROWS(LIST) is what the table consists of. */
+#define QUERN_USE_ENUM(LIST) enum { LIST(QUERN_USE_NAME) LIST##_ROWS }
+#define QUERN_USE_ENUM_FROM(FIRST, LIST) enum { LIST##_BEFORE = (FIRST)-1, LIST(QUERN_USE_NAME) LIST##_ROWS }
+#define QUERN_USE_ROWS(LIST)                                                                                 \
+	{ LIST(QUERN_USE_ROW) QUERN_END_USES }
+#define QUERN_USE_NAME(name, ...) name,
+#define QUERN_USE_ROW(name, ...) { QUERN_USE_MEMBERS(__VA_ARGS__) },
+#define QUERN_USE_MEMBERS(field_, unit_, access_, ...)                                                       \
+	.field = field_, .unit = unit_, .access = access_, .shape = __VA_ARGS__
 #endif
 
 /* ==== fields ==== */

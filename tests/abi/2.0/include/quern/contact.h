@@ -96,9 +96,9 @@ typedef struct quern_cone {
 	quern_real spring, damper; /* shares in [0, 1] */
 } quern_cone;
 
-/* Inside the cone both stay. Outside, the spring shrinks until |s a + b| = cap: to the largest such s, so that the total
- * keeps its side and changes smoothly. Where no s in [0, 1] brings it into the cone, the spring shrinks to where the total
- * is least, and both are clipped. The root is written without cancellation. */
+/* Inside the cone both stay. Outside, the spring shrinks until |s a + b| = cap: to the largest such s, so that the
+ * total keeps its side and changes smoothly. Where no s in [0, 1] brings it into the cone, the spring shrinks to
+ * where the total is least, and both are clipped. The root is written without cancellation. */
 QUERN_INLINE quern_cone quern_cone_shares(quern_vec a, quern_vec b, quern_real cap) {
 	const quern_vec sum = quern_vec_add(a, b);
 	const quern_real ab = quern_vec_dot(a, b, 3), aa = quern_vec_dot(a, a, 3), cc = cap * cap;

@@ -26,7 +26,8 @@ typedef enum {
 } quern_phase;
 
 /* rows: 0 for struct of arrays; 8 for one 64-byte row per grid node, whose lanes are the components of the set's
- * fields in the order in which the owner's stages first name them. A set may hang on a slot: then it exists only
+ * fields in the order in which the owner's stages first name them; column.real[0] of such a field is where its first lane
+ * of entry 0 lies, and the next entry's is 8 numbers on. A set may hang on a slot: then it exists only
  * while that slot is filled. Sets "total" (one entry) and, on the grid, "cell" belong to the host. */
 typedef struct quern_set {
 	const char *name, *doc, *slot;

@@ -41,7 +41,8 @@ QUERN_INLINE quern_real quern_vec_dot(quern_vec a, quern_vec b, int dim) {
 QUERN_INLINE quern_vec quern_vec_cross(quern_vec a, quern_vec b) {
 	return QUERN_VALUE(quern_vec, a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
-/* A row-major matrix times a vector, and its transpose times a vector: with a pose's turn, from body to scene and back. */
+/* A row-major matrix times a vector, and its transpose times a vector: with a pose's turn, from body to scene and
+ * back. */
 QUERN_INLINE quern_vec quern_vec_turn(const quern_real m[9], quern_vec a) {
 	return QUERN_VALUE(quern_vec, m[0] * a.x + m[1] * a.y + m[2] * a.z, m[3] * a.x + m[4] * a.y + m[5] * a.z,
 		m[6] * a.x + m[7] * a.y + m[8] * a.z);
