@@ -181,6 +181,10 @@ uint64_t quern_check_settings(const quern_check *c) {
 
 /* ---- instances ---- */
 
+static bool no_section(const quern_setup *setup, const char *section) {
+	(void)setup, (void)section;
+	return false;
+}
 static void no_publish(const quern_setup *setup, const char *name, const char *unit, quern_real value) {
 	(void)setup, (void)name, (void)unit, (void)value;
 }
@@ -191,6 +195,7 @@ const quern_host quern_check_init_services = { .abi = QUERN_ABI,
 	.fail = quern_scene_fail,
 	.random = quern_random,
 	.publish = no_publish,
+	.keeps = no_section,
 	.extension = no_extension };
 
 static void say_why(check_instance *it, const char *fallback) {

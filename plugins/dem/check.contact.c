@@ -156,10 +156,33 @@ static void clear_sums(const quern_check_kernel *k) {
 	}
 }
 
-static void next_step(quern_check_kernel *k) {
-	k->host->run(k, 512, false);
-	k->host->advance(k);
+/* A law that is bounded by the force of those before it finds such a force: that of a spring along the normal, without
+ * loss, whose half-period is 25 of the law's steps. */
+static void lean(const quern_check_kernel *k) {
+	const quern_contact_ops *ops = k->ops;
+	const double pace = 6.283185307179586 / (50 * step_of(k));
+	const double stiffness = ops->follows ? pace * pace * quern_check_given(k, MASS, 0)[0] : 0;
+	for (uint32_t i = 0; i < k->n && ops->follows; i++) {
+		const double overlap = fmax(quern_check_given(k, OVERLAP, 0)[i], 0);
+		for (uint32_t c = 0; c < k->dim; c++)
+			quern_check_given(k, FORCE, c)[i] = stiffness * overlap * quern_check_given(k, NORMAL, c)[i];
+		if (k->at[STORED] >= 0) quern_check_given(k, STORED, 0)[i] = 0.5 * stiffness * overlap * overlap;
+	}
+}
+
+static void begin_step(const quern_check_kernel *k) {
 	clear_sums(k);
+	lean(k);
+}
+
+static void act(quern_check_kernel *k) {
+	begin_step(k);
+	k->host->run(k, 512, false);
+}
+
+static void next_step(quern_check_kernel *k) {
+	act(k);
+	k->host->advance(k);
 }
 
 static quern_check_kernel *make(
@@ -169,6 +192,7 @@ static quern_check_kernel *make(
 	fill_pairs(k, 20);
 	k->dt = step_of(k);
 	for (int step = 0; step < 3; step++) next_step(k);
+	begin_step(k);
 	return k;
 }
 
@@ -201,8 +225,7 @@ static void exchange(quern_check_kernel *k) {
 static void reaction(quern_check_kernel *k, quern_check_kernel *other, quern_check_tally *t) {
 	exchange(other);
 	for (int step = 0; step < 8; step++) {
-		k->host->run(k, 512, false);
-		k->host->run(other, 512, false);
+		act(k), act(other);
 		for (uint32_t i = 0; i < k->n; i++) {
 			const double force = size_of(k, FORCE, k->dim, i) + 1e-30,
 						 couple = size_of(k, COUPLE, quern_check_axial(k->dim), i) + 1e-30;
@@ -218,23 +241,43 @@ static void reaction(quern_check_kernel *k, quern_check_kernel *other, quern_che
 						couple,
 					1e-10, "%u-D: the couple on the second body is not minus that on the first", k->dim);
 		}
-		k->host->advance(k), clear_sums(k);
-		k->host->advance(other), clear_sums(other);
+		k->host->advance(k), k->host->advance(other);
 	}
 }
 
 /* A law adds: what stood there stays. */
-static void addition(quern_check_kernel *k, quern_check_tally *t) {
-	k->host->run(k, 512, false);
+static void added_to(quern_check_kernel *k, int name, quern_check_tally *t) {
+	act(k);
 	quern_real *alone = k->host->memory(k->n, sizeof(quern_real));
-	memcpy(alone, quern_check_found(k, FORCE, 0), k->n * sizeof(quern_real));
-	for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, FORCE, 0)[i] = 3;
+	memcpy(alone, quern_check_found(k, name, 0), k->n * sizeof(quern_real));
+	begin_step(k);
+	for (uint32_t i = 0; i < k->n; i++) quern_check_given(k, name, 0)[i] += 3;
 	k->host->run(k, 512, false);
 	for (uint32_t i = 0; i < k->n; i++)
-		k->host->measure(t, fabs(quern_check_found(k, FORCE, 0)[i] - alone[i] - 3) / (fabs(alone[i]) + 3),
-			1e-14, "%u-D: the force is written over what another law has added", k->dim);
-	clear_sums(k);
+		k->host->measure(t, fabs(quern_check_found(k, name, 0)[i] - alone[i] - 3) / (fabs(alone[i]) + 3),
+			1e-14, "%u-D: the %s is written over what another law has added", k->dim,
+			k->host->column(k, k->at[name])->name);
 	free(alone);
+}
+
+static void addition(quern_check_kernel *k, quern_check_tally *t) {
+	added_to(k, FORCE, t);
+	if (k->at[COUPLE] >= 0) added_to(k, COUPLE, t);
+}
+
+/* Without a force of the laws before it, such a law gives nothing. */
+static void alone(quern_check_kernel *k, quern_check_tally *t) {
+	const quern_contact_ops *ops = k->ops;
+	if (!ops->follows) return;
+	clear_sums(k);
+	k->host->run(k, 512, false);
+	for (uint32_t i = 0; i < k->n; i++) {
+		const double force = size_of(k, FORCE, k->dim, i),
+					 couple = size_of(k, COUPLE, quern_check_axial(k->dim), i);
+		k->host->expect(t, force == 0 && couple == 0,
+			"%u-D: a force of %.3g N, a couple of %.3g N m where no law before it gives a force", k->dim,
+			force, couple);
+	}
 }
 
 static void apart(quern_check_kernel *k, quern_check_tally *t) {
@@ -246,7 +289,7 @@ static void apart(quern_check_kernel *k, quern_check_tally *t) {
 		quern_check_given(k, OVERLAP, 0)[i] = -reach - (i % 3 ? 1e-3 * radius : 0);
 	}
 	next_step(k);
-	k->host->run(k, 512, false);
+	act(k);
 	for (uint32_t i = 0; i < k->n; i++) {
 		const bool silent =
 			size_of(k, FORCE, k->dim, i) == 0 && size_of(k, COUPLE, quern_check_axial(k->dim), i) == 0;
@@ -272,9 +315,9 @@ static void apart(quern_check_kernel *k, quern_check_tally *t) {
 
 static void losses(quern_check_kernel *k, quern_check_tally *t) {
 	for (int step = 0; step < 8; step++) {
-		k->host->run(k, 512, false);
+		act(k);
 		for (uint32_t i = 0; i < k->n; i++) {
-			double power = 0, scale = 1e-300, speed = 0;
+			double power = 0, scale = 1e-300, speed = 0, turning = 0, spin = 0;
 			for (uint32_t c = 0; c < k->dim; c++) {
 				power += quern_check_found(k, DASHPOT, c)[i] * quern_check_given(k, VELOCITY, c)[i];
 				speed += fabs(quern_check_given(k, VELOCITY, c)[i]);
@@ -282,11 +325,19 @@ static void losses(quern_check_kernel *k, quern_check_tally *t) {
 			scale += speed * (size_of(k, FORCE, k->dim, i) + size_of(k, DASHPOT, k->dim, i));
 			k->host->measure(
 				t, power / scale, 1e-12, "%u-D: the dashpot drives the bodies, with %.3g W", k->dim, power);
+			for (uint32_t c = 0; k->at[DRAG_COUPLE] >= 0 && c < quern_check_axial(k->dim); c++) {
+				turning += quern_check_found(k, DRAG_COUPLE, c)[i] * quern_check_given(k, SPIN, c)[i];
+				spin += fabs(quern_check_given(k, SPIN, c)[i]);
+			}
+			scale = 1e-300 + spin * (size_of(k, COUPLE, quern_check_axial(k->dim), i) +
+										size_of(k, DRAG_COUPLE, quern_check_axial(k->dim), i));
+			k->host->measure(t, turning / scale, 1e-12,
+				"%u-D: the couple that damps drives the bodies, with %.3g W", k->dim, turning);
 			/* what a normal spring stores may be negative: grains that attract each other */
 			k->host->expect(t, quern_check_found(k, SHEARED, 0)[i] >= 0,
 				"%u-D: a tangential spring stores %.3g J", k->dim, quern_check_found(k, SHEARED, 0)[i]);
 		}
-		k->host->advance(k), clear_sums(k);
+		k->host->advance(k);
 	}
 }
 
@@ -378,6 +429,8 @@ static void keep_books(const quern_check_kernel *k, uint32_t i, impact *p) {
 						quern_check_found(k, SHEARED, 0)[i] + p->lost;
 	for (uint32_t c = 0; c < k->dim; c++)
 		p->lost -= k->dt * quern_check_found(k, DASHPOT, c)[i] * quern_check_given(k, VELOCITY, c)[i];
+	for (uint32_t c = 0; k->at[DRAG_COUPLE] >= 0 && c < quern_check_axial(k->dim); c++)
+		p->lost -= k->dt * quern_check_found(k, DRAG_COUPLE, c)[i] * quern_check_given(k, SPIN, c)[i];
 	p->lost += quern_check_found(k, RUBBED, 0)[i];
 	if (!(held <= p->most)) p->most = held;
 }
@@ -480,7 +533,7 @@ static void homogeneous(const quern_check *c, const quern_check_instance *it, qu
 }
 
 typedef struct {
-	quern_check_tally reacts, adds, silent, lost, whole, limits, books, scaled;
+	quern_check_tally reacts, adds, silent, lost, whole, limits, books, scaled, follows;
 } tallies;
 
 static void try_instance(const quern_check *c, const quern_check_instance *it, tallies *t) {
@@ -493,6 +546,7 @@ static void try_instance(const quern_check *c, const quern_check_instance *it, t
 	constants(k[0], &t->limits);
 	reaction(k[0], k[1], &t->reacts);
 	addition(k[0], &t->adds);
+	alone(k[0], &t->follows);
 	losses(k[0], &t->lost);
 	apart(k[0], &t->silent);
 	c->host->kernel_destroy(k[0]), c->host->kernel_destroy(k[1]);
@@ -504,7 +558,8 @@ static void law(const quern_check *c) {
 	tallies t = { { .name = "action and reaction" }, { .name = "laws add up" },
 		{ .name = "silence when apart" }, { .name = "dashpots only take" },
 		{ .name = "impacts gain no energy" }, { .name = "period, stiffness, reach" },
-		{ .name = "books of energy" }, { .name = "homogeneous in (stiffness, mass)" } };
+		{ .name = "books of energy" }, { .name = "homogeneous in (stiffness, mass)" },
+		{ .name = "nothing without a force" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it) try_instance(c, it, &t);
@@ -514,6 +569,7 @@ static void law(const quern_check *c) {
 	c->host->tell(c, &t.reacts, NULL);
 	c->host->tell(c, &t.adds, NULL);
 	c->host->tell(c, &t.silent, NULL);
+	if (t.follows.tried) c->host->tell(c, &t.follows, NULL);
 	c->host->tell(c, &t.lost, NULL);
 	c->host->tell(c, &t.whole, NULL);
 	c->host->tell(c, &t.books, NULL);

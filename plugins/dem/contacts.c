@@ -108,9 +108,11 @@ QUERN_INLINE void add_forces(const forces_work *w, uint32_t first, uint32_t last
 	else add_2d(w, first, last, n, spin, weighted, paired);
 }
 
-/* From `lane` of the rows on. */
-static void add_couples(const forces_work *w, const quern_real *weight, quern_real (*row)[8], uint32_t lane,
+/* Couples have rows of their own, with what damps from lane 3 on: a sum that took a chunk's torques and then its couples
+ * would depend on where chunks are cut. */
+static void add_couples(const forces_work *w, const quern_real *weight, uint32_t lane,
 	quern_real *const couple[3], uint32_t first, uint32_t last, uint32_t n, uint32_t turns, bool paired) {
+	quern_real(*row)[8] = w->couple_row;
 	for (uint32_t q = 0; q < n; q++) {
 		const uint32_t i = row_of(w->first[q], first, last), j = row_of(w->second[q], first, last);
 		const quern_real share = weight ? weight[q] : 1;
@@ -134,16 +136,24 @@ QUERN_INLINE void add_all(const forces_shared *sh, const forces_work *w, const c
 	else if (weight) add_forces(w, first, last, c->n, dim, spin, true, paired, false);
 	else add_forces(w, first, last, c->n, dim, spin, false, paired, false);
 	if (!spin || !sh->couple) return;
-	add_couples(w, weight, w->row, (uint32_t)dim, w->couple, first, last, c->n, turns, paired);
-	if (sh->books)
-		add_couples(w, weight, dim == 2 ? w->row : w->drag_row, dim == 2 ? LANE_DRAG + 2 : 3, w->drag_couple,
-			first, last, c->n, turns, paired);
+	add_couples(w, weight, 0, w->couple, first, last, c->n, turns, paired);
+	if (sh->books) add_couples(w, weight, 3, w->drag_couple, first, last, c->n, turns, paired);
 }
 
 QUERN_INLINE void add_both(
 	const forces_shared *sh, const forces_work *w, const contact_chunk *c, const int dim, const bool spin) {
 	if (c->body < 0) add_all(sh, w, c, dim, spin, true);
 	else add_all(sh, w, c, dim, spin, false);
+}
+
+void quern_dem_fold_couples(const forces_shared *sh, const forces_work *w, uint32_t n) {
+	const uint32_t dim = sh->s->dim, turns = dim == 3 ? 3 : 1;
+	for (uint32_t i = 0; i < n && w->couple_row && sh->spin; i++)
+		for (uint32_t k = 0; k < turns; k++) {
+			w->row[i][dim + k] += w->couple_row[i][k];
+			if (sh->books && dim == 2) w->row[i][LANE_DRAG + 2] += w->couple_row[i][3];
+			if (sh->books && dim == 3) w->drag_row[i][3 + k] += w->couple_row[i][3 + k];
+		}
 }
 
 /* ---- the chunk ---- */

@@ -79,6 +79,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	for (uint32_t r = 0; r < integrator->n_uses && sh->looks; r++)
 		carve_columns(&c, w->own[r], quern_shape_size(integrator->uses[r].shape, dim), GRAINS);
 	w->row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
+	if (sh->couple) w->couple_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	if (sh->books && dim == 3) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	return c.used + 64;
 }
@@ -96,9 +97,11 @@ static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	const uint32_t n = sh->grain[b + 1] - sh->grain[b];
 	quern_real *sums = sh->sums + (size_t)b * N_ENERGIES;
 	memset(w.row, 0, ((size_t)n + 1) * sizeof *w.row);
+	if (w.couple_row) memset(w.couple_row, 0, ((size_t)n + 1) * sizeof *w.row);
 	if (w.drag_row) memset(w.drag_row, 0, ((size_t)n + 1) * sizeof *w.row);
 	if (sh->contact) quern_dem_pairs(sh, &w, b, sums);
 	if (sh->touch) quern_dem_touches(sh, &w, b, sums);
+	quern_dem_fold_couples(sh, &w, n);
 	quern_dem_integrate(sh, &w, b, sums);
 	if (sh->checks) quern_dem_check_grains(sh, b);
 }

@@ -69,7 +69,8 @@ typedef struct forces_work {
 		*drag_torque[3];
 	law_row *rows; /* of all laws, one after the other */
 	int32_t *first, *second, *slot, *feature;
-	quern_real (*row)[8], (*drag_row)[8]; /* per grain of the block, one more for partners outside */
+	/* per grain of the block, one more for partners outside; couples, and from lane 3 on what of them damps */
+	quern_real (*row)[8], (*drag_row)[8], (*couple_row)[8];
 	quern_real *grains[N_GRAIN_COLUMNS];
 	quern_real *own[QUERN_MOST_USES][9]; /* of the integrator, while nothing moves */
 } forces_work;
@@ -91,6 +92,8 @@ void quern_dem_integrate(const forces_shared *, forces_work *, uint32_t b, quern
 /* ---- contacts.c ---- */
 /* Of a chunk whose geometry and motion are known. */
 void quern_dem_act(const forces_shared *, forces_work *, const contact_chunk *, quern_real *sums);
+/* Couples of n grains join the torques in their rows. */
+void quern_dem_fold_couples(const forces_shared *, const forces_work *, uint32_t n);
 /* What springs hold, by entry of the list from `begin` on, if anybody asks. */
 quern_real *quern_dem_held(const forces_shared *, int row, uint32_t begin);
 /* ---- laws.c ---- */

@@ -233,6 +233,15 @@ static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32
 	d->reach = reach > d->reach ? reach : d->reach;
 }
 
+/* A law that is bounded by the force of those before it in the list does nothing where there are none. */
+static quern_status refuse_order(const quern_setup *setup, const quern_bound *law, quern_err *err) {
+	return setup->host->fail(err, QUERN_E_PARAM, "contact",
+		"%s does nothing at the head of the list: it is bounded by the normal force of the laws before it; "
+		"put one "
+		"that pushes there, such as linear",
+		law->id);
+}
+
 /* A random packing's bulk modulus, from the affine estimates of docs/theory/grains.md, section 5, with what real
  * packings reach of them: 0.3 k_n for discs, 0.6 of z phi k_n / (3 pi D) for spheres (z = 5). */
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
@@ -241,6 +250,8 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	quern_real kn = 0, most = 0;
 	if (d->settles && !n_slot[SLOT_CONTACT])
 		return refuse_settling(d, setup, err, "without a contact law grains fall for ever: give contact one");
+	if (n_slot[SLOT_CONTACT] && ((const quern_contact_ops *)slot[SLOT_CONTACT][0].ops)->follows)
+		return refuse_order(setup, &slot[SLOT_CONTACT][0], err);
 	d->features = false;
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section
- * 5 */
+ * 6 */
 #include "../common/radius.h"
 #include "observers.h"
 #include <quern/observer.h>

@@ -16,7 +16,8 @@ static const double gravity = 9.81, radius = 1e-3, resistance = 0.05;
 
 /* A sphere is a hundredth as heavy as the same disc of one metre; softer laws let both lie as deep. */
 static double stiffness(int dim) { return dim == 2 ? 1e4 : 100; } /* N/m */
-#define ROLLING "{rolling: {stiffness: %g, damping: %g, friction: 0.05}}"
+#define ROLLING "{rolling: {stiffness: %g, damping: 0.001, friction: 0.05%s}}"
+static const char *twisting(int dim) { return dim == 3 ? ", twisting_friction: 0.05" : ""; }
 
 /* A disc or a sphere that rolls over a plane without slipping is slowed down by mu_r g m/(m + I/r^2), two thirds or five
  * sevenths of mu_r g. In 3-D it rolls askew to the axes. */
@@ -35,7 +36,7 @@ static void rolling_slows_down(void **state) {
 			"  place: [{position: %s, velocity: %s, spin: %s}]}}\n",
 			dim, dim == 2 ? "[0, -9.81]" : "[0, 0, -9.81]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
 			dim == 2 ? "[1, 0.1]" : "[1, 1, 0.1]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
-			dim == 2 ? "[0, 1]" : "[0, 0, 1]", radius, stiffness(dim), stiffness(dim), 1e-6 * stiffness(dim),
+			dim == 2 ? "[0, 1]" : "[0, 0, 1]", radius, stiffness(dim), stiffness(dim), twisting(dim),
 			dim == 2 ? "[0.01, 0.000993]" : "[0.01, 0.01, 0.000999]", dim == 2 ? "[0.5, 0]" : "[0.4, 0.3, 0]",
 			dim == 2 ? "[-500, 0]" : "[-300, 400, 0]");
 		harness_until(run, 0.05); /* it has found its depth by then */
@@ -71,8 +72,7 @@ static quern_run *pair(int dim, const char *observe) {
 		"  place: [{position: %s, spin: %s}, {position: %s, radius: 0.7 mm, spin: %s}]}}\n",
 		dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
 		dim == 2 ? "[0.02, 0.02]" : "[0.02, 0.02, 0.02]", observe, stiffness(dim), stiffness(dim),
-		1e-6 * stiffness(dim), dim == 2 ? "[0.01, 0.01]" : "[0.01, 0.01, 0.01]",
-		dim == 2 ? "[3, 0]" : "[1, -2, 3]",
+		twisting(dim), dim == 2 ? "[0.01, 0.01]" : "[0.01, 0.01, 0.01]", dim == 2 ? "[3, 0]" : "[1, -2, 3]",
 		dim == 2 ? "[0.01169, 0.01]" : "[0.0109757, 0.0109757, 0.0109757]",
 		dim == 2 ? "[-20, 0]" : "[4, 5, -6]");
 }
@@ -134,7 +134,7 @@ static double budget_gap(int dim, int n) {
 		"  place: [{position: %s, velocity: %s}, {position: %s, radius: 0.7 mm, spin: %s}]}}\n",
 		dim, dim == 2 ? "[0, -9.81]" : "[0, 0, -9.81]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
 		dim == 2 ? "[0.05, 0.02]" : "[0.05, 0.02, 0.02]", step, dim == 2 ? "[0, 0]" : "[0, 0, 0]",
-		dim == 2 ? "[0, 1]" : "[0, 0, 1]", stiffness(dim), stiffness(dim), 1e-6 * stiffness(dim),
+		dim == 2 ? "[0, 1]" : "[0, 0, 1]", stiffness(dim), stiffness(dim), twisting(dim),
 		dim == 2 ? "[0.01, 0.001001]" : "[0.01, 0.01, 0.001001]", dim == 2 ? "[0.06, 0]" : "[0.06, 0.01, 0]",
 		dim == 2 ? "[0.013, 0.0008]" : "[0.013, 0.0101, 0.0008]", dim == 2 ? "[20, 0]" : "[5, 20, 10]");
 	static const char *const parts[] = { "total.kinetic", "total.potential", "total.stored", "total.sheared",

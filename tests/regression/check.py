@@ -47,7 +47,7 @@ def check_templates():
     return stated
 
 
-LINEAR, VERLET = "dem/contact.linear.c", "dem/integrator.velocity_verlet.c"
+LINEAR, ROLLS, VERLET = "dem/contact.linear.c", "dem/contact.rolling.c", "dem/integrator.velocity_verlet.c"
 FORCE = "b->force[0][i] += f.x;"
 ADD = "static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }"
 
@@ -97,6 +97,21 @@ BROKEN = [
     ("keeps what it has stored", "contact", [("b->stored[i] +=", "b->stored[i] += 1e-6 +")], "silence when apart"),
     ("has a stiffness of its own", "contact", [("? p.stiffness * overlap[i]", "? (p.stiffness + 100) * overlap[i]")],
      "homogeneous in (stiffness, mass)"),
+    ("turns the second otherwise", ROLLS, [("-= radius[i] * f;", "-= radius[i] * (f < 0 ? 1.001 * f : f);")],
+     "action and reaction"),
+    ("drives what rolls", ROLLS, [("-= radius[i] * f;", "+= radius[i] * f;")], "impacts gain no energy"),
+    ("rolls against nothing", ROLLS, [("pushed > 0 ? pushed : 0), &spring", "pushed > 0 ? pushed + 1e-3 : 1e-3), &spring")],
+     "nothing without a force"),
+    ("has a cone of its own", ROLLS, [("pushed > 0 ? pushed : 0), &spring", "pushed > 0 ? pushed / (1 + pushed) : 0), &spring")],
+     "homogeneous in (stiffness, mass)"),
+    ("writes its couple over others", ROLLS, [("-= radius[i] * f;", "= -radius[i] * f;")], "laws add up"),
+    ("is driven by what damps rolling", ROLLS, [("-= radius[i] * (f - k * now);", "+= radius[i] * (f - k * now);")],
+     "dashpots only take"),
+    ("stores what it rubs", ROLLS, [("sheared[i] += 0.5 * k * now * now;", "sheared[i] += 50 * k * now * now;")],
+     "books of energy"),
+    ("drives what twists", ROLLS, [('normal force; 0: twists freely; 3-D.", .max = 10)', 'normal force; 0: twists freely; 3-D.", .def = 0.5, .max = 10)'),
+                                   ("axpy(-r * all, n, couple)", "axpy(r * all, n, couple)"),
+                                   ('(setup->dim == 2 && law->twisting_friction > 0)', "(0)")], "impacts gain no energy"),
     ("does not turn", "mpm_hypo/material.elastic.c", [
         ("const tensor l = TENSOR_AT(b->gradient, i, dim);",
          "tensor l = TENSOR_AT(b->gradient, i, dim); l.xy = l.yx = 0.5 * (l.xy + l.yx);")], "rotation"),

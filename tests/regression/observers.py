@@ -133,8 +133,44 @@ def nothing_moves(place):
     assert s["mass_initial"] == 0 and s["mass_defect"] == 0 and s["discrete_share"] == 0, s
 
 
+FLOWS = "[{packing_fraction: {region: {box: {lower: [0, 0], upper: [0.02, 0.02]}}}}, coordination, " \
+    "{coordination: {rattlers: false, label: bearing}}, {granular_temperature: {region: {box: {lower: [0.5, 0.2], upper: [0.6, 0.3]}}, " \
+    "label: nowhere}}, granular_temperature, {flux: {at: 0.03}}, {flux: {axis: 1, at: 0.02, label: down}}, repose, mass]"
+
+
+def flows(place):
+    """Grains alone, a continuum alone and a hybrid, each with all of them: finite, plausible, the same for any threads and
+    batches, and after a resume."""
+    options = [*lab.SMALL["column"], "--set=time.end=30 ms", "--set=output.every=5 ms", "--set=grains.settle.energy=0.02",
+               f"--set=observe={FLOWS}"]
+    for model in ("grains", "continuum", "all"):
+        more = [] if model == "all" else [f"--set=model={model}"]
+        # a continuum alone knows no density of grains
+        more += [f"--set=observe={FLOWS.replace('{region', '{grain_density: 2500, region', 1)}"] if model == "continuum" else []
+        one, other = place / f"{model}_1", place / f"{model}_3"
+        lab.run("column", one, *options, *more)
+        lab.run("column", other, *options, *more, "--set=run.batch=8", threads=3)
+        assert (one / "series.csv").read_bytes() == (other / "series.csv").read_bytes(), model
+        header, rows = lab.series(one)
+        last = dict(zip([name.split(" ")[0] for name in header], rows[-1]))
+        has_grains, has_points = model != "continuum", model != "grains"
+        assert 0.4 < last["packing_fraction.fraction"] < 1, last
+        assert (last["packing_fraction.grains"] > 0) == has_grains and (last["packing_fraction.points"] > 0) == has_points, last
+        assert (last["coordination.number"] > 1) == has_grains and last["bearing.number"] >= last["coordination.number"], last
+        assert (last["granular_temperature.temperature"] > 0) == has_grains, last
+        assert last["nowhere.temperature"] == last["nowhere.grains"] == 0, last
+        assert rows[0][header.index("flux.mass [kg/s]")] == 0 and last["flux.mass"] > 0 and last["down.mass"] < 0, last
+        assert (last["flux.grains"] != 0) == has_grains and (last["down.points"] != 0) == has_points, last
+        assert -1.2 < last["repose.angle"] < 0.1 and last["repose.columns"] > 5, last
+        half = place / f"{model}_2"
+        lab.run("column", half, *options, *more, "--until=12 ms")
+        lab.run("column", half, *options, *more, resume=True)
+        assert (one / "series.csv").read_bytes() == (half / "series.csv").read_bytes(), f"{model}, resumed"
+    print("packing, contacts, temperature, fluxes and slope of grains, of a continuum and of a hybrid")
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
         place = pathlib.Path(name)
-        for test in (objects, labels, many, finite, nothing_moves):
+        for test in (objects, labels, many, finite, nothing_moves, flows):
             test(place)
