@@ -39,7 +39,9 @@ typedef struct quern_contact_batch {
 } quern_contact_batch;
 
 typedef struct quern_contact_ops {
-	uint32_t size, pad;
+	/* follows 1: what it gives is bounded by the force of the laws before it in the list; a solver refuses such a law where
+	 * none stands before it, since it would do nothing */
+	uint32_t size, follows;
 	void (*force[2])(const void *self, const quern_contact_batch *); /* [batch] [0] 2-D, [1] 3-D */
 	/* [setup] s, half the shortest undamped period of a contact over all its modes: pi/omega */
 	quern_real (*period)(const void *self, uint32_t dim, quern_real mass, quern_real radius);
