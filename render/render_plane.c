@@ -203,25 +203,47 @@ static bool is_there(const quern_section *bodies, const quern_filling *body) {
 	return !row || !body->item || quern_param_number(row, body->item) != 1;
 }
 
+/* The distance to one body, in pixels, of every pixel; returns the least. */
+static float distances_to(
+	const render_style *s, const quern_filling *body, int width, int height, float *distance) {
+	float least = INFINITY;
+	for (int y = 0; y < height; y++)
+		for (int begin = 0; begin < width; begin += RUN) {
+			_Alignas(64) double gap[RUN];
+			gaps(s, body, y, begin, gap);
+			for (int i = 0; i < RUN && begin + i < width; i++) {
+				float *at = &distance[(size_t)y * (size_t)width + (size_t)(begin + i)];
+				*at = (float)(gap[i] * s->view->scale);
+				least = fminf(least, *at);
+			}
+		}
+	return least;
+}
+
+/* What is there but thinner than a line is drawn as one: bounded, since of other bodies only the rim may be in sight. */
+static float thickening(const render_style *s, const quern_filling *body, float least) {
+	quern_real lower[3] = { 0 }, upper[3] = { 0 };
+	const float half = 0.75f * (float)s->line;
+	((const quern_body_ops *)body->instance->ops)->bounds(body->instance->self, 2, lower, upper);
+	for (int k = 0; k < 2; k++)
+		if (!isfinite(lower[k]) || !isfinite(upper[k])) return 0;
+	return least > -half && least < 1 ? half : 0;
+}
+
 /* The distance to the nearest body, in pixels, of every pixel. */
 static float *distances(const render_style *s, int width, int height) {
 	const quern_section *bodies = s->frame->scene ? quern_scene_section(s->frame->scene, "bodies") : NULL;
+	const size_t n = (size_t)width * (size_t)height;
 	if (!bodies || !bodies->n_slots) return NULL;
-	float *nearest = quern_take((size_t)width * (size_t)height, sizeof(float));
-	for (size_t i = 0; i < (size_t)width * (size_t)height; i++) nearest[i] = INFINITY;
+	float *nearest = quern_take(n, sizeof(float)), *one = quern_take(n, sizeof(float));
+	for (size_t i = 0; i < n; i++) nearest[i] = INFINITY;
 	for (size_t b = 0; b < bodies->slots[0].n; b++) {
 		const quern_filling *body = &bodies->slots[0].filling[b];
 		if (!is_there(bodies, body)) continue;
-		for (int y = 0; y < height; y++)
-			for (int begin = 0; begin < width; begin += RUN) {
-				_Alignas(64) double gap[RUN];
-				gaps(s, body, y, begin, gap);
-				for (int i = 0; i < RUN && begin + i < width; i++) {
-					float *at = &nearest[y * width + begin + i];
-					*at = fminf(*at, (float)(gap[i] * s->view->scale));
-				}
-			}
+		const float more = thickening(s, body, distances_to(s, body, width, height, one));
+		for (size_t i = 0; i < n; i++) nearest[i] = fminf(nearest[i], one[i] - more);
 	}
+	free(one);
 	return nearest;
 }
 

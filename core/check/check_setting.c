@@ -114,6 +114,29 @@ static void put_choice(const quern_param *row, uint32_t index, choice how, uint6
 
 static void put_rows(const check *, uint32_t dim, const quern_param *rows, uint64_t setting, quern_node *map);
 
+/* Corners of something: on a circle, none like another. */
+static void put_corner(const check *c, uint32_t dim, const quern_param *row, double turn, quern_node *item) {
+	const double size = quern_check_ordinary(&c->open, row->unit);
+	quern_node *vector = quern_node_put_list(item, row->name);
+	for (uint32_t k = 0; k < dim; k++) {
+		char text[32];
+		quern_number(within(row, size * (1 + sin(turn + 1.5 * k))), text);
+		quern_node_append(vector, text);
+	}
+}
+
+/* As few items as the row allows. */
+static void put_list(const check *c, uint32_t dim, const quern_param *row, quern_node *map) {
+	const uint32_t n = bounded(row) && row->min > 1 ? (uint32_t)ceil(row->min) : 1;
+	const bool corners = n > 1 && row->rows->type == QUERN_T_VECTOR && !row->rows[1].name;
+	quern_node *list = quern_node_put_list(map, row->name);
+	for (uint32_t i = 0; i < n; i++) {
+		quern_node *item = quern_node_append_map(list);
+		if (corners) put_corner(c, dim, row->rows, 6.283185307179586 * i / n, item);
+		else put_rows(c, dim, row->rows, 0, item);
+	}
+}
+
 static void put_row(const check *c, uint32_t dim, const quern_param *row, uint32_t index, choice how,
 	uint64_t key, quern_node *map) {
 	switch (row->type) {
@@ -133,8 +156,7 @@ static void put_row(const check *c, uint32_t dim, const quern_param *row, uint32
 		if (needs_a_value(row)) quern_node_put_quoted(map, row->name, "check");
 		break;
 	case QUERN_T_LIST:
-		if (needs_a_value(row) || how == HIGH)
-			put_rows(c, dim, row->rows, 0, quern_node_append_map(quern_node_put_list(map, row->name)));
+		if (needs_a_value(row) || how == HIGH) put_list(c, dim, row, map);
 		break;
 	default: break;
 	}

@@ -89,11 +89,21 @@ static json_t *text_schema(const quern_param *row) {
 }
 
 static json_t *map_schema(const quern_param *rows);
+static json_t *value_schema(const quern_param *row);
 
 static json_t *list_schema(const quern_param *row) {
 	json_t *item = map_schema(row->rows);
+	const bool vectors = row->rows->name && !row->rows[1].name && row->rows->type == QUERN_T_VECTOR;
+	if (vectors)
+		item = json_pack("{s:[o, o]}", "anyOf", item, value_schema(row->rows)); /* or the vector alone */
 	json_t *list = json_pack("{s:s, s:O}", "type", "array", "items", item);
-	return json_pack("{s:[o, o]}", "anyOf", item, list);
+	if (row->min != row->max && isfinite(row->max)) {
+		json_object_set_new(list, "minItems", json_integer((json_int_t)row->min));
+		json_object_set_new(list, "maxItems", json_integer((json_int_t)row->max));
+	}
+	if (row->min == row->max || row->min <= 1) return json_pack("{s:[o, o]}", "anyOf", item, list);
+	json_decref(item);
+	return list;
 }
 
 static json_t *words_schema(const quern_param *row) {
@@ -104,7 +114,9 @@ static json_t *words_schema(const quern_param *row) {
 
 static json_t *value_schema(const quern_param *row) {
 	switch (row->type) {
-	case QUERN_T_INT: return row->choices ? words_schema(row) : number_schema(row);
+	case QUERN_T_INT:
+		if (row->text) return json_pack("{s:[o, {s:s}]}", "anyOf", number_schema(row), "type", "string");
+		return row->choices ? words_schema(row) : number_schema(row);
 	case QUERN_T_BOOL: return defined("switch");
 	case QUERN_T_TEXT: return text_schema(row);
 	case QUERN_T_VECTOR:

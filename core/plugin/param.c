@@ -208,9 +208,57 @@ static bool read_number(const quern_reading *r, const char *owner, const quern_p
 	return false;
 }
 
+/* The names that somebody has published as "SET.NAME", NULL-terminated. */
+static const char **names_of(const quern_reading *r, const char *set, size_t *n) {
+	const char **names = NULL;
+	size_t capacity = 0;
+	*n = 0;
+	for (size_t i = 0; i < r->n_published; i++)
+		if (is_prefix(set, r->published[i].name)) {
+			names = quern_grow(names, *n + 1, &capacity, sizeof *names);
+			names[(*n)++] = r->published[i].name + strlen(set) + 1;
+		}
+	names = quern_grow(names, *n, &capacity, sizeof *names);
+	names[*n] = NULL;
+	return names;
+}
+
+static void refuse_name(
+	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node) {
+	size_t n;
+	const char **names = names_of(r, row->text, &n);
+	const char *near = quern_nearest(node->text, names);
+	quern_text cure = { 0 };
+	if (near) quern_text_add(&cure, "did you mean '%s'?", near);
+	else if (!n) quern_text_add(&cure, "give one this name, or its number here");
+	for (size_t i = 0; i < n && !near; i++)
+		quern_text_add(&cure, "%s%s", i ? ", " : "these have a name: ", names[i]);
+	/* whoever has that name may have stopped at a fault of its own */
+	quern_report_follow(r->report, node->mark, "%s: %s: no %s is called '%s'; %s", owner, row->name,
+		row->text, node->text, quern_text_string(&cure));
+	quern_text_finish(&cure);
+	free(names);
+}
+
+/* A word in the place of a number: what somebody has published under it. False if there is no word. */
+static bool read_name(const quern_reading *r, const char *owner, const quern_param *row,
+	const quern_node *node, int32_t *member) {
+	if (!row->text || node->kind != QUERN_NODE_SCALAR || !quern_is_name(node->text)) return false;
+	for (size_t i = 0; i < r->n_published; i++) {
+		const quern_published *p = &r->published[i];
+		if (!is_prefix(row->text, p->name) || strcmp(p->name + strlen(row->text) + 1, node->text) != 0)
+			continue;
+		*member = (int32_t)p->value;
+		return true;
+	}
+	refuse_name(r, owner, row, node);
+	return true;
+}
+
 static void read_int(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, int32_t *member) {
 	double value;
+	if (read_name(r, owner, row, node, member)) return;
 	if (row->choices) {
 		int32_t k = 0;
 		char say[64];
@@ -282,6 +330,32 @@ static const char *read_text(
 	return kept;
 }
 
+/* A list whose items have but one key, a vector, takes the vector alone for an item: [[0, 0], [1, 0]]. */
+static const quern_param *bare_vector(const quern_param *rows) {
+	return rows && rows->name && !rows[1].name && rows->type == QUERN_T_VECTOR ? rows : NULL;
+}
+
+static void read_item(const quern_reading *r, const char *owner, const quern_param *rows,
+	const quern_node *item, const char *const *also, void *instance) {
+	const quern_param *bare = bare_vector(rows);
+	if (bare && item->kind != QUERN_NODE_MAP) {
+		quern_entry one = {
+			.key = (char *)(uintptr_t)bare->name, .value = (quern_node *)(uintptr_t)item, .mark = item->mark
+		};
+		const quern_node map = { .kind = QUERN_NODE_MAP, .mark = item->mark, .entries = &one, .n = 1 };
+		quern_params_read(r, owner, rows, &map, item->mark, also, instance);
+	} else quern_params_read(r, owner, rows, item, item->mark, also, instance);
+}
+
+static void check_length(
+	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node, uint32_t n) {
+	char range[96];
+	if (!node || in_range(row, n)) return;
+	quern_param_range(row, range);
+	quern_report_add(r->report, node->mark, "%s: %s has %u item%s, must have %s", owner, row->name, n,
+		n == 1 ? "" : "s", range);
+}
+
 static void read_list(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, const char *const *also, quern_list *list) {
 	const bool many = node && node->kind == QUERN_NODE_LIST;
@@ -293,10 +367,10 @@ static void read_list(const quern_reading *r, const char *owner, const quern_par
 	list->n = !node ? 0 : many ? (uint32_t)node->n : 1;
 	list->item_size = row->item_size;
 	list->items = quern_take(list->n, row->item_size);
+	check_length(r, owner, row, node, list->n);
 	for (uint32_t i = 0; i < list->n; i++) {
 		const quern_node *item = many ? node->entries[i].value : node;
-		quern_params_read(
-			r, name, row->rows, item, item->mark, inner, (char *)list->items + (size_t)i * row->item_size);
+		read_item(r, name, row->rows, item, inner, (char *)list->items + (size_t)i * row->item_size);
 	}
 	free(name);
 }

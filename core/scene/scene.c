@@ -82,7 +82,7 @@ void quern_scene_publish(const quern_setup *setup, const char *name, const char 
 		if (!strcmp(s->published[i].name, name))
 			return; /* the first to know is right: in the order of reading */
 	s->published = quern_grow(s->published, s->n_published, &s->published_capacity, sizeof(quern_published));
-	s->published[s->n_published++] = (quern_published) { name, unit, value };
+	s->published[s->n_published++] = (quern_published) { quern_tree_keep(s->tree, name), unit, value };
 }
 
 bool quern_scene_keeps(const quern_setup *setup, const char *section) {

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <quern/body.h>
 #include <quern/solver.h>
+#include <stdio.h>
 
 enum { BODY_ALWAYS, BODY_SETTLING, BODY_RUNNING };
 enum { BOUNDARY_SLIP, BOUNDARY_STICKY, BOUNDARY_NONE };
@@ -12,7 +13,18 @@ typedef struct body_item {
 	int32_t when;        /* BODY_* */
 	int32_t boundary;    /* BOUNDARY_* on the continuum's grid */
 	quern_real friction; /* of the boundary; NaN: the choice above holds */
+	const char *name;    /* NULL: it has none */
 } body_item;
+
+enum { BODY_WORDS = 120 };
+
+/* What messages call body number i of the scene: "body 'floor', a body.plane", or by its number. */
+static inline const char *quern_body_say(const quern_bound *body, uint32_t i, char out[BODY_WORDS]) {
+	const char *name = ((const body_item *)body->item)->name;
+	if (name) snprintf(out, BODY_WORDS, "body '%.50s', a %.50s", name, body->id);
+	else snprintf(out, BODY_WORDS, "body %u, a %.50s", i, body->id);
+	return out;
+}
 
 QUERN_INLINE bool quern_body_is_there(const quern_bound *body, bool settling) {
 	const int32_t when = ((const body_item *)body->item)->when;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.bodies - walls and bodies: who is there, and what impulse each has given to the material */
 #include "bodies.h"
+#include <string.h>
 
 typedef struct {
 	int32_t unused;
@@ -18,6 +19,8 @@ static const quern_param rows[] = { QUERN_PARAM_AS(body_item, when, "while", "1"
 	QUERN_PARAM_AS(body_item, friction, "boundary.frictional", "1",
 		"Coulomb friction on the continuum's grid, in place of slip or sticky.", .flags = QUERN_MAYBE,
 		.min = 0, .max = 100),
+	QUERN_PARAM(body_item, name, NULL, "A word that messages call it by, and observers may: its own.",
+		.flags = QUERN_MAYBE),
 	QUERN_END_PARAMS };
 
 static const quern_set sets[] = {
@@ -42,11 +45,49 @@ static const quern_use place_uses[] = { { .field = "body.impulse",
 											.flags = QUERN_OPTIONAL },
 	QUERN_END_USES };
 
+enum { LONGEST_NAME = 40 };
+
+static const char *name_of(const quern_bound *body) { return ((const body_item *)body->item)->name; }
+
+static bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
+static bool is_word(const char *name) {
+	uint32_t n = 0;
+	for (; name[n]; n++)
+		if (n == LONGEST_NAME ||
+			!(is_letter(name[n]) || (n && (name[n] == '_' || (name[n] >= '0' && name[n] <= '9')))))
+			return false;
+	return n > 0;
+}
+
+/* Names are words of their own, published as the number of the body. */
+static quern_status name_body(const quern_setup *setup, const quern_bound *body, uint32_t i, quern_err *err) {
+	const char *name = name_of(&body[i]), *dot = strchr(body[i].id, '.');
+	char where[120], published[60];
+	snprintf(where, sizeof where, "%u.%.60s.name", i, dot ? dot + 1 : body[i].id);
+	if (!name) return QUERN_OK;
+	if (!is_word(name))
+		return setup->host->fail(err, QUERN_E_PARAM, where,
+			"'%.60s' is no name: it must be letters, digits and '_', beginning with a letter, at most %d of "
+			"them",
+			name, LONGEST_NAME);
+	for (uint32_t k = 0; k < i; k++)
+		if (name_of(&body[k]) && !strcmp(name_of(&body[k]), name))
+			return setup->host->fail(
+				err, QUERN_E_PARAM, where, "body %u is called '%s' already: give each its own name", k, name);
+	snprintf(published, sizeof published, "body.%s", name);
+	setup->host->publish(setup, published, "1", i);
+	return QUERN_OK;
+}
+
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
-	(void)self, (void)slot, (void)err;
+	(void)self;
 	setup->host->publish(setup, "bodies.count", "1", n_slot[0]);
-	return QUERN_OK;
+	quern_status status = QUERN_OK;
+	for (uint32_t i = 0; i < n_slot[0]; i++)
+		if (name_body(setup, slot[0], i, err) != QUERN_OK) status = QUERN_E_PARAM;
+	return status;
 }
 
 static quern_status place(const void *self, const quern_step *s) {

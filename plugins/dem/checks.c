@@ -87,10 +87,10 @@ void quern_dem_check_grains(const forces_shared *sh, uint32_t b) {
 
 static quern_status stop_deep(const forces_shared *sh, const deep_contact *c, const char *how) {
 	const quern_step *s = sh->s;
-	char partner[80], remedy[200] = "";
+	char partner[BODY_WORDS + 1], which[BODY_WORDS], remedy[200] = "";
 	if (c->second < 0)
-		snprintf(partner, sizeof partner, "body %lld, a %s,", -1 - (long long)c->second,
-			s->slot[SLOT_BODIES][-1 - c->second].id);
+		snprintf(partner, sizeof partner, "%s,",
+			quern_body_say(&s->slot[SLOT_BODIES][-1 - c->second], (uint32_t)(-1 - c->second), which));
 	else snprintf(partner, sizeof partner, "grain %lld", (long long)c->second);
 	if (c->stiffness > 0)
 		snprintf(remedy, sizeof remedy,

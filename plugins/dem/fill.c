@@ -156,10 +156,12 @@ static bool may_stand(const filling *f, const dem_place *grain, char why[WORDS])
 		if (!quern_body_is_there(body, f->d->settles)) continue;
 		const quern_real in = -quern_body_gap(body, s->dim, spot.x, spot.radius, NULL) / spot.radius;
 		if (!(in > (1 + 1e-9) * f->d->overlap_start)) continue;
-		if (in >= 1) snprintf(why, WORDS, "starts in body %u, a %s, with its centre", b, body->id);
+		char which[BODY_WORDS];
+		quern_body_say(body, b, which);
+		if (in >= 1) snprintf(why, WORDS, "starts in %s, with its centre", which);
 		else
-			snprintf(why, WORDS, "overlaps body %u, a %s, by %.2g of a radius; overlap.start allows %g", b,
-				body->id, in, f->d->overlap_start);
+			snprintf(why, WORDS, "overlaps %s, by %.2g of a radius; overlap.start allows %g", which, in,
+				f->d->overlap_start);
 		return false;
 	}
 	return true;

@@ -104,13 +104,13 @@ static quern_status clip(const quern_step *s, uint32_t *n) {
 		if (!quern_body_is_there(body, false) || (item->boundary == BOUNDARY_NONE && isnan(item->friction)))
 			continue;
 		const uint32_t found = mark_inside(s, body, *n, inside);
+		char which[BODY_WORDS];
+		quern_body_say(body, b, which);
 		if (found == *n)
-			return s->host->stop(
-				s->run, QUERN_E_PARAM, "fill", -1, "lies in body %u, a %s, with all its points", b, body->id);
+			return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1, "lies in %s, with all its points", which);
 		if (found)
-			s->host->log(s->run, 2,
-				"%u of %u points of continuum.fill lie in body %u, a %s, and are left out", found, *n, b,
-				body->id);
+			s->host->log(
+				s->run, 2, "%u of %u points of continuum.fill lie in %s, and are left out", found, *n, which);
 	}
 	for (uint32_t i = 0; i < *n; i++)
 		if (!inside[i]) from[kept++] = (int32_t)i;

@@ -9,7 +9,8 @@ typedef struct {
 	quern_real bodies; /* there are */
 } observer;
 static const quern_param params[] = { QUERN_PARAM(observer, body, "1",
-										  "Number of the body in the scene's list, from 0.", .max = 1e6),
+										  "Name of the body, or its number in the scene's list, from 0.",
+										  .text = "body", .max = 1e6),
 	QUERN_PARAM(observer, bodies, "1", "Bodies that there are.", .from = "bodies.count",
 		.flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),
 	QUERN_END_PARAMS };

@@ -108,8 +108,9 @@ typedef struct quern_solver_ops {
 	const char *section;
 	const char *const *needs; /* sections without which this one has nothing to do */
 	const char *const *with;  /* sections that `model` keeps beside this one where the scene has them */
-	const char *const *after; /* other sections that are read first: what they publish is there */
-	const quern_set *sets;    /* NULL-name terminated, like what follows */
+	const char *const
+		*after; /* sections that are read first, as those of `needs` are: what they publish is there */
+	const quern_set *sets; /* NULL-name terminated, like what follows */
 	const quern_slot *slots;
 	const quern_stage *stages;
 	const quern_output *sums; /* what `account` gives; solvers that give the same name mean the same */
