@@ -52,7 +52,7 @@ static int32_t cell_of(const placer *p, uint32_t k, quern_real x) { return wrapp
 
 /* Of any image: whoever places a grain may have gone round a periodic domain. */
 static quern_real nearest_image(const placer *p, uint32_t k, quern_real d) {
-	return p->periodic[k] ? d - p->length[k] * floor(d / p->length[k] + 0.5) : d;
+	return quern_image_far(d, p->periodic[k] ? p->length[k] : 0);
 }
 
 static void link_spot(placer *p, uint32_t i) {

@@ -2,6 +2,7 @@
 /* observer.flux - mass and momentum per second through a plane across an axis, between two observations */
 #include "observers.h"
 #include "region.h"
+#include <quern/space.h>
 
 typedef struct {
 	int32_t axis;
@@ -94,7 +95,7 @@ static int crossed(
 	for (uint32_t k = 0; k < dim; k++) {
 		if (!isfinite(from[k][i])) return 0;
 		way[k] = to[k][i] - from[k][i];
-		if (o->length[k] > 0) way[k] -= o->length[k] * floor(way[k] / o->length[k] + 0.5);
+		way[k] = quern_image_far(way[k], o->length[k]);
 	}
 	const uint32_t a = (uint32_t)o->axis;
 	const quern_real period = o->length[a], x = from[a][i], y = x + way[a];

@@ -52,6 +52,12 @@ QUERN_INLINE quern_real quern_image_at(quern_real x, quern_real origin, quern_re
 QUERN_INLINE quern_real quern_image(quern_real d, quern_real half, quern_real length) {
 	return quern_image_at(d, 0, half, length);
 }
+/* The same of any difference, however many lengths it is; length 0: not periodic. */
+QUERN_INLINE quern_real quern_image_far(quern_real d, quern_real length) {
+	if (!(length > 0)) return d;
+	const quern_real t = d / length + 0.5, down = (quern_real)(int64_t)t;
+	return d - length * (down - (t < down ? 1 : 0));
+}
 QUERN_INLINE quern_vec quern_vec_image(quern_vec d, quern_images p, int dim) {
 	return QUERN_VALUE(quern_vec, quern_image(d.x, p.half[0], p.length[0]),
 		quern_image(d.y, p.half[1], p.length[1]), dim == 3 ? quern_image(d.z, p.half[2], p.length[2]) : 0);
