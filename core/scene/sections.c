@@ -114,6 +114,10 @@ static const quern_solver_ops *solver_of(parts *p, part *it) {
 	if (!it->asked) {
 		quern_scene *s = p->scene;
 		const char *given = named_solver(it->entry->value);
+		const quern_node *said =
+			it->entry->value->kind == QUERN_NODE_MAP ? quern_node_find(it->entry->value, "solver") : NULL;
+		if (said && !given)
+			quern_report_add(s->report, said->mark, "%s: solver must be the name of one", it->entry->key);
 		const char *name = given ? given : default_solver(s, it);
 		const quern_mark mark = given ? quern_node_find(it->entry->value, "solver")->mark : it->entry->mark;
 		it->asked = true;
