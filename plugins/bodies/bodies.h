@@ -10,10 +10,11 @@ enum { BODY_ALWAYS, BODY_SETTLING, BODY_RUNNING };
 enum { BOUNDARY_SLIP, BOUNDARY_STICKY, BOUNDARY_NONE };
 
 typedef struct body_item {
-	int32_t when;        /* BODY_* */
-	int32_t boundary;    /* BOUNDARY_* on the continuum's grid */
-	quern_real friction; /* of the boundary; NaN: the choice above holds */
-	const char *name;    /* NULL: it has none */
+	int32_t when;         /* BODY_* */
+	int32_t boundary;     /* BOUNDARY_* on the continuum's grid */
+	quern_real friction;  /* of the boundary; NaN: the choice above holds */
+	const char *name;     /* NULL: it has none */
+	const char *material; /* a word; NULL: it has none */
 } body_item;
 
 enum { BODY_WORDS = 120 };

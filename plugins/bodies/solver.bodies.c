@@ -21,6 +21,9 @@ static const quern_param rows[] = { QUERN_PARAM_AS(body_item, when, "while", "1"
 		.min = 0, .max = 100),
 	QUERN_PARAM(body_item, name, NULL, "A word that messages call it by, and observers may: its own.",
 		.flags = QUERN_MAYBE),
+	QUERN_PARAM(body_item, material, NULL,
+		"What it is made of: one of the grains' materials, or a word of its own that stands in grains.pairs.",
+		.flags = QUERN_MAYBE),
 	QUERN_END_PARAMS };
 
 static const quern_set sets[] = {
