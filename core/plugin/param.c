@@ -33,6 +33,10 @@ static const quern_entry *walk(const quern_node *node, const char *name, quern_m
 		const size_t n = strcspn(name, ".");
 		snprintf(part, sizeof part, "%.*s", (int)n, name);
 		const quern_entry *entry = step_into(node, part);
+		if (!entry && !strncmp(name, "0.", 2)) { /* the one item of a list, given without brackets */
+			name += 2;
+			continue;
+		}
 		if (!entry || quern_node_is_null(entry->value)) return NULL;
 		if (mark) *mark = entry->value->mark;
 		if (!name[n]) return entry;
@@ -361,17 +365,19 @@ static void read_named(const quern_reading *r, const char *owner, const quern_pa
 	const quern_node *value = named->value;
 	const quern_param *bare = quern_param_bare(list);
 	const bool map = value->kind == QUERN_NODE_MAP, alone = !map && bare && !quern_node_is_null(value);
+	char say[64];
+	if (!map && !alone && !quern_node_is_null(value)) {
+		quern_report_add(r->report, value->mark, "%s: '%s' must be a map, not %s", owner, named->key,
+			quern_node_say(value, say));
+		return;
+	}
 	const quern_node name = {
 		.kind = QUERN_NODE_SCALAR, .quoted = true, .mark = named->mark, .text = named->key
 	};
 	quern_entry *entries = quern_take(value->n + 2, sizeof *entries);
 	quern_node item = { .kind = QUERN_NODE_MAP, .mark = named->mark, .entries = entries };
-	char say[64];
 	entries[item.n++] = entry_of(list->text, &name, named->mark);
 	if (alone) entries[item.n++] = entry_of(bare->name, value, value->mark);
-	else if (!map && !quern_node_is_null(value))
-		quern_report_add(r->report, value->mark, "%s: '%s' must be a map, not %s", owner, named->key,
-			quern_node_say(value, say));
 	for (size_t i = 0; map && i < value->n; i++) {
 		if (!strcmp(value->entries[i].key, list->text))
 			quern_report_add(r->report, value->entries[i].mark, "%s: '%s' has its %s already: its key", owner,

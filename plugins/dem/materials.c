@@ -192,7 +192,7 @@ static quern_status check_body(
 		used = used || !strcmp(name_in(d, i, 0), name) || !strcmp(name_in(d, i, 1), name);
 	if (used) return QUERN_OK;
 	return setup->host->fail(err, QUERN_E_PARAM, NULL,
-		"%s is of '%.60s', which is no material of grains and stands in none of grains.pairs; %s",
+		"%s, is of '%.60s', which is no material of grains and stands in none of grains.pairs; %s",
 		quern_body_say(&body[b], b, which), name, known(d, there));
 }
 

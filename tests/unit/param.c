@@ -242,7 +242,7 @@ static void named_items(void **state) {
 		assert_true(r.m.parts.n == 2 && r.m.words.n == 2 && isnan(r.m.alone));
 		assert_string_equal(parts[0].word, "sand");
 		assert_string_equal(parts[1].word, "rock");
-		assert_true(parts[0].share == 0.7 && parts[1].share == 0.3);
+		assert_true(fabs(parts[0].share - 0.7) < 1e-15 && fabs(parts[1].share - 0.3) < 1e-15);
 		assert_string_equal(words[0].word, "a");
 		assert_string_equal(words[1].word, "b");
 		forget(&r);
