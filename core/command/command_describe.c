@@ -133,7 +133,7 @@ static void print_param(const quern_param *row, int indent) {
 	if (*range) printf(", %s", range);
 	if (row->from) printf("; default: %s", row->from);
 	else if (row->flags & QUERN_REQUIRED)
-		printf("; required%s%s", row->unless ? " unless there is " : "", row->unless ? row->unless : "");
+		printf("; required%s%s", row->unless ? " without " : "", row->unless ? row->unless : "");
 	else if (row->choices) printf("; default: %s", row->choices[(int)row->def]);
 	else if (row->type == QUERN_T_BOOL) printf("; default: %s", row->def != 0 ? "true" : "false");
 	else if (row->type == QUERN_T_TEXT && row->text) printf("; default: %s", row->text);

@@ -132,7 +132,7 @@ TABLES = [
      "'a' has rows, so its type must be quern_list"),
     (library(param_size="0"), "rows of 0 and 64 bytes"), (library(param_size="1"), "rows of 1 and 64 bytes"),
     (library(param_size="1u << 30"), "rows of 1073741824 and 64 bytes"),
-    (library(use_size="0"), "rows of 104 and 0 bytes"), (library(use_size="63"), "rows of 104 and 63 bytes"),
+    (library(use_size="0"), "rows of 112 and 0 bytes"), (library(use_size="63"), "rows of 112 and 63 bytes"),
     (library(uses=f"[0 ... 39] = {{ {USE} }},"), "more than 32 uses"),
     (library(uses=f"[0 ... 999] = {{ {USE} }},"), "more than 32 uses"),
     (library(uses=f'{{ {USE}, .field = "slip" }},'), "'slip' is no SET.NAME"),

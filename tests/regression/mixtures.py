@@ -48,7 +48,7 @@ def check_tables():
     assert [row["name"] for row in rows["pairs"]["rows"]] == ["between"]
     assert next(slot for slot in told["slots"] if slot["name"] == "contact")["refine"] == "pairs"
     said = subprocess.run([lab.QUERN, "describe", "grains"], check=True, capture_output=True, text=True).stdout
-    assert "required unless there is materials" in said and "map or list" in said
+    assert "required without materials" in said and "map or list" in said
     print("plan and describe know materials and pairs")
 
 
