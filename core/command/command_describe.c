@@ -185,8 +185,9 @@ static void print_solver(const quern_solver_ops *ops) {
 	puts("\nslots");
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		if (s->same_as) continue;
-		printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", s->kind->name,
-			s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "");
+		printf("  %-16s %s: %s%s%s%s%s\n", *s->name ? s->name : "(the section)", s->kind->name,
+			s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "",
+			s->refine ? "; its keys may stand in the items of " : "", s->refine ? s->refine : "");
 		for (const quern_param *row = s->rows; row && row->name; row++) print_param(row, 6);
 	}
 	puts("\nstages");

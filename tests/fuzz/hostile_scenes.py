@@ -39,7 +39,6 @@ SMALL = {
                   "hybrid.oracle": [{"packing_fraction": {"depth": "8 mm", "half_width": "4 mm"}}]},
     "elastic_bar": {"time.end": 4},
     "incline": {"time.end": "40 ms"},
-    "mixture": {"time.end": "10 ms", "output.every": "2 ms"},
     "two_grains": {},
     "continuum": {"model": "continuum", "domain.upper": [0.1, 0.2], "time.end": "10 ms", "output.every": "2 ms",
                   "continuum.fill.region.box.upper": [0.04, 0.06]},
@@ -236,12 +235,6 @@ def change_material(tree, r):
         {"elastic": {"bulk_modulus": 10.0 ** r.uniform(2, 7), "poisson": 0.3, "density": 10.0 ** r.uniform(1, 5)}}])
 
 
-def change_pairs(tree, r):
-    words = [*tree["grains"].get("materials", {}), "rubber"]
-    pair = {"between": [r.choice(words), r.choice(words)], r.choice(["friction", "restitution", "stiffness"]): 10.0 ** r.uniform(-2, 8)}
-    tree["grains"].setdefault("pairs", []).append(pair)
-
-
 def change_fill(tree, r):
     corners = place_in(tree, r, 0.05), place_in(tree, r, 0.05)
     region = {"box": {"lower": list(map(min, *corners)), "upper": list(map(max, *corners))}}
@@ -257,7 +250,7 @@ def change_integrator(tree, r):
 
 
 CHANGES = {None: [add_plane, add_box, change_step, change_periodic, change_gravity],
-           "grains": [add_grain, change_contact, change_contact, change_integrator, change_fill, change_pairs],
+           "grains": [add_grain, change_contact, change_contact, change_integrator, change_fill],
            "continuum": [change_material, change_fill]}
 
 
