@@ -60,6 +60,8 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 	QUERN_PARAM(dem, features, NULL,
 		"Keep with every touch which feature of the body it is on; set by itself where bodies have several.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, moving, NULL, "Watch how far bodies have moved; set by itself where one does.",
+		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -253,6 +255,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	if (n_slot[SLOT_CONTACT] && ((const quern_contact_ops *)slot[SLOT_CONTACT][0].ops)->follows)
 		return refuse_order(setup, &slot[SLOT_CONTACT][0], err);
 	d->features = false;
+	d->moving = n_slot[SLOT_BODIES] && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
@@ -385,7 +388,11 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	if (isfinite(fast.period)) say_limit(&fast, &first, by_period, reason);
 	else snprintf(reason, 160, "grains without a contact law");
 	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
-	return by_period ? fast.period / 50 : 0.5 * first.hard;
+	const quern_real chosen = by_period ? fast.period / 50 : 0.5 * first.hard;
+	const quern_real speed = d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES) : 0;
+	if (!(0.1 * l.radius < speed * chosen)) return chosen;
+	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, l.radius);
+	return 0.1 * l.radius / speed;
 }
 
 enum { SUM_DISCRETE = SUM_OWN };

@@ -68,14 +68,14 @@ typedef struct {
 } near_points;
 
 /* Marks the points that lie in a body; returns how many were not marked before. */
-static uint32_t mark_inside(const quern_step *s, const quern_bound *body, uint32_t n, bool *inside) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+static uint32_t mark_inside(
+	const quern_step *s, const quern_bound *body, const quern_pose *pose, uint32_t n, bool *inside) {
 	near_points w = { .radius = { 0 } };
 	uint32_t found = 0;
 	for (uint32_t i = 0; i < n; i += CHUNK) {
 		const uint32_t m = n - i < CHUNK ? n - i : CHUNK;
 		quern_body_batch batch = {
-			.n = m, .cap = CHUNK, .dim = s->dim, .pose = &still, .radius = w.radius, .gap = w.gap
+			.n = m, .cap = CHUNK, .dim = s->dim, .pose = pose, .radius = w.radius, .gap = w.gap
 		};
 		for (uint32_t k = 0; k < s->dim; k++) {
 			batch.position[k] = s->use[FILL_POSITION].real[k] + i;
@@ -97,13 +97,14 @@ static quern_status clip(const quern_step *s, uint32_t *n) {
 	bool *inside = s->host->memory(s->run, (size_t)*n + 1);
 	int32_t *from = s->host->memory(s->run, ((size_t)*n + 1) * sizeof(int32_t));
 	uint32_t kept = 0;
-	if (!inside || !from) return QUERN_E_MEMORY;
+	const body_pose *pose = quern_body_poses_now(s, SLOT_BODIES);
+	if (!inside || !from || !pose) return QUERN_E_MEMORY;
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
 		const body_item *item = body->item;
 		if (!quern_body_is_there(body, false) || (item->boundary == BOUNDARY_NONE && isnan(item->friction)))
 			continue;
-		const uint32_t found = mark_inside(s, body, *n, inside);
+		const uint32_t found = mark_inside(s, body, &pose[b].pose, *n, inside);
 		char which[BODY_WORDS];
 		quern_body_say(body, b, which);
 		if (found == *n)
