@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "episodes.h"
 #include "param.h"
 #include "render.h"
 #include <math.h>
@@ -196,11 +197,22 @@ static void gaps(const render_style *s, const quern_filling *body, const quern_p
 	((const quern_body_ops *)body->instance->ops)->closest(body->instance->self, &batch);
 }
 
-/* A body that is there only while grains settle is gone in every frame. */
+/* A body that is there only while grains settle is gone in every frame; one that is never there too. */
 static bool is_there(const quern_section *bodies, const quern_filling *body) {
 	const quern_param *row = bodies->slots[0].slot->rows;
 	row = row ? quern_param_find(row, "while") : NULL;
-	return !row || !body->item || quern_param_number(row, body->item) != 1;
+	const double when = row && body->item ? quern_param_number(row, body->item) : 0;
+	return when != 1 && when != 3;
+}
+
+/* With the values of the scene's stage that led to the frame. */
+static const quern_section *bodies_of(const render_frame *f) {
+	const quern_scene *scene = f->scene;
+	if (!scene) return NULL;
+	int64_t k = quern_episode_at(scene, f->time);
+	if (k > 0 && scene->episodes[k].begin == f->time) k--;
+	if (k >= 0 && scene->episodes[k].scene) scene = scene->episodes[k].scene;
+	return quern_scene_section(scene, "bodies");
 }
 
 /* The distance to one body, in pixels, of every pixel; returns the least. */
@@ -234,7 +246,7 @@ static float thickening(const render_style *s, const quern_filling *body, float 
 
 /* The distance to the nearest body, in pixels, of every pixel. */
 static float *distances(const render_style *s, int width, int height) {
-	const quern_section *bodies = s->frame->scene ? quern_scene_section(s->frame->scene, "bodies") : NULL;
+	const quern_section *bodies = bodies_of(s->frame);
 	const size_t n = (size_t)width * (size_t)height;
 	if (!bodies || !bodies->n_slots) return NULL;
 	float *nearest = quern_take(n, sizeof(float)), *one = quern_take(n, sizeof(float));

@@ -40,7 +40,7 @@ extern "C" {
 #endif
 
 #define QUERN_ABI_MAJOR 2u
-#define QUERN_ABI_MINOR 0u
+#define QUERN_ABI_MINOR 1u
 #define QUERN_ABI (QUERN_ABI_MAJOR << 16 | QUERN_ABI_MINOR)
 #define QUERN_LANES 8u
 

@@ -86,6 +86,9 @@ typedef struct quern_step {
 	const uint32_t *n_slot;
 	const quern_host *host;
 	quern_run *run;
+	/* since 2.1: the step with which the present one of the scene's `stages` began, -1 where it has none; keys may have
+	 * other values from that step on */
+	int64_t stage_step;
 } quern_step;
 
 enum {

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { BODY_ALWAYS, BODY_SETTLING, BODY_RUNNING };
+enum { BODY_ALWAYS, BODY_SETTLING, BODY_RUNNING, BODY_NEVER };
 enum { BOUNDARY_SLIP, BOUNDARY_STICKY, BOUNDARY_NONE };
 
 typedef struct body_item {
@@ -28,7 +28,7 @@ static inline const char *quern_body_say(const quern_bound *body, uint32_t i, ch
 
 QUERN_INLINE bool quern_body_is_there(const quern_bound *body, bool settling) {
 	const int32_t when = ((const body_item *)body->item)->when;
-	return when == BODY_ALWAYS || (when == BODY_SETTLING) == settling;
+	return when == BODY_ALWAYS || (when != BODY_NEVER && (when == BODY_SETTLING) == settling);
 }
 
 /* Poses of all bodies of a slot, with the velocities of the time `rate`, until the stage returns; NULL: no memory. While

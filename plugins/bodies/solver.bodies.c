@@ -14,15 +14,16 @@ static const quern_param params[] = { QUERN_PARAM(bodies, moving, NULL,
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
-static const char *const whens[] = { "always", "settling", "running", NULL };
+static const char *const whens[] = { "always", "settling", "running", "never", NULL };
 static const char *const boundaries[] = { "slip", "sticky", "none", NULL };
 static const quern_param table_rows[] = { QUERN_PARAM(
 											  body_place, time, "s", "When.", .flags = QUERN_REQUIRED),
 	QUERN_PARAM(body_place, shift, "m", "How far it has come by then."),
 	QUERN_PARAM(body_place, angle, "rad", "How far it has turned by then."), QUERN_END_PARAMS };
-static const quern_param rows[] = { QUERN_PARAM_AS(body_item, when, "while", "1",
-										"When it is there; a gate is there while settling.",
-										.choices = whens),
+static const quern_param rows[] = {
+	QUERN_PARAM_AS(body_item, when, "while", "1",
+		"When it is there: a gate while settling, or until a stage of the scene says never.",
+		.choices = whens),
 	QUERN_PARAM(body_item, boundary, "1", "What it does to the continuum's grid.", .choices = boundaries),
 	QUERN_PARAM_AS(body_item, friction, "boundary.frictional", "1",
 		"Coulomb friction on the continuum's grid, in place of slip or sticky.", .flags = QUERN_MAYBE,
@@ -51,7 +52,8 @@ static const quern_param rows[] = { QUERN_PARAM_AS(body_item, when, "while", "1"
 		"When velocity, spin and sinus set in; until then it stands where it is.", .max = INFINITY),
 	QUERN_PARAM_AS(body_item, motion.until, "motion.until", "s", "When they end; then it stays where it is.",
 		.def = INFINITY, .max = INFINITY),
-	QUERN_END_PARAMS };
+	QUERN_END_PARAMS
+};
 
 static const quern_set sets[] = {
 	{ .name = "body", .plural = "bodies", .doc = "Walls and bodies, in the order of the scene." },
