@@ -41,14 +41,16 @@ static inline body_pose *quern_body_poses(
 		const body_motion *motion = &((const body_item *)s->slot[slot][b].item)->motion;
 		body_pivot pivot;
 		quern_motion_pivot(motion, &s->slot[slot][b], s->dim, &pivot);
-		all[b] = (body_pose) { .pose = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } },
-			.pivot = { pivot.about[0], pivot.about[1], pivot.about[2] } };
+		all[b] = quern_motion_still;
+		for (int k = 0; k < 3; k++) all[b].pivot[k] = pivot.about[k];
 		if (!quern_motion_is_any(motion)) continue;
 		quern_motion_at(motion, &pivot, s->settling ? 0 : time, rate, &all[b]);
 		if (!s->settling) continue;
 		for (int k = 0; k < 3; k++) all[b].pose.velocity[k] = all[b].pose.spin[k] = 0;
 		all[b].moves = false;
 	}
+	for (uint32_t b = 0; b < n && all; b++)
+		quern_motion_repeat(&all[b], &s->slot[slot][b], s->dim, s->lower, s->upper, s->periodic);
 	return all;
 }
 
@@ -58,7 +60,7 @@ static inline body_pose *quern_body_poses_now(const quern_step *s, uint32_t slot
 	return quern_body_poses(s, slot, now, now);
 }
 
-/* m/s, the fastest place of any body within the domain, now or at the end of the step. */
+/* m/s, the fastest place of any body, now or at the end of the step. */
 static inline quern_real quern_bodies_speed(const quern_step *s, uint32_t slot) {
 	quern_real most = 0;
 	for (uint32_t b = 0; b < s->n_slot[slot]; b++) {
@@ -70,7 +72,7 @@ static inline quern_real quern_bodies_speed(const quern_step *s, uint32_t slot) 
 		for (int end = 0; end < 2; end++) {
 			const quern_real time = s->time + (quern_real)(s->substep % s->n_substeps + end) * s->dt;
 			quern_motion_at(motion, &pivot, time, time, &pose);
-			const quern_real speed = quern_motion_speed(&pose, s->dim, s->lower, s->upper);
+			const quern_real speed = quern_motion_speed(&pose, &s->slot[slot][b], s->dim, s->lower, s->upper);
 			most = speed > most ? speed : most;
 		}
 	}
@@ -85,20 +87,20 @@ static inline bool quern_bodies_move(const quern_bound *body, uint32_t n) {
 }
 
 /* Gap of one sphere to a body, or to one of its features, and the normal there (may be NULL). */
-static inline quern_real quern_body_gap_of(const quern_bound *body, const quern_pose *pose,
+static inline quern_real quern_body_gap_of(const quern_bound *body, const body_pose *pose,
 	const int32_t *feature, uint32_t dim, const quern_real x[3], quern_real radius, quern_real normal[3]) {
 	_Alignas(64) quern_real at[3][QUERN_LANES], r[QUERN_LANES], gap[QUERN_LANES], n[3][QUERN_LANES],
 		v[3][QUERN_LANES];
 	_Alignas(64) int32_t which[QUERN_LANES];
 	for (uint32_t i = 0; i < QUERN_LANES; i++) {
-		for (uint32_t k = 0; k < 3; k++) at[k][i] = k < dim ? x[k] : 0;
+		for (uint32_t k = 0; k < 3; k++) at[k][i] = k < dim ? quern_motion_bring(pose, k, x[k]) : 0;
 		r[i] = radius;
 		which[i] = feature ? *feature : 0;
 	}
 	const quern_body_batch batch = { .n = 1,
 		.cap = QUERN_LANES,
 		.dim = dim,
-		.pose = pose,
+		.pose = &pose->pose,
 		.position = { at[0], at[1], at[2] },
 		.radius = r,
 		.feature = feature ? which : NULL,
@@ -111,7 +113,7 @@ static inline quern_real quern_body_gap_of(const quern_bound *body, const quern_
 }
 
 /* The same to its nearest place. */
-static inline quern_real quern_body_gap(const quern_bound *body, const quern_pose *pose, uint32_t dim,
+static inline quern_real quern_body_gap(const quern_bound *body, const body_pose *pose, uint32_t dim,
 	const quern_real x[3], quern_real radius, quern_real normal[3]) {
 	return quern_body_gap_of(body, pose, NULL, dim, x, radius, normal);
 }

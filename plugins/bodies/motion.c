@@ -112,19 +112,44 @@ bool quern_motion_pivot(const body_motion *m, const quern_bound *body, uint32_t 
 	return known;
 }
 
-/* A corner of the domain is farthest from the axis. */
-quern_real quern_motion_speed(
-	const body_pose *p, uint32_t dim, const quern_real lower[3], const quern_real upper[3]) {
+const body_pose quern_motion_still = { .pose = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } } };
+
+void quern_motion_repeat(body_pose *p, const quern_bound *body, uint32_t dim, const quern_real lower[3],
+	const quern_real upper[3], const bool periodic[3]) {
+	quern_real low[3] = { 0 }, high[3] = { 0 };
+	((const quern_body_ops *)body->ops)->bounds(body->self, dim, low, high);
+	for (uint32_t k = 0; k < dim; k++) {
+		quern_real half = 0, at = p->pose.position[k];
+		for (uint32_t j = 0; j < dim; j++) {
+			const quern_real t = p->pose.turn[3 * k + j];
+			if (t == 0) continue;
+			half += 0.5 * fabs(t) * (high[j] - low[j]);
+			at += 0.5 * t * (high[j] + low[j]);
+		}
+		const bool bounded = half < INFINITY && 2 * half < upper[k] - lower[k];
+		p->middle[k] = bounded ? at : 0;
+		p->length[k] = bounded && periodic[k] ? upper[k] - lower[k] : 0;
+		p->repeats = p->repeats || p->length[k] > 0;
+	}
+}
+
+/* Of a corner of the body's own box, or of the domain where it has none: no place is farther from the axis. */
+quern_real quern_motion_speed(const body_pose *p, const quern_bound *body, uint32_t dim,
+	const quern_real lower[3], const quern_real upper[3]) {
 	const quern_vec drift = QUERN_VEC_OF(p->pose.velocity), spin = QUERN_VEC_OF(p->pose.spin),
 					at = QUERN_VEC_OF(p->pose.position);
-	quern_real most = 0;
+	quern_real low[3] = { 0 }, high[3] = { 0 }, most = 0;
+	bool bounded = true;
 	if (!p->moves) return 0;
+	((const quern_body_ops *)body->ops)->bounds(body->self, dim, low, high);
+	for (uint32_t k = 0; k < dim; k++) bounded = bounded && isfinite(low[k]) && isfinite(high[k]);
 	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
-		const quern_vec x = { corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
-			dim == 2     ? 0
-			: corner & 4 ? upper[2]
-						 : lower[2] };
-		const quern_vec v = quern_vec_add(drift, quern_vec_cross(spin, quern_vec_sub(x, at)));
+		quern_real x[3] = { 0 };
+		for (uint32_t k = 0; k < dim; k++)
+			x[k] = bounded ? (corner >> k & 1 ? high[k] : low[k]) : corner >> k & 1 ? upper[k] : lower[k];
+		const quern_vec place = QUERN_VEC_OF(x);
+		const quern_vec arm = bounded ? quern_vec_turn(p->pose.turn, place) : quern_vec_sub(place, at);
+		const quern_vec v = quern_vec_add(drift, quern_vec_cross(spin, arm));
 		most = quern_max(most, sqrt(quern_vec_dot(v, v, 3)));
 	}
 	return most;

@@ -107,9 +107,9 @@ static quern_real overlap_of(const placer *p, const quern_spot *a, const quern_s
 }
 
 static bool meets_body(const placer *p, const quern_spot *s) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	static const body_pose still = { .pose = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } } };
 	for (uint32_t b = 0; b < p->n_bodies; b++) {
-		const quern_pose *pose = p->pose ? &p->pose[b].pose : &still;
+		const body_pose *pose = p->pose ? &p->pose[b] : &still;
 		if (quern_body_gap(&p->body[b], pose, p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
 	}
 	return false;

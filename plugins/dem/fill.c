@@ -156,7 +156,7 @@ static bool may_stand(const filling *f, const dem_place *grain, char why[WORDS])
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
 		if (!quern_body_is_there(body, f->d->settles)) continue;
 		const quern_real in =
-			-quern_body_gap(body, &f->pose[b].pose, s->dim, spot.x, spot.radius, NULL) / spot.radius;
+			-quern_body_gap(body, &f->pose[b], s->dim, spot.x, spot.radius, NULL) / spot.radius;
 		if (!(in > (1 + 1e-9) * f->d->overlap_start)) continue;
 		char which[BODY_WORDS];
 		quern_body_say(body, b, which);

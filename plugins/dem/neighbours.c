@@ -203,7 +203,7 @@ static quern_status list_contacts(listing *l) {
 enum { CHUNK = 256, MOST_FEATURES = 64 };
 
 typedef struct {
-	_Alignas(64) quern_real gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
+	_Alignas(64) quern_real position[3][CHUNK], gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
 	int32_t feature[MOST_FEATURES];
 } near_body;
 
@@ -220,7 +220,13 @@ static void find_gaps(const listing *l, uint32_t b, uint32_t first, uint32_t m, 
 		batch.position[k] = l->job.position[k] + first;
 		batch.normal[k] = w->normal[k];
 		batch.velocity[k] = w->velocity[k];
+		if (l->pose[b].repeats) batch.position[k] = w->position[k];
 	}
+	if (l->pose[b].repeats)
+		quern_motion_bring_all(&l->pose[b], l->s->dim, m,
+			(const quern_real *const[3]) { l->job.position[0] + first, l->job.position[1] + first,
+				l->s->dim == 3 ? l->job.position[2] + first : NULL },
+			(quern_real *const[3]) { w->position[0], w->position[1], w->position[2] });
 	((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 }
 
@@ -231,7 +237,7 @@ static uint32_t find_features(const listing *l, uint32_t b, uint32_t i, near_bod
 	quern_real x[3] = { 0 };
 	w->feature[0] = 0;
 	if (!ops->features) return 1;
-	for (uint32_t k = 0; k < l->s->dim; k++) x[k] = l->job.position[k][i];
+	for (uint32_t k = 0; k < l->s->dim; k++) x[k] = quern_motion_bring(&l->pose[b], k, l->job.position[k][i]);
 	return ops->features(
 		body->self, &l->pose[b].pose, x, l->job.radius[i] + l->job.reach, MOST_FEATURES, w->feature);
 }

@@ -37,6 +37,8 @@ static void geometry(const forces_shared *sh, forces_work *w, const contact_chun
 	quern_real *x[3] = { w->arm[1], w->force[0], w->force[1] }; /* free until the laws are called */
 	for (uint32_t k = 0; k < sh->s->dim; k++)
 		quern_gather(QUERN_VECTOR, x[k], sh->use[FORCE_OLD_POSITION].real[k], 0, w->first, c->n);
+	if (at->repeats)
+		quern_motion_bring_all(at, sh->s->dim, c->n, (const quern_real *const[3]) { x[0], x[1], x[2] }, x);
 	for (uint32_t q = 0; q < c->n && ops->features; q++)
 		w->feature[q] = sh->use[FORCE_FEATURE].index[c->begin + q];
 	const quern_body_batch batch = { .n = c->n,
@@ -118,6 +120,14 @@ QUERN_INLINE quern_vec couple_at(quern_real *const couple[3], uint32_t q, uint32
 	return dim == 3 ? QUERN_VEC_AT(couple, q, 3) : (quern_vec) { 0, 0, couple[0][q] };
 }
 
+/* A grain's centre, as the body's nearest image sees it. */
+QUERN_INLINE quern_vec place_of(const forces_shared *sh, const contact_chunk *c, int32_t grain) {
+	quern_real x[3] = { 0 };
+	for (uint32_t k = 0; k < sh->s->dim; k++)
+		x[k] = quern_motion_bring(&sh->pose[c->body], k, sh->use[FORCE_OLD_POSITION].real[k][grain]);
+	return QUERN_VEC_OF(x);
+}
+
 /* About the pivot, of the force in the middle of the contact. */
 static void book_twist(const forces_shared *sh, const forces_work *w, const contact_chunk *c) {
 	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
@@ -125,7 +135,7 @@ static void book_twist(const forces_shared *sh, const forces_work *w, const cont
 	const quern_vec pivot = QUERN_VEC_OF(sh->pose[c->body].pivot);
 	quern_real *twist = quern_dem_booked(sh, c->block, (uint32_t)c->body) + B_TWIST;
 	for (uint32_t q = 0; q < c->n; q++) {
-		const quern_vec x = QUERN_VEC_AT(sh->use[FORCE_OLD_POSITION].real, w->first[q], dim);
+		const quern_vec x = place_of(sh, c, w->first[q]);
 		const quern_vec at = quern_vec_axpy(-w->arm[0][q], QUERN_VEC_AT(w->normal, q, dim), x);
 		const quern_vec moment =
 			quern_vec_add(quern_vec_cross(quern_vec_sub(at, pivot), QUERN_VEC_AT(w->force, q, dim)),

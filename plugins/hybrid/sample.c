@@ -75,7 +75,7 @@ static void sample_touch(sampling *p, uint32_t q) {
 	const int32_t *feature = several ? u[S_TOUCH_FEATURE].index + q : NULL;
 	const quern_real x[3] = { centre.x, centre.y, centre.z }, radius = u[S_RADIUS].real[0][i];
 	quern_real normal[3];
-	const quern_real gap = quern_body_gap_of(body, &p->pose[k].pose, feature, s->dim, x, radius, normal);
+	const quern_real gap = quern_body_gap_of(body, &p->pose[k], feature, s->dim, x, radius, normal);
 	const quern_vec branch = quern_vec_scale(radius + gap, QUERN_VEC_OF(normal));
 	add(p, quern_vec_sub(centre, branch), f, branch);
 }

@@ -72,21 +72,24 @@ static void place(const mpm *p, const quern_step *s, const mpm_fill *item, const
 enum { CHUNK = 64 };
 
 typedef struct {
-	_Alignas(64) quern_real radius[CHUNK], gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
+	_Alignas(64) quern_real position[3][CHUNK], radius[CHUNK], gap[CHUNK], normal[3][CHUNK],
+		velocity[3][CHUNK];
 } near_points;
 
 /* Marks the points that lie in a body; returns how many were not marked before. */
 static uint32_t mark_inside(
-	const quern_step *s, const quern_bound *body, const quern_pose *pose, uint32_t n, bool *inside) {
+	const quern_step *s, const quern_bound *body, const body_pose *pose, uint32_t n, bool *inside) {
 	near_points w = { .radius = { 0 } };
 	uint32_t found = 0;
 	for (uint32_t i = 0; i < n; i += CHUNK) {
 		const uint32_t m = n - i < CHUNK ? n - i : CHUNK;
 		quern_body_batch batch = {
-			.n = m, .cap = CHUNK, .dim = s->dim, .pose = pose, .radius = w.radius, .gap = w.gap
+			.n = m, .cap = CHUNK, .dim = s->dim, .pose = &pose->pose, .radius = w.radius, .gap = w.gap
 		};
 		for (uint32_t k = 0; k < s->dim; k++) {
-			batch.position[k] = s->use[FILL_POSITION].real[k] + i;
+			for (uint32_t q = 0; q < m; q++)
+				w.position[k][q] = quern_motion_bring(pose, k, s->use[FILL_POSITION].real[k][i + q]);
+			batch.position[k] = w.position[k];
 			batch.normal[k] = w.normal[k];
 			batch.velocity[k] = w.velocity[k];
 		}
@@ -112,7 +115,7 @@ static quern_status clip(const quern_step *s, uint32_t *n) {
 		const body_item *item = body->item;
 		if (!quern_body_is_there(body, false) || (item->boundary == BOUNDARY_NONE && isnan(item->friction)))
 			continue;
-		const uint32_t found = mark_inside(s, body, &pose[b].pose, *n, inside);
+		const uint32_t found = mark_inside(s, body, &pose[b], *n, inside);
 		char which[BODY_WORDS];
 		quern_body_say(body, b, which);
 		if (found == *n)

@@ -23,7 +23,7 @@ typedef struct {
 enum { B_IMPULSE, B_TWIST = 3, B_WORK = 6, N_BOOKED };
 
 typedef struct {
-	_Alignas(64) quern_real position[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
+	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
 } near_nodes;
 
 /* Volume of a node over that of one inside: less at and next to a wall. */
@@ -75,7 +75,9 @@ static void touch_node(const grid_work *w, uint32_t j, const near_nodes *n, uint
 	meet_body(item, n, i, dim, mass, motion, booked + B_IMPULSE);
 	if (!w->twists) return;
 	const quern_vec given = quern_vec_sub(QUERN_VEC_OF(booked), before);
-	const quern_vec arm = quern_vec_sub(QUERN_VEC_AT(n->position, i, dim), QUERN_VEC_OF(w->pose[j].pivot));
+	quern_real x[3] = { 0 };
+	for (uint32_t k = 0; k < dim; k++) x[k] = quern_motion_bring(&w->pose[j], k, n->position[k][i]);
+	const quern_vec arm = quern_vec_sub(QUERN_VEC_OF(x), QUERN_VEC_OF(w->pose[j].pivot));
 	const quern_vec moment = quern_vec_cross(arm, given);
 	if (dim == 3) booked[B_TWIST] += moment.x, booked[B_TWIST + 1] += moment.y;
 	booked[B_TWIST + (dim == 3 ? 2 : 0)] += moment.z;
@@ -101,11 +103,16 @@ static bool body_is_far(
 	return one.gap[0] > 0;
 }
 
+static void bring_nodes(const body_pose *pose, uint32_t dim, near_nodes *n) {
+	quern_motion_bring_all(pose, dim, N,
+		(const quern_real *const[3]) { n->position[0], n->position[1], n->position[2] },
+		(quern_real *const[3]) { n->own[0], n->own[1], n->own[2] });
+}
+
 static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_real *booked) {
 	const quern_step *s = w->s;
 	quern_body_batch batch = { .n = N, .cap = N, .dim = s->dim, .radius = n->radius, .gap = n->gap };
 	for (uint32_t k = 0; k < s->dim; k++) {
-		batch.position[k] = n->position[k];
 		batch.normal[k] = n->normal[k];
 		batch.velocity[k] = n->velocity[k];
 	}
@@ -122,7 +129,10 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_rea
 			(item->boundary == BOUNDARY_NONE && isnan(item->friction)))
 			continue;
 		batch.pose = &w->pose[j].pose;
-		if (body_is_far(body, n, batch, w->g->cell * w->g->edge)) continue;
+		if (w->pose[j].repeats) bring_nodes(&w->pose[j], s->dim, n);
+		else if (body_is_far(body, n, batch, w->g->cell * w->g->edge)) continue;
+		for (uint32_t k = 0; k < s->dim; k++)
+			batch.position[k] = w->pose[j].repeats ? n->own[k] : n->position[k];
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 		for (uint32_t i = 0; i < N; i++) {
 			const quern_real mass = w->node[(size_t)b * N + i][0];
