@@ -40,7 +40,7 @@ extern "C" {
 #endif
 
 #define QUERN_ABI_MAJOR 2u
-#define QUERN_ABI_MINOR 0u
+#define QUERN_ABI_MINOR 1u
 #define QUERN_ABI (QUERN_ABI_MAJOR << 16 | QUERN_ABI_MINOR)
 #define QUERN_LANES 8u
 
@@ -104,7 +104,7 @@ typedef struct quern_param {
 	uint8_t type, flags;
 	uint16_t pad;
 	const char *
-		unless; /* another key beside which this one must not stand, and which makes REQUIRED ask for nothing */
+		unless; /* since 2.1: another key beside which this one must not stand, and which makes REQUIRED ask for nothing */
 } quern_param;
 
 typedef struct quern_list {
@@ -169,13 +169,15 @@ typedef enum {
 #define QUERN_NO_TARGET (-1) /* an INDEX that points at nothing */
 
 enum {
-	QUERN_OPTIONAL = 1, /* attaches to the field if somebody else needs it; its column is NULL otherwise */
-	QUERN_OTHERS = 2,   /* this READ looks at other entities: if its stage changes the field too, the
+	QUERN_OPTIONAL = 1,  /* attaches to the field if somebody else needs it; its column is NULL otherwise */
+	QUERN_OTHERS = 2,    /* this READ looks at other entities: if its stage changes the field too, the
 	                       field is kept twice and the stage writes every entry of the new copy */
-	QUERN_BEFORE = 4,   /* this READ wants the value from before this phase's changes */
-	QUERN_SHOWN = 8,    /* in every frame, asked for or not */
-	QUERN_WANTED = 16,  /* makes the field exist if anybody in the scene can write it; NULL otherwise */
-	QUERN_RELEASED = 32 /* nothing is changed through this use while settling */
+	QUERN_BEFORE = 4,    /* this READ wants the value from before this phase's changes */
+	QUERN_SHOWN = 8,     /* in every frame, asked for or not */
+	QUERN_WANTED = 16,   /* makes the field exist if anybody in the scene can write it; NULL otherwise */
+	QUERN_RELEASED = 32, /* nothing is changed through this use while settling */
+	QUERN_EXISTS =
+		64 /* since 2.1: this READ only makes the field exist; its column is NULL, and nothing is gathered */
 };
 
 /* One use of one field by one plugin. A field exists if and only if a counting, non-optional use names

@@ -57,7 +57,7 @@ typedef struct quern_slot {
 	uint32_t item_size;      /* bytes that `rows` fill */
 	uint32_t list, required; /* required: a list that must be given, be it empty */
 	uint32_t pad;
-	/* "cases": a list among the solver's parameters whose items take, beside their own rows, keys of the plugins here: what
+	/* since 2.1: "cases", a list among the solver's parameters whose items take, beside their own rows, keys of the plugins here: what
 	 * they are in that case. A key that several of them have is given under a plugin's name: {linear: {friction: 0.1}} */
 	const char *refine;
 } quern_slot;
@@ -74,7 +74,7 @@ typedef struct quern_bound {
 	const quern_column *again; /* the same for the slot's `again` */
 	uint32_t n_uses, n_variant;
 	const char *id, *path; /* "contact.linear"; "grains.contact", for messages */
-	/* by item of the list that refines this slot, 1 + n_variant instances each: the one to use in that case, then those
+	/* since 2.1: by item of the list that refines this slot, 1 + n_variant instances each: the one to use in that case, then those
 	 * with what entry 0, 1, ... of the overriding slot says on top. All are there; NULL without such a list */
 	const void *const *refined;
 	uint32_t n_refined, pad;
@@ -93,6 +93,9 @@ typedef struct quern_step {
 	const uint32_t *n_slot;
 	const quern_host *host;
 	quern_run *run;
+	/* since 2.1: the step with which the present one of the scene's `stages` began, -1 where it has none; keys may have
+	 * other values from that step on */
+	int64_t stage_step;
 } quern_step;
 
 enum {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 #include "placer.h"
-#include "../bodies/bodies.h"
 #include "tools.h"
 #include <math.h>
 #include <stdlib.h>
@@ -108,8 +107,11 @@ static quern_real overlap_of(const placer *p, const quern_spot *a, const quern_s
 }
 
 static bool meets_body(const placer *p, const quern_spot *s) {
-	for (uint32_t b = 0; b < p->n_bodies; b++)
-		if (quern_body_gap(&p->body[b], p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
+	static const body_pose still = { .pose = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } } };
+	for (uint32_t b = 0; b < p->n_bodies; b++) {
+		const body_pose *pose = p->pose ? &p->pose[b] : &still;
+		if (quern_body_gap(&p->body[b], pose, p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
+	}
 	return false;
 }
 

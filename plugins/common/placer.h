@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
 #pragma once
+#include "../bodies/bodies.h"
 #include <quern/packer.h>
-#include <quern/solver.h>
 #include <quern/space.h>
 
 typedef struct placer {
@@ -18,6 +18,7 @@ typedef struct placer {
 	int32_t *head;
 	uint32_t n_heads;        /* a power of two */
 	const quern_bound *body; /* bodies that grains must not touch */
+	const body_pose *pose;   /* where each of them is; NULL: where the scene put it */
 	uint32_t n_bodies;
 	bool failed; /* memory ran out */
 } placer;

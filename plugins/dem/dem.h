@@ -29,6 +29,7 @@ typedef struct dem {
 	bool mixed;    /* there are several materials */
 	bool fixed;    /* some grains do not move */
 	bool features; /* some bodies have several */
+	bool moving;   /* some bodies do */
 	bool settles;
 	quern_real reach;  /* m, of the laws beyond touching */
 	quern_real height; /* m, of the fill, or of the domain where there is none */

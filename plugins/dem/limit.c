@@ -86,7 +86,7 @@ static void look_for_lightest(const quern_step *s, lightest *of) {
 /* By material. Before there are grains, what the distributions may bring. */
 static void lightest_grains(const dem *d, const quern_step *s, lightest *of) {
 	bool any = false;
-	for (uint32_t k = 0; k < d->n_materials; k++)
+	for (uint32_t k = 0; k < MOST_MATERIALS; k++)
 		of[k] = (lightest) { .mass = { INFINITY, INFINITY }, .radius = INFINITY };
 	look_for_lightest(s, of);
 	for (uint32_t k = 0; k < d->n_materials; k++) any = any || isfinite(of[k].mass[0]);
@@ -133,10 +133,9 @@ static void take_shorter(contact_limit *fast, contact_limit *first, const contac
 
 /* The stiffest contact is that of the two lightest grains of a pair of materials, or of the lightest against a body: the shortest,
  * and the first to fail when the step grows. */
-static void find_limits(const dem *d, const quern_step *s, contact_limit *fast, contact_limit *first) {
-	lightest l[MOST_MATERIALS];
+static void find_limits(
+	const dem *d, const quern_step *s, const lightest *l, contact_limit *fast, contact_limit *first) {
 	contact_limit c;
-	lightest_grains(d, s, l);
 	for (uint32_t k = 0; k < d->n_materials; k++) {
 		if (isfinite(l[k].mass[0])) c = limit_of_two(d, s, &l[k], k), take_shorter(fast, first, &c);
 		for (uint32_t m = k + 1; m < d->n_materials; m++)
@@ -153,11 +152,19 @@ static void find_limits(const dem *d, const quern_step *s, contact_limit *fast, 
 quern_real quern_dem_limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	const dem *d = self;
 	contact_limit fast = { .period = INFINITY, .hard = INFINITY }, first = fast;
-	find_limits(d, s, &fast, &first);
+	lightest l[MOST_MATERIALS];
+	quern_real least = INFINITY;
+	lightest_grains(d, s, l);
+	find_limits(d, s, l, &fast, &first);
+	for (uint32_t k = 0; k < d->n_materials; k++) least = fmin(least, l[k].radius);
 	*hard = first.hard;
 	const bool by_period = fast.period / 50 <= 0.5 * first.hard;
 	if (isfinite(fast.period)) say_limit(&fast, &first, by_period, reason);
 	else snprintf(reason, 160, "grains without a contact law");
 	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
-	return by_period ? fast.period / 50 : 0.5 * first.hard;
+	const quern_real chosen = by_period ? fast.period / 50 : 0.5 * first.hard;
+	const quern_real speed = d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES) : 0;
+	if (!(0.1 * least < speed * chosen)) return chosen;
+	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, least);
+	return 0.1 * least / speed;
 }

@@ -98,6 +98,8 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 	QUERN_PARAM(dem, features, NULL,
 		"Keep with every touch which feature of the body it is on; set by itself where bodies have several.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, moving, NULL, "Watch how far bodies have moved; set by itself where one does.",
+		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -352,6 +354,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	const quern_status status = quern_dem_pair_up(d, setup, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err);
 	if (status != QUERN_OK) return status;
 	d->features = false;
+	d->moving = n_slot[SLOT_BODIES] && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++)

@@ -20,7 +20,7 @@ typedef struct hybrid {
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
-	bool affine;
+	bool affine, moving;                              /* moving: some bodies do */
 } hybrid;
 
 /* slots, in the order of the solver's table */

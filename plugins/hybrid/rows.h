@@ -122,6 +122,7 @@ QUERN_USE_ENUM(BACK_USES);
 	X(A_GRAIN_OWED_MOMENTUM, "cell.grain_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
 	X(A_POINT_OWED_MOMENTUM, "cell.point_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
 	X(A_BODY, "body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED) \
+	X(A_BODY_WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .when = "moving") \
 	X(A_FACES, "total.faces", "N s", QUERN_READ, QUERN_VECTOR) \
 	X(A_SUPPORT, "total.support", "N s", QUERN_READ, QUERN_VECTOR) \
 	X(A_EXCHANGE, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR) \

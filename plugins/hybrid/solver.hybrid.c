@@ -28,6 +28,8 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.from = "grain.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, packed, "packed_density", "kg/m^3", "Density of the continuum without stress.",
 		.from = "continuum.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
+	QUERN_PARAM(hybrid, moving, NULL, "Ask for the work of bodies; set by itself where one moves.",
+		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -133,6 +135,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	if (!n_slot[SLOT_ORACLE])
 		return setup->host->fail(
 			err, QUERN_E_PARAM, NULL, "give an oracle: without one nobody says where grains are needed");
+	h->moving = quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	h->affine = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->affine != 0;
 	return QUERN_OK;
 }

@@ -9,6 +9,8 @@
 static quern_status reckon(update *d) {
 	quern_hybrid_move_entries(d);
 	quern_hybrid_averages(d);
+	d->pose = quern_body_poses_now(d->s, SLOT_BODIES);
+	if (!d->pose) return QUERN_E_MEMORY;
 	quern_status status = quern_hybrid_walls(d);
 	if (status != QUERN_OK) return status;
 	quern_hybrid_fixed(d);

@@ -28,6 +28,7 @@ typedef struct update {
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
 	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that is open */
+	const body_pose *pose;    /* by body */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
 	int32_t *zone;            /* by cell: the new one; the old one stands in the field until the end */
 	bool *drop_grain, *drop_point;

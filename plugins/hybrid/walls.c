@@ -7,17 +7,14 @@
 enum { N = QUERN_BLOCK_CELLS }; /* cells of a block, and places in a cell */
 
 typedef struct {
-	_Alignas(64) quern_real position[3][N], radius[N], gap[N], normal[3][N], velocity[3][N], least[N];
+	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N],
+		least[N];
 } places;
 
 /* Gap of every place to the nearest body that is there now; infinite where there is none. */
 static void nearest_bodies(const update *d, places *p) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
-	quern_body_batch batch = {
-		.n = N, .cap = N, .dim = d->s->dim, .pose = &still, .radius = p->radius, .gap = p->gap
-	};
+	quern_body_batch batch = { .n = N, .cap = N, .dim = d->s->dim, .radius = p->radius, .gap = p->gap };
 	for (uint32_t k = 0; k < d->s->dim; k++) {
-		batch.position[k] = p->position[k];
 		batch.normal[k] = p->normal[k];
 		batch.velocity[k] = p->velocity[k];
 	}
@@ -25,6 +22,11 @@ static void nearest_bodies(const update *d, places *p) {
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
 		if (!quern_body_is_there(body, d->s->settling)) continue;
+		batch.pose = &d->pose[b].pose;
+		quern_motion_bring_all(&d->pose[b], d->s->dim, N,
+			(const quern_real *const[3]) { p->position[0], p->position[1], p->position[2] },
+			(quern_real *const[3]) { p->own[0], p->own[1], p->own[2] });
+		for (uint32_t k = 0; k < d->s->dim; k++) batch.position[k] = p->own[k];
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 		for (uint32_t i = 0; i < N; i++) p->least[i] = p->gap[i] < p->least[i] ? p->gap[i] : p->least[i];
 	}
@@ -74,7 +76,7 @@ static quern_real gap_at(const update *d, const quern_real x[3]) {
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
 		if (!quern_body_is_there(body, d->s->settling)) continue;
-		const quern_real gap = quern_body_gap(body, d->s->dim, x, 0, NULL);
+		const quern_real gap = quern_body_gap(body, &d->pose[b], d->s->dim, x, 0, NULL);
 		least = gap < least ? gap : least;
 	}
 	return least;

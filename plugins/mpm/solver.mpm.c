@@ -166,12 +166,14 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		const quern_real v2 = cloud_square(&s->use[FILL_VELOCITY], i, s->dim);
 		fastest = v2 > fastest ? v2 : fastest;
 	}
+	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES);
 	fastest = sqrt(fastest);
+	fastest = bodies > fastest ? bodies : fastest;
 	const quern_real modulus = s->dim * p->bulk > 2 * p->shear ? s->dim * p->bulk : 2 * p->shear;
 	const quern_real omega = sqrt(p->stiffness * modulus / p->density) / p->cell;
 	const quern_real rate = 0.5 * omega + fastest / p->cell;
 	snprintf(reason, 160, "stress waves of %s in cells of %.3g m%s", s->slot[SLOT_MATERIAL][0].id, p->cell,
-		fastest > 0.5 * omega * p->cell ? " and the speed of points" : "");
+		fastest > 0.5 * omega * p->cell ? " and the speed of points or bodies" : "");
 	*hard = 1 / rate;
 	return 0.9 / rate;
 }

@@ -22,12 +22,26 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 	X(SHEARED, "total.sheared", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(DAMPED, "total.damped", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(RUBBED, "total.rubbed", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
 static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 
-enum { KINETIC, SPINNING, POINTS, POTENTIAL, SPRINGS, TANGENTIAL, ELASTIC, DASHPOTS, SLIDING, COUPLING, SUM };
+enum {
+	KINETIC,
+	SPINNING,
+	POINTS,
+	POTENTIAL,
+	SPRINGS,
+	TANGENTIAL,
+	ELASTIC,
+	DASHPOTS,
+	SLIDING,
+	COUPLING,
+	BODIES,
+	SUM
+};
 static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = "Kinetic, of grains." },
 	{ .name = "spin", .unit = "J", .doc = "Kinetic, of their rotation." },
 	{ .name = "points", .unit = "J", .doc = "Kinetic, of points." },
@@ -38,6 +52,7 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 	{ .name = "damped", .unit = "J", .doc = "Lost in dashpots so far." },
 	{ .name = "rubbed", .unit = "J", .doc = "Lost to sliding contacts so far." },
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
+	{ .name = "driven", .unit = "J", .doc = "Done by bodies that move so far, with a minus." },
 	{ .name = "budget", .unit = "J", .doc = "All of it: constant for grains alone." }, { .name = NULL } };
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
@@ -59,6 +74,7 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const int rows[] = { STORED, SHEARED, DAMPED, RUBBED, EXCHANGED },
 			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
 	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;
+	for (uint32_t i = 0; u[WORK].real[0] && i < b->count[WORK]; i++) out[BODIES] -= u[WORK].real[0][i];
 	for (int k = 0; k < SUM; k++) out[SUM] += out[k];
 	return QUERN_OK;
 }

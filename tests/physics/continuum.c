@@ -142,6 +142,57 @@ static void weight_at_rest(void **unused) {
 	assert_true(good);
 }
 
+/* A layer on a slope, periodic along it: with the stress of its weight it stays where it is, sheared; from nothing it falls into
+ * motion. Gravity along each axis in turn, up and down, and askew along the others. */
+static void layer_at_rest(void **unused) {
+	(void)unused;
+	bool good = true;
+	table_head("a layer on a slope, 0.1 s: speed over that of a free fall");
+	for (int dim = 2; dim <= 3; dim++)
+		for (int axis = 0; axis < dim; axis++)
+			for (int up = 0; up < 2; up++)
+				for (int rests = 0; rests < 2; rests++) {
+					double g[3], low[3] = { 0, 0, 0 }, high[3] = { 0.4, 0.4, 0.4 }, from[3] = { 0, 0, 0 },
+								 to[3] = { 0.4, 0.4, 0.4 }, at[3] = { 0, 0, 0 }, normal[3] = { 0, 0, 0 };
+					const char *around[3] = { "true", "true", "true" };
+					for (int k = 0; k < 3; k++) g[k] = k == axis ? (up ? 9 : -9) : 2.0 + k;
+					high[axis] = 1.2, to[axis] = up ? 1.2 : 1, from[axis] = up ? 0.2 : 0;
+					at[axis] = up ? 1.2 : 0, normal[axis] = up ? -1 : 1, around[axis] = "false";
+					const double *of[7] = { g, low, high, at, normal, from, to };
+					char word[7][80], loops[40];
+					for (int w = 0; w < 7; w++) {
+						if (dim == 2) snprintf(word[w], sizeof word[w], "[%g, %g]", of[w][0], of[w][1]);
+						else snprintf(word[w], sizeof word[w], "[%g, %g, %g]", of[w][0], of[w][1], of[w][2]);
+					}
+					if (dim == 2) snprintf(loops, sizeof loops, "[%s, %s]", around[0], around[1]);
+					else snprintf(loops, sizeof loops, "[%s, %s, %s]", around[0], around[1], around[2]);
+					quern_run *run = harness_open(1,
+						"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s, periodic: "
+						"%s}, time: {end: 1},\n"
+						"output: {every: 0.1}, bodies: [{plane: {point: %s, normal: %s, boundary: "
+						"sticky}}],\n"
+						"continuum: {cell: 0.1, material: {elastic: {bulk_modulus: 1e7, poisson: 0.3, "
+						"density: 1000}}, transfer: "
+						"{picflip: {rate: 0}},\n  fill: {region: {box: {lower: %s, upper: %s}}, stress: %s, "
+						"lateral: 0.5}}}\n",
+						dim, word[0], word[1], word[2], loops, word[3], word[4], word[5], word[6],
+						rests ? "at_rest" : "none");
+					harness_until(run, 0.1);
+					const quern_column v = harness_field(run, "point.velocity");
+					double most = 0, fall = 0;
+					for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+						for (int k = 0; k < dim; k++) most = fmax(most, fabs(v.real[k][i]));
+					for (int k = 0; k < dim; k++) fall = fmax(fall, fabs(g[k]) * 0.1);
+					char what[80];
+					snprintf(what, sizeof what, "%d-D, axis %d, %s, %s", dim, axis, up ? "up" : "down",
+						rests ? "at rest" : "from nothing");
+					if (rests) good &= table_row(what, most / fall, 0, 0.01);
+					else table_note(what, most / fall), good &= most / fall > 0.02;
+					harness_close(run);
+				}
+	assert_true(good);
+}
+
 /* Gravity switched on at once makes the column ring; where that has died down it carries the same stress. */
 static void weight_after_ringing(void **unused) {
 	(void)unused;
@@ -331,8 +382,9 @@ static void seams_keep_points_inside(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(weight_at_rest),
-		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen),
-		cmocka_unit_test(lattice_is_uniform), cmocka_unit_test(inside_out_ends_the_run),
-		cmocka_unit_test(grid_follows_the_block), cmocka_unit_test(seams_keep_points_inside) };
+		cmocka_unit_test(layer_at_rest), cmocka_unit_test(weight_after_ringing),
+		cmocka_unit_test(thrown_and_fallen), cmocka_unit_test(lattice_is_uniform),
+		cmocka_unit_test(inside_out_ends_the_run), cmocka_unit_test(grid_follows_the_block),
+		cmocka_unit_test(seams_keep_points_inside) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

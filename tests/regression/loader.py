@@ -5,8 +5,10 @@ import os
 import shutil
 import tempfile
 
+import lab
 from workshop import PLUGINS, SANITIZED, SOURCE, compile, quern, source
 
+MAJOR, MINOR = lab.interface()
 LINEAR = "dem/contact.linear.c"
 SCENE = str(SOURCE / "configs/two_grains.yaml")
 
@@ -54,9 +56,9 @@ def library(rows="", uses="", ops=".force = { force, force }", more="", head="",
 
 
 def check_interfaces(folder):
-    refused(library(abi="3u << 16"), "contact.bad", folder, "is built for interface 3.0, this program speaks 2.0",
+    refused(library(abi="3u << 16"), "contact.bad", folder, f"is built for interface 3.0, this program speaks {MAJOR}.{MINOR}",
             "rebuild")
-    refused(library(abi="QUERN_ABI + 1"), "contact.bad", folder, "is built for interface 2.1, this program speaks 2.0")
+    refused(library(abi="QUERN_ABI + 1"), "contact.bad", folder, f"is built for interface {MAJOR}.{MINOR + 1}, this program speaks {MAJOR}.{MINOR}")
     refused(library(size="8"), "contact.bad", folder, "is built for interface")
     refused(library(real_size="4"), "contact.bad", folder, "is built for another number format")
     refused(library(plugin="0"), "contact.bad", folder, "describes no plugin")

@@ -12,7 +12,10 @@ SHORT = {"two_grains": lab.sets(time__end="5 ms"), "mixture": lab.sets(time__end
          "incline": lab.sets(time__end="50 ms"),
          "elastic_bar": lab.sets(time__end="2"),
          "column": [*lab.SMALL["column"], *lab.sets(time__end="20 ms")],
-         "column_3d": [*lab.SMALL["column_3d"], *lab.sets(time__end="5 ms")]}
+         "column_3d": [*lab.SMALL["column_3d"], *lab.sets(time__end="5 ms")],
+         "drum": lab.sets(time__end="50 ms", output__every="10 ms", grains__material__radius__mean="3 mm"),
+         "gate": [*lab.sets(grains__material__radius__mean="3 mm", time__end="60 ms", output__every="10 ms"),
+                  "--set=stages.0.for=15 ms", "--set=stages.1.for=20 ms"]}
 TWINS = {"column": ("all", "grains", "continuum"), "column_3d": ("all", "grains")}
 TWIN = ["--set=output.fields=[grain.velocity, point.velocity]"]
 FILED = """
