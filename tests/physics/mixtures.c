@@ -170,6 +170,34 @@ static void every_pair(void **unused) {
 	assert_true(good);
 }
 
+/* Where one pair alone is rough, springs and spins exist for it; the others stay smooth. */
+static void one_rough_pair(void **unused) {
+	static text t;
+	bool good = true;
+	(void)unused;
+	table_head("friction, where that of sand and steel alone is not 0");
+	t.length = 0;
+	text_add(&t, "{quern: 1, dimension: 3, gravity: [0, 0, 0], domain: {lower: [-9, -9, -9], upper: [9, 9, "
+				 "9]}, time: {end: 1},\n"
+				 "output: {every: 1}, grains: {materials: {sand: {density: 2500, radius: {mean: 5 mm}}, "
+				 "steel: {density: 7800, "
+				 "radius: {mean: 3 mm}}},\n"
+				 "contact: {linear: {stiffness: 1e13, restitution: 1, friction: 0}}, pairs: {between: "
+				 "[steel, sand], friction: "
+				 "0.3},\n  place: [\n");
+	add_grain(&t, 3, "sand", -5e-3 - 1e-9, 0, 0.5, 5, true);
+	add_grain(&t, 3, "steel", 3e-3, 0, -0.5, 0, true);
+	add_grain(&t, 3, "sand", -5e-3 - 1e-9, 1, 0.5, 5, true);
+	add_grain(&t, 3, "sand", 5e-3, 1, -0.5, 0, false);
+	quern_run *run = harness_open(1, "%s", t.data);
+	harness_steps(run, 600);
+	good &= judge_friction("sand on steel", 0.3, (motion) { 0.5, 5 }, motion_of(run, 0));
+	good &= judge_friction("sand on sand", 0, (motion) { 0.5, 5 }, motion_of(run, 2));
+	assert_true(harness_has(run, "contact.slip"));
+	harness_close(run);
+	assert_true(good);
+}
+
 /* ==== the step ==== */
 
 static double step_of(const char *more, const char *pair, const char *place, char reason[200]) {
@@ -517,9 +545,9 @@ static void same_bits(void **unused) {
 }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(every_pair), cmocka_unit_test(steps),
-		cmocka_unit_test(mixtures), cmocka_unit_test(seeds), cmocka_unit_test(one_and_the_same),
-		cmocka_unit_test(keeps_its_grains), cmocka_unit_test(books), cmocka_unit_test(given),
-		cmocka_unit_test(refused), cmocka_unit_test(same_bits) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(every_pair), cmocka_unit_test(one_rough_pair),
+		cmocka_unit_test(steps), cmocka_unit_test(mixtures), cmocka_unit_test(seeds),
+		cmocka_unit_test(one_and_the_same), cmocka_unit_test(keeps_its_grains), cmocka_unit_test(books),
+		cmocka_unit_test(given), cmocka_unit_test(refused), cmocka_unit_test(same_bits) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

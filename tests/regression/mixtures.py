@@ -52,6 +52,22 @@ def check_tables():
     print("plan and describe know materials and pairs")
 
 
+def check_stages(folder):
+    """A stage of the scene may give a pair other parameters, also in the middle of a contact; it cannot take a material from its grains."""
+    smooth = "--set=stages=[{for: 30 ms}, {set: {grains.pairs.0.friction: 0, grains.pairs.1.restitution: 0.3}}]"
+    lab.run("mixture", folder / "one", *SHORT)
+    lab.run("mixture", folder / "two", *SHORT, smooth)
+    lab.run("mixture", folder / "threads", *SHORT, smooth, "--set=run.batch=8", threads=2)
+    lab.same(folder / "two", folder / "threads", "two stages, 2 threads and run.batch: 8")
+    last = [lab.contents(lab.frames(folder / name)[k])["grains/position"] for name in ("one", "two") for k in (3, 10)]
+    assert (last[0] == last[2]).all() and abs(last[1] - last[3]).max() > 1e-5, "the stage changes nothing, or too early"
+    one, steel = "{density: 2500, radius: {mean: 2 mm}}", "{density: 7800, radius: {mean: 1.5 mm}}"
+    said = lab.run("mixture", folder / "fewer", *SHORT, f"--set=grains.materials={{sand: {one}, glass: {one}, steel: {steel}}}",
+                   f"--set=stages=[{{for: 10 ms}}, {{set: {{grains.materials: {{sand: {one}, steel: {steel}}}}}}}]", status=2)
+    assert "a stage of the scene has 2 of them, and there are grains of number 2" in said, said
+    print("stages change pairs, not materials")
+
+
 def check_name_alone(folder):
     """One material by name is one material, also for a hybrid, whose grains come and go; a wall's word changes nothing by itself."""
     options = [*lab.SMALL["column"], "--set=time.end=20 ms", "--set=grains.settle.energy=0.02"]
@@ -72,5 +88,7 @@ if __name__ == "__main__":
         check_bits(pathlib.Path(name) / "plain", SHORT, "mixture")
     with lab.workplace() as name:
         check_bits(pathlib.Path(name) / "more", [*SHORT, *MORE], "two laws and walls")
+    with lab.workplace() as name:
+        check_stages(pathlib.Path(name))
     with lab.workplace() as name:
         check_name_alone(pathlib.Path(name))
