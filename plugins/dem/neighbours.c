@@ -356,7 +356,7 @@ static quern_status keep_inside(const listing *l) {
 
 /* At the release other bodies are there than while settling, whatever has moved; and when a stage of the scene begins. */
 static bool is_release(const quern_step *s) {
-	return !s->settling && s->substep % s->n_substeps == 0 && (s->step == 0 || s->step == s->stage_step);
+	return !s->settling && s->within == 0 && (s->step == 0 || s->step == s->stage_step);
 }
 
 /* Before the first step there is no list yet, or that of settling; after it there always is one. */

@@ -194,7 +194,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
 	if (d->file) d->fixed = true; /* its header may say so */
 	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = 2 * d->radii.mean;
-	if (d->settles && !(gravity > 0))
+	if (d->settles && !(gravity > 0) && !setup->later)
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
@@ -389,7 +389,8 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	else snprintf(reason, 160, "grains without a contact law");
 	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
 	const quern_real chosen = by_period ? fast.period / 50 : 0.5 * first.hard;
-	const quern_real speed = d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES) : 0;
+	const quern_real speed =
+		d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY) : 0;
 	if (!(0.1 * l.radius < speed * chosen)) return chosen;
 	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, l.radius);
 	return 0.1 * l.radius / speed;
