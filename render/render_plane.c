@@ -216,10 +216,8 @@ static const quern_section *bodies_of(const render_frame *f) {
 }
 
 /* The distance to one body, in pixels, of every pixel; returns the least. */
-static float distances_to(
-	const render_style *s, const quern_filling *body, size_t b, int width, int height, float *distance) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
-	const quern_pose *pose = b < s->frame->n_poses ? &s->frame->pose[b] : &still;
+static float distances_to(const render_style *s, const quern_filling *body, const quern_pose *pose, int width,
+	int height, float *distance) {
 	float least = INFINITY;
 	for (int y = 0; y < height; y++)
 		for (int begin = 0; begin < width; begin += RUN) {
@@ -251,10 +249,13 @@ static float *distances(const render_style *s, int width, int height) {
 	if (!bodies || !bodies->n_slots) return NULL;
 	float *nearest = quern_take(n, sizeof(float)), *one = quern_take(n, sizeof(float));
 	for (size_t i = 0; i < n; i++) nearest[i] = INFINITY;
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	const bool posed = s->frame->n_poses == bodies->slots[0].n;
 	for (size_t b = 0; b < bodies->slots[0].n; b++) {
 		const quern_filling *body = &bodies->slots[0].filling[b];
 		if (!is_there(bodies, body)) continue;
-		const float more = thickening(s, body, distances_to(s, body, b, width, height, one));
+		const float more = thickening(
+			s, body, distances_to(s, body, posed ? &s->frame->pose[b] : &still, width, height, one));
 		for (size_t i = 0; i < n; i++) nearest[i] = fminf(nearest[i], one[i] - more);
 	}
 	free(one);

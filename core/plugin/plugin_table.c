@@ -125,7 +125,6 @@ static bool param(quern_table_reader *r, const char *of, const quern_param *row,
 	if (row->offset % alignment(row->type))
 		return quern_table_refuse(
 			r, "%s: '%s' lies at byte %u, where its type cannot", of, row->name, row->offset);
-	if (row->flags & ~127u) return quern_table_refuse(r, "%s: '%s' has unknown flags", of, row->name);
 	if (row->flags & QUERN_FILE && row->type != QUERN_T_TEXT)
 		return quern_table_refuse(r, "%s: '%s' is a file, so its type must be const char *", of, row->name);
 	if (!is_unit(row->unit) || !is_doc(row->doc) || !is_doc(row->text) ||

@@ -280,7 +280,8 @@ quern_step quern_run_record(quern_run *run, const quern_section *section) {
 		.n_slot = section ? run->plan->n_slot[i] : NULL,
 		.host = &quern_host_table,
 		.run = run,
-		.stage_step = run->entered };
+		.stage_step = run->entered,
+		.within = run->within };
 	memcpy(step.gravity, g->gravity, sizeof step.gravity);
 	memcpy(step.lower, g->lower, sizeof step.lower);
 	memcpy(step.upper, g->upper, sizeof step.upper);
@@ -525,15 +526,18 @@ static quern_status do_step(quern_run *run) {
 	const uint32_t substeps = quern_run_substeps(run);
 	quern_status status = run_phase(run, QUERN_BEGIN, c->dt);
 	for (uint32_t k = 0; k < substeps && status == QUERN_OK; k++) {
+		run->within = k;
 		status = run_phase(run, QUERN_SUBSTEP, c->dt / substeps);
 		c->substep++;
 	}
+	run->within = 0;
 	count_steps(run, true, substeps);
 	for (int phase = QUERN_DEPOSIT; phase <= QUERN_END && status == QUERN_OK; phase++)
 		status = run_phase(run, (quern_phase)phase, c->dt);
 	count_steps(run, false, 1);
 	c->step++;
 	c->at++;
+	run->entered = -1;
 	return status;
 }
 

@@ -35,9 +35,10 @@ struct quern_run {
 	quern_log *log;
 	char *folder; /* NULL: nothing is written */
 	struct quern_sidecars *sidecars;
-	/* of the scene's `stages`: the present one, -1 before the first; its first step, -1 if no values have changed; a plan
+	/* of the scene's `stages`: the present one, -1 before the first; this step if it begins with it, else -1; a plan
 	 * for each, NULL where that is the first one, which is the scene's own */
 	int64_t episode, entered;
+	uint32_t within; /* the substep that runs, of a step */
 	quern_plan **plans, *first_plan;
 	size_t n_plans;
 	const quern_plan_stage *stage; /* the one that runs, for messages; NULL between stages */

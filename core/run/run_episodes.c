@@ -7,27 +7,78 @@
 
 /* ---- plans ---- */
 
-static bool same_fields(const quern_store *a, const quern_store *b, const char **which) {
-	bool same = a->n_fields == b->n_fields && a->n_sets == b->n_sets;
-	for (size_t k = 0; k < a->n_fields && k < b->n_fields; k++) {
-		const quern_field *f = &a->fields[k], *g = &b->fields[k];
-		if (!strcmp(f->name, g->name) && f->shape == g->shape && f->twice == g->twice && f->kept == g->kept &&
-			f->local == g->local && f->lane == g->lane)
-			continue;
-		*which = f->name;
-		return false;
+/* A field of one that the other has not, or in another form; NULL: there is none. */
+static const char *other_field(const quern_store *a, const quern_store *b) {
+	for (size_t k = 0; k < a->n_fields; k++) {
+		const quern_field *f = &a->fields[k], *g = k < b->n_fields ? &b->fields[k] : NULL;
+		if (quern_store_field(b, f->name) < 0) return f->name;
+		if (!g || strcmp(f->name, g->name) != 0 || f->shape != g->shape || f->twice != g->twice ||
+			f->kept != g->kept || f->local != g->local || f->lane != g->lane)
+			return f->name;
 	}
-	if (!same) *which = a->n_fields > b->n_fields ? a->fields[b->n_fields].name : b->fields[a->n_fields].name;
-	return same;
+	return NULL;
 }
 
-static bool same_plugins(const quern_loader *a, const quern_loader *b, const char **which) {
-	const size_t n = quern_loader_count(a), m = quern_loader_count(b);
-	for (size_t i = 0; i < n || i < m; i++) {
-		*which = i < m ? quern_loader_at(b, i)->plugin.id : quern_loader_at(a, i)->plugin.id;
-		if (i >= n || i >= m || strcmp(quern_loader_at(a, i)->plugin.id, *which) != 0) return false;
+/* The first of two lists of fields is told from both ends, so that what is missing is named and not what stands in its
+ * place. */
+static const char *missing_field(const quern_store *a, const quern_store *b) {
+	for (size_t k = 0; k < a->n_fields; k++)
+		if (quern_store_field(b, a->fields[k].name) < 0) return a->fields[k].name;
+	for (size_t k = 0; k < b->n_fields; k++)
+		if (quern_store_field(a, b->fields[k].name) < 0) return b->fields[k].name;
+	const char *other = other_field(a, b);
+	return other ? other : other_field(b, a);
+}
+
+static const char *name_of(const quern_filling *f) {
+	const quern_node *name = f->instance->map ? quern_node_find(f->instance->map, "name") : NULL;
+	return name && name->kind == QUERN_NODE_SCALAR ? name->text : "";
+}
+
+/* The same plugins in the same places, called alike: sets have entries for them, and others know them by number. */
+static bool same_filling(const quern_slot_use *a, const quern_slot_use *b) {
+	for (size_t i = 0; i < a->n && i < b->n; i++)
+		if (strcmp(a->filling[i].instance->file->plugin.id, b->filling[i].instance->file->plugin.id) != 0 ||
+			strcmp(name_of(&a->filling[i]), name_of(&b->filling[i])) != 0)
+			return false;
+	return a->n == b->n;
+}
+
+/* A slot that is filled otherwise, or a solver; NULL: there is none. */
+static const char *other_plugins(const quern_scene *a, const quern_scene *b) {
+	for (size_t i = 0; i < a->n_sections && i < b->n_sections; i++) {
+		const quern_section *one = &a->sections[i], *two = &b->sections[i];
+		if (strcmp(one->name, two->name) != 0 ||
+			strcmp(one->solver->file->plugin.id, two->solver->file->plugin.id) != 0)
+			return one->name;
+		for (size_t k = 0; k < one->n_slots; k++)
+			if (!same_filling(&one->slots[k], &two->slots[k])) return one->slots[k].path;
 	}
-	return true;
+	return a->n_sections == b->n_sections ? NULL : "one of the sections";
+}
+
+/* A parameter that counts before the first step alone, and has another value; NULL: there is none. */
+static const char *other_start(const quern_scene *a, const quern_scene *b, const char **of) {
+	for (size_t i = 0; i < a->n_instances && i < b->n_instances; i++) {
+		const quern_instance *one = a->instances[i], *two = b->instances[i];
+		for (const quern_param *row = one->file->params; row && row->name; row++) {
+			if (!(row->flags & QUERN_ONCE)) continue;
+			const quern_param alone[] = { *row, { .name = NULL } };
+			quern_text text[2] = { { 0 }, { 0 } };
+			const void *self[2] = { one->self, two->self };
+			for (int k = 0; k < 2; k++) {
+				quern_node *map = quern_node_create(QUERN_NODE_MAP);
+				quern_params_write(alone, self[k], (uint32_t)a->general.dimension, NULL, map);
+				quern_node_print(map, 0, &text[k]);
+				quern_node_destroy(map);
+			}
+			const bool same = !strcmp(quern_text_string(&text[0]), quern_text_string(&text[1]));
+			for (int k = 0; k < 2; k++) quern_text_finish(&text[k]);
+			*of = one->path;
+			if (!same) return row->name;
+		}
+	}
+	return NULL;
 }
 
 static double cell_of(const quern_scene *s) {
@@ -40,21 +91,28 @@ static double cell_of(const quern_scene *s) {
 }
 
 /* The state goes from plan to plan as it is. */
-static void check(quern_run *run, const quern_scene *other, const quern_plan *plan) {
+static void check(quern_run *run, size_t episode, const quern_scene *other, const quern_plan *plan) {
 	quern_report *report = run->scene->report;
-	const quern_entry *entry = quern_node_entry(run->scene->tree->root, "stages");
-	const char *which = "";
-	if (!same_plugins(run->scene->loader, other->loader, &which))
-		quern_report_add(report, entry->mark,
-			"stages: %s is there in one and not in another: a stage changes values, not what takes part",
+	const quern_node *list = quern_node_find(run->scene->tree->root, "stages");
+	const quern_mark mark = list->entries[episode].value->mark;
+	const char *of = "", *which = other_plugins(run->scene, other);
+	if (which)
+		quern_report_add(report, mark,
+			"stages: %s must hold the same plugins as the scene, in the same order and by the same names: a "
+			"stage changes values, not what takes part",
 			which);
-	else if (!same_fields(&run->plan->store, &plan->store, &which))
-		quern_report_add(report, entry->mark,
-			"stages: the field %s is there in one and not in another: a stage changes values, not what is "
-			"computed",
+	else if ((which = other_start(run->scene, other, &of)))
+		quern_report_add(report, mark,
+			"stages: %s.%s cannot change in the course of a run: it counts before the first step alone", of,
+			which);
+	else if ((which = missing_field(&run->plan->store, &plan->store)))
+		quern_report_add(report, mark,
+			"stages: the field %s is there in one and not in another, or otherwise: what a stage switches "
+			"on, such as "
+			"friction or a motion, must be on in the scene, be it by a tiny value",
 			which);
 	else if (cell_of(run->scene) != cell_of(other))
-		quern_report_add(report, entry->mark, "stages: the grid's cell cannot change in the course of a run");
+		quern_report_add(report, mark, "stages: the grid's cell cannot change in the course of a run");
 }
 
 void quern_run_plan_episodes(quern_run *run) {
@@ -69,7 +127,7 @@ void quern_run_plan_episodes(quern_run *run) {
 		if (!other) continue;
 		run->plans[k] = quern_plan_create(other, run->pool);
 		quern_report_take(scene->report, other->report);
-		if (!quern_report_errors(scene->report)) check(run, other, run->plans[k]);
+		if (!quern_report_errors(scene->report)) check(run, k, other, run->plans[k]);
 	}
 }
 
@@ -109,10 +167,9 @@ static void change_plan(quern_run *run, int64_t episode) {
 void quern_run_enter_episode(quern_run *run, double time) {
 	const int64_t k = quern_episode_at(run->scene, time);
 	if (k == run->episode) return;
-	const bool changes = run->scene->episodes[k].scene || (run->episode >= 0 && run->plan != run->first_plan);
 	change_plan(run, k);
-	if (changes) run->entered = run->clock.step;
-	if (run->log && (k || changes))
+	run->entered = run->clock.step;
+	if (run->log)
 		quern_log_add(run->log, 1, "stage %lld of the scene, from t = %.6g s on", (long long)k, time);
 }
 

@@ -69,6 +69,13 @@ static bool check_keys(quern_scene *s, const quern_node *item) {
 	return false;
 }
 
+/* What differs from a frame's time, or from the end, by round-off alone is that time. */
+static double snap(const quern_general *g, double time) {
+	const double n = floor(time / g->every + 0.5), frame = n * g->every;
+	if (fabs(time - g->end) <= 1e-9 * g->end) return g->end;
+	return fabs(time - frame) <= 1e-9 * fmax(time, g->every) ? frame : time;
+}
+
 /* An episode lasts for its time, the last one to the end. */
 static void read_item(quern_scene *s, const quern_node *list, size_t i, double *begin) {
 	const quern_entry *item = &list->entries[i];
@@ -87,7 +94,7 @@ static void read_item(quern_scene *s, const quern_node *list, size_t i, double *
 			s->report, item->value->mark, "stages: for is missing: all but the last one need it");
 	quern_episode *e = &s->episodes[s->n_episodes++];
 	*e = (quern_episode) { .begin = *begin, .scene = set ? vary(s, set) : NULL };
-	*begin += length;
+	*begin = isfinite(length) ? snap(&s->general, *begin + length) : *begin + length;
 	if (!last && isfinite(*begin) && *begin >= s->general.end)
 		quern_report_add(s->report, item->value->mark,
 			"stages: this one would end at %.6g s, and time.end is %.6g s", *begin, s->general.end);

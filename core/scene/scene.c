@@ -101,7 +101,8 @@ quern_setup quern_scene_setup(const quern_scene *s, const char *path) {
 	quern_setup setup = { .dim = (uint32_t)s->general.dimension,
 		.lanes = QUERN_LANES,
 		.host = s->host,
-		.scene = (void *)(uintptr_t)s };
+		.scene = (void *)(uintptr_t)s,
+		.later = s->later };
 	setup.stream =
 		quern_hash(path, strlen(path)) ^ ((uint64_t)(uint32_t)s->general.seed * 0x9e3779b97f4a7c15u);
 	memcpy(setup.gravity, s->general.gravity, sizeof setup.gravity);
@@ -334,6 +335,7 @@ quern_scene *quern_scene_read(const char *path, const char *const *sets, const q
 quern_scene *quern_scene_vary(quern_tree *tree, const quern_host *host) {
 	quern_scene *s = create(host);
 	s->tree = tree;
+	s->later = true;
 	resolve(s);
 	return s;
 }

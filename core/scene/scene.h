@@ -74,6 +74,7 @@ typedef struct quern_episode {
 
 typedef struct quern_scene {
 	quern_general general;
+	bool later; /* these are the values of a stage of another scene */
 	bool sound; /* dimension, gravity and domain may be relied on */
 	quern_report *report;
 	quern_units *units;

@@ -82,7 +82,9 @@ enum {
 	QUERN_MAYBE = 8,     /* may be left out: the member is then NaN (every component), INT32_MIN or NULL */
 	QUERN_PLANAR = 16,   /* `planar` is the default in 2-D, `def` in 3-D */
 	QUERN_ADVANCED = 32, /* listed apart by `describe` */
-	QUERN_FILE = 64      /* T_TEXT: a file that must exist; relative to the scene's folder */
+	QUERN_FILE = 64,     /* T_TEXT: a file that must exist; relative to the scene's folder */
+	QUERN_ONCE =
+		128 /* since 2.1: it counts before the first step alone: stages of a scene cannot change it */
 };
 
 /* One row feeds the scene reader, `describe`, the JSON Schema, the resolved scene and the fuzzer. */
@@ -287,6 +289,7 @@ typedef struct quern_setup {
 	bool periodic[3];
 	const quern_host *host;
 	void *scene; /* opaque */
+	bool later;  /* since 2.1: the values of one of the scene's `stages`, which come after the release */
 } quern_setup;
 
 /* ==== plugin and library ==== */

@@ -93,9 +93,10 @@ typedef struct quern_step {
 	const uint32_t *n_slot;
 	const quern_host *host;
 	quern_run *run;
-	/* since 2.1: the step with which the present one of the scene's `stages` began, -1 where it has none; keys may have
-	 * other values from that step on */
+	/* since 2.1: this step's number if one of the scene's `stages` begins with it, so that keys may have other values than in
+	 * the last step; else -1 */
 	int64_t stage_step;
+	uint32_t within; /* since 2.1: which of n_substeps this is, from 0; 0 in other phases */
 } quern_step;
 
 enum {

@@ -57,25 +57,19 @@ static inline body_pose *quern_body_poses(
 
 /* The same as they are now: at the beginning of this substep, or of the step. */
 static inline body_pose *quern_body_poses_now(const quern_step *s, uint32_t slot) {
-	const quern_real now = s->time + (quern_real)(s->substep % s->n_substeps) * s->dt;
+	const quern_real now = s->time + (quern_real)s->within * s->dt;
 	return quern_body_poses(s, slot, now, now);
 }
 
-/* m/s, the fastest place of any body, now or at the end of the step. */
-static inline quern_real quern_bodies_speed(const quern_step *s, uint32_t slot) {
+/* m/s, no less than the speed of any place of any body between two times. */
+static inline quern_real quern_bodies_speed(
+	const quern_step *s, uint32_t slot, quern_real from, quern_real to) {
 	quern_real most = 0;
 	for (uint32_t b = 0; b < s->n_slot[slot]; b++) {
 		const body_motion *motion = &((const body_item *)s->slot[slot][b].item)->motion;
-		body_pivot pivot;
-		body_pose pose;
 		if (!quern_motion_is_any(motion)) continue;
-		quern_motion_pivot(motion, &s->slot[slot][b], s->dim, &pivot);
-		for (int end = 0; end < 2; end++) {
-			const quern_real time = s->time + (quern_real)(s->substep % s->n_substeps + end) * s->dt;
-			quern_motion_at(motion, &pivot, time, time, &pose);
-			const quern_real speed = quern_motion_speed(&pose, &s->slot[slot][b], s->dim, s->lower, s->upper);
-			most = speed > most ? speed : most;
-		}
+		const quern_real speed = quern_motion_speed(motion, &s->slot[slot][b], s, from, to);
+		most = speed > most ? speed : most;
 	}
 	return most;
 }

@@ -28,7 +28,8 @@ static void go_straight(const body_motion *m, quern_real since, bool on, course 
 
 /* It begins where the body stands, whatever the phase. */
 static void swing(const body_motion *m, quern_real since, bool on, course *c) {
-	const quern_real omega = 6.283185307179586 * m->frequency, at = omega * since + m->phase;
+	const quern_real omega = 6.283185307179586 * m->frequency, turns = m->frequency * since;
+	const quern_real at = 6.283185307179586 * (turns - floor(turns)) + m->phase;
 	const quern_real way = quern_sin(at) - quern_sin(m->phase), rate = omega * quern_cos(at);
 	if (!(m->frequency > 0)) return;
 	c->shift = quern_vec_axpy(way, QUERN_VEC_OF(m->amplitude), c->shift);
@@ -85,8 +86,11 @@ void quern_motion_at(
 	const course at = course_at(m, time), then = course_at(m, rate);
 	const quern_vec c = QUERN_VEC_OF(p->about), pivot = quern_vec_add(c, at.shift),
 					spin = quern_vec_scale(then.spin, QUERN_VEC_OF(p->axis));
+	const quern_real whole =
+		floor(at.angle * 0.15915494309189535); /* turns: sines of huge angles mean nothing */
+	const quern_real angle = fabs(at.angle) > 1e5 ? at.angle - 6.283185307179586 * whole : at.angle;
 	*out = (body_pose) { .moves = then.spin != 0 || quern_vec_dot(then.velocity, then.velocity, 3) > 0 };
-	turn_about(p->axis, at.angle, out->pose.turn);
+	turn_about(p->axis, angle, out->pose.turn);
 	const quern_vec origin = quern_vec_sub(pivot, quern_vec_turn(out->pose.turn, c));
 	const quern_vec drift = quern_vec_add(then.velocity, quern_vec_cross(spin, quern_vec_sub(origin, pivot)));
 	const quern_real to[4][3] = { { origin.x, origin.y, origin.z }, { drift.x, drift.y, drift.z },
@@ -133,24 +137,42 @@ void quern_motion_repeat(body_pose *p, const quern_bound *body, uint32_t dim, co
 	}
 }
 
-/* Of a corner of the body's own box, or of the domain where it has none: no place is farther from the axis. */
-quern_real quern_motion_speed(const body_pose *p, const quern_bound *body, uint32_t dim,
-	const quern_real lower[3], const quern_real upper[3]) {
-	const quern_vec drift = QUERN_VEC_OF(p->pose.velocity), spin = QUERN_VEC_OF(p->pose.spin),
-					at = QUERN_VEC_OF(p->pose.position);
-	quern_real low[3] = { 0 }, high[3] = { 0 }, most = 0;
-	bool bounded = true;
-	if (!p->moves) return 0;
-	((const quern_body_ops *)body->ops)->bounds(body->self, dim, low, high);
-	for (uint32_t k = 0; k < dim; k++) bounded = bounded && isfinite(low[k]) && isfinite(high[k]);
-	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
-		quern_real x[3] = { 0 };
-		for (uint32_t k = 0; k < dim; k++)
-			x[k] = bounded ? (corner >> k & 1 ? high[k] : low[k]) : corner >> k & 1 ? upper[k] : lower[k];
-		const quern_vec place = QUERN_VEC_OF(x);
-		const quern_vec arm = bounded ? quern_vec_turn(p->pose.turn, place) : quern_vec_sub(place, at);
-		const quern_vec v = quern_vec_add(drift, quern_vec_cross(spin, arm));
-		most = quern_max(most, sqrt(quern_vec_dot(v, v, 3)));
+/* Largest rates of way and of turning from `from` to `to`, whenever they come. */
+static void fastest(const body_motion *m, quern_real from, quern_real to, quern_real *way, quern_real *turn) {
+	const body_place *row = m->table.items;
+	const quern_real omega = 6.283185307179586 * m->frequency;
+	*way = *turn = 0;
+	if (from < m->until && to >= m->from) {
+		const quern_vec v = QUERN_VEC_OF(m->velocity), a = QUERN_VEC_OF(m->amplitude);
+		*way = sqrt(quern_vec_dot(v, v, 3)) + omega * sqrt(quern_vec_dot(a, a, 3));
+		*turn = fabs(m->spin) + omega * fabs(m->swing);
 	}
-	return most;
+	quern_real along = 0, about = 0;
+	for (uint32_t k = 0; k + 1 < m->table.n; k++) {
+		if (row[k + 1].time < from || row[k].time > to) continue;
+		const quern_real length = row[k + 1].time - row[k].time;
+		const quern_vec d = quern_vec_sub(QUERN_VEC_OF(row[k + 1].shift), QUERN_VEC_OF(row[k].shift));
+		along = quern_max(along, sqrt(quern_vec_dot(d, d, 3)) / length);
+		about = quern_max(about, fabs(row[k + 1].angle - row[k].angle) / length);
+	}
+	*way += along;
+	*turn += about;
+}
+
+/* Of a corner of the body's own box, or of the domain where it has none: no place is farther from the pivot. */
+quern_real quern_motion_speed(
+	const body_motion *m, const quern_bound *body, const quern_step *s, quern_real from, quern_real to) {
+	quern_real low[3] = { 0 }, high[3] = { 0 }, way, turn, arm2 = 0;
+	body_pivot pivot;
+	fastest(m, from, to, &way, &turn);
+	if (!(turn > 0)) return way;
+	quern_motion_pivot(m, body, s->dim, &pivot);
+	((const quern_body_ops *)body->ops)->bounds(body->self, s->dim, low, high);
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const bool bounded = isfinite(low[k]) && isfinite(high[k]);
+		const quern_real a = fabs((bounded ? low[k] : s->lower[k]) - pivot.about[k]),
+						 b = fabs((bounded ? high[k] : s->upper[k]) - pivot.about[k]);
+		arm2 += quern_max(a, b) * quern_max(a, b);
+	}
+	return way + turn * sqrt(arm2);
 }

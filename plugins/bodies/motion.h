@@ -57,6 +57,7 @@ static inline void quern_motion_bring_all(
 	for (uint32_t k = 0; k < dim; k++)
 		for (uint32_t i = 0; i < n; i++) to[k][i] = quern_motion_bring(p, k, from[k][i]);
 }
-/* Most that any place of it moves in a second at these velocities, m/s; of one without bounds, within the domain. */
-quern_real quern_motion_speed(const body_pose *, const quern_bound *body, uint32_t dim,
-	const quern_real lower[3], const quern_real upper[3]);
+/* m/s, no less than the speed of any place of the body at any time between these two; where it has no bounds, of any place in
+ * the domain as it stood at first. */
+quern_real quern_motion_speed(
+	const body_motion *, const quern_bound *body, const quern_step *, quern_real from, quern_real to);

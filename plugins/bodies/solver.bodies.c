@@ -92,7 +92,19 @@ static const quern_slot slots[] = { { .name = "",
 /* clang-format on */
 QUERN_USE_ENUM(SHOW_USES);
 static const quern_use place_uses[] = QUERN_USE_ROWS(PLACE_USES);
+/* clang-format off */
+#define LAST_USES(X, access) \
+	X(LAST_POSITION, "body.last_position", "m", access, QUERN_VECTOR, .when = "moving", \
+		.doc = "Its position when the last step had ended.") \
+	X(LAST_TURN, "body.last_turn", "1", access, QUERN_TENSOR, .when = "moving", .initial = 1, \
+		.doc = "Its turn then.")
+#define FOLLOW_USES(X) LAST_USES(X, QUERN_WRITE)
+#define JOIN_USES(X) LAST_USES(X, QUERN_READ)
+/* clang-format on */
+QUERN_USE_ENUM(JOIN_USES);
+static const quern_use follow_uses[] = QUERN_USE_ROWS(FOLLOW_USES);
 static const quern_use show_uses[] = QUERN_USE_ROWS(SHOW_USES);
+static const quern_use join_uses[] = QUERN_USE_ROWS(JOIN_USES);
 
 enum { LONGEST_NAME = 40 };
 
@@ -198,6 +210,16 @@ static quern_status place(const void *self, const quern_step *s) {
 	return s->host->remap(s->run, "body", n, from, 0, NULL);
 }
 
+static void put_poses(
+	const quern_step *s, const body_pose *pose, const quern_column *position, const quern_column *turn) {
+	for (uint32_t b = 0; b < s->n_slot[0]; b++)
+		for (uint32_t k = 0; k < s->dim; k++) {
+			if (position->real[0]) position->real[k][b] = pose[b].pose.position[k];
+			for (uint32_t l = 0; l < s->dim && turn->real[0]; l++)
+				turn->real[s->dim * k + l][b] = pose[b].pose.turn[3 * k + l];
+		}
+}
+
 /* For whoever looks: solvers ask for the poses of their own time. */
 static quern_status show(const void *self, const quern_step *s) {
 	const quern_column *u = s->use;
@@ -205,15 +227,48 @@ static quern_status show(const void *self, const quern_step *s) {
 	const body_pose *pose = quern_body_poses(s, 0, s->time, s->time);
 	(void)self;
 	if (!pose) return QUERN_E_MEMORY;
+	put_poses(s, pose, &u[SHOW_POSITION], &u[SHOW_TURN]);
 	for (uint32_t b = 0; b < s->n_slot[0]; b++) {
-		for (uint32_t k = 0; k < dim; k++) {
-			if (u[SHOW_POSITION].real[0]) u[SHOW_POSITION].real[k][b] = pose[b].pose.position[k];
-			if (u[SHOW_VELOCITY].real[0]) u[SHOW_VELOCITY].real[k][b] = pose[b].pose.velocity[k];
-			for (uint32_t l = 0; l < dim && u[SHOW_TURN].real[0]; l++)
-				u[SHOW_TURN].real[dim * k + l][b] = pose[b].pose.turn[3 * k + l];
-		}
+		for (uint32_t k = 0; k < dim && u[SHOW_VELOCITY].real[0]; k++)
+			u[SHOW_VELOCITY].real[k][b] = pose[b].pose.velocity[k];
 		for (uint32_t k = 0; k < n_turn && u[SHOW_SPIN].real[0]; k++)
 			u[SHOW_SPIN].real[k][b] = pose[b].pose.spin[dim == 3 ? k : 2];
+	}
+	return QUERN_OK;
+}
+
+/* Where bodies have come to at the end of a step: the next one may begin a stage of the scene, with another course. */
+static quern_status follow(const void *self, const quern_step *s) {
+	if (!((const bodies *)self)->moving) return QUERN_OK;
+	const body_pose *pose = quern_body_poses(s, 0, s->time + s->dt, s->time + s->dt);
+	if (!pose) return QUERN_E_MEMORY;
+	put_poses(s, pose, &s->use[LAST_POSITION], &s->use[LAST_TURN]);
+	return QUERN_OK;
+}
+
+/* A course is reckoned from its own keys alone: at a stage of the scene it must lead on from where the last one ended. */
+static quern_status lead_on(const void *self, const quern_step *s) {
+	const quern_column at = s->use[LAST_POSITION], turn = s->use[LAST_TURN];
+	const uint32_t dim = s->dim;
+	if (!((const bodies *)self)->moving || s->step != s->stage_step || !s->step) return QUERN_OK;
+	const body_pose *pose = quern_body_poses_now(s, 0);
+	if (!pose) return QUERN_E_MEMORY;
+	for (uint32_t b = 0; b < s->n_slot[0]; b++) {
+		quern_real jump = 0, size = 0;
+		for (uint32_t k = 0; k < dim; k++) {
+			size += (s->upper[k] - s->lower[k]) * (s->upper[k] - s->lower[k]);
+			jump = fmax(jump, fabs(pose[b].pose.position[k] - at.real[k][b]));
+			for (uint32_t l = 0; l < dim; l++)
+				jump =
+					fmax(jump, sqrt(size) * fabs(pose[b].pose.turn[3 * k + l] - turn.real[dim * k + l][b]));
+		}
+		char which[BODY_WORDS];
+		if (!(jump > 1e-9 * sqrt(size))) continue;
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+			"%s would jump by %.3g m where this stage of the scene begins: a stage's motion is reckoned from "
+			"t = 0 "
+			"on, by its own keys alone; let it lead on from there by from, until and table",
+			quern_body_say(&s->slot[0][b], b, which), jump);
 	}
 	return QUERN_OK;
 }
@@ -223,6 +278,16 @@ static const quern_stage stages[] = { { .name = "bodies.place",
 										  .phase = QUERN_SETUP,
 										  .uses = place_uses,
 										  .run = place },
+	{ .name = "bodies.lead_on",
+		.doc = "No body jumps where a stage of the scene begins.",
+		.phase = QUERN_BEGIN,
+		.uses = join_uses,
+		.run = lead_on },
+	{ .name = "bodies.follow",
+		.doc = "Where bodies have come to.",
+		.phase = QUERN_END,
+		.uses = follow_uses,
+		.run = follow },
 	{ .name = "bodies.show",
 		.doc = "Where bodies are.",
 		.phase = QUERN_OUTPUT,

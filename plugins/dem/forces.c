@@ -139,7 +139,10 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
 	sh->booked =
 		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * N_BOOKED * sizeof(quern_real));
-	sh->pose = quern_body_poses_now(s, SLOT_BODIES);
+	/* an integrator in two parts has moved the grains on already: bodies are where they will be then */
+	const quern_real ahead = !sh->looks && integrator->open[s->dim - 2] ? 1 : 0;
+	const quern_real now = s->time + ((quern_real)s->within + ahead) * s->dt;
+	sh->pose = quern_body_poses(s, SLOT_BODIES, now, now);
 	if (!sh->pose) return false;
 	sh->works = !sh->looks && s->use[FORCE_WORK].real[0];
 	sh->twists = !sh->looks && s->use[FORCE_TWIST].real[0];
@@ -165,7 +168,8 @@ static quern_real farthest_with_bodies(const forces_shared *sh, quern_real farth
 	const quern_step *s = sh->s;
 	quern_real *swept = sh->use[FORCE_SWEPT].real[0];
 	if (!swept || s->settling) return farthest;
-	*swept += quern_bodies_speed(s, SLOT_BODIES) * s->dt;
+	const quern_real now = s->time + (quern_real)s->within * s->dt;
+	*swept += quern_bodies_speed(s, SLOT_BODIES, now - s->dt, now + 2 * s->dt) * s->dt;
 	return fmax(farthest, 0.5 * (farthest + *swept));
 }
 

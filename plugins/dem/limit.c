@@ -86,7 +86,7 @@ static void look_for_lightest(const quern_step *s, lightest *of) {
 /* By material. Before there are grains, what the distributions may bring. */
 static void lightest_grains(const dem *d, const quern_step *s, lightest *of) {
 	bool any = false;
-	for (uint32_t k = 0; k < MOST_MATERIALS; k++)
+	for (uint32_t k = 0; k < d->n_materials; k++)
 		of[k] = (lightest) { .mass = { INFINITY, INFINITY }, .radius = INFINITY };
 	look_for_lightest(s, of);
 	for (uint32_t k = 0; k < d->n_materials; k++) any = any || isfinite(of[k].mass[0]);
@@ -163,7 +163,8 @@ quern_real quern_dem_limit(const void *self, const quern_step *s, quern_real *ha
 	else snprintf(reason, 160, "grains without a contact law");
 	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
 	const quern_real chosen = by_period ? fast.period / 50 : 0.5 * first.hard;
-	const quern_real speed = d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES) : 0;
+	const quern_real speed =
+		d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY) : 0;
 	if (!(0.1 * least < speed * chosen)) return chosen;
 	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, least);
 	return 0.1 * least / speed;

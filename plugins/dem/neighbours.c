@@ -378,18 +378,7 @@ static quern_status keep_inside(const listing *l) {
 
 /* At the release other bodies are there than while settling, whatever has moved; and when a stage of the scene begins. */
 static bool is_release(const quern_step *s) {
-	return !s->settling && s->substep % s->n_substeps == 0 && (s->step == 0 || s->step == s->stage_step);
-}
-
-/* A stage of the scene may change what pairs of materials do, not take a material away from its grains. */
-static quern_status keep_materials(const quern_step *s, const dem *d) {
-	const int32_t *material = s->use[NEAR_MATERIAL].index;
-	for (uint32_t i = 0; i < s->host->set(s->run, "grain").n && material; i++)
-		if (material[i] >= (int32_t)d->n_materials)
-			return s->host->stop(s->run, QUERN_E_PARAM, "materials", -1,
-				"a stage of the scene has %u of them, and there are grains of number %d, counted from 0",
-				d->n_materials, material[i]);
-	return QUERN_OK;
+	return !s->settling && s->within == 0 && (s->step == 0 || s->step == s->stage_step);
 }
 
 /* Before the first step there is no list yet, or that of settling; after it there always is one. */
@@ -403,8 +392,7 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 	l.ops = l.search->ops;
 	const quern_real moved = s->use[NEAR_DISPLACEMENT].real[0][0];
 	if (moved < 0.5 * l.d->skin * 2 * l.d->material[0].radii.mean && !is_release(s)) return QUERN_OK;
-	quern_status status = keep_materials(s, l.d);
-	if (status == QUERN_OK) status = keep_inside(&l);
+	quern_status status = keep_inside(&l);
 	if (status == QUERN_OK) status = sort_grains(&l);
 	if (status == QUERN_OK) status = check_periodic(&l);
 	if (status == QUERN_OK) status = list_contacts(&l);

@@ -61,7 +61,8 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		"Several materials, by name: {sand: {density: ..., radius: ...}, ...}. The first stands for all "
 		"where a number "
 		"such as `grain.diameter` is taken.",
-		.rows = material_rows, .item_size = sizeof(dem_material), .text = "name", .max = MOST_MATERIALS),
+		.rows = material_rows, .item_size = sizeof(dem_material), .text = "name", .max = MOST_MATERIALS,
+		.flags = QUERN_ONCE),
 	QUERN_PARAM(dem, pairs, NULL,
 		"Pairs of materials whose contacts have parameters of their own, such as {between: [sand, steel], "
 		"friction: 0.2}.",
@@ -233,7 +234,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
 	if (d->file) d->fixed = true; /* its header may say so */
 	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = dem_diameter(d);
-	if (d->settles && !(gravity > 0))
+	if (d->settles && !(gravity > 0) && !setup->later)
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);

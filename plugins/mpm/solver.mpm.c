@@ -166,7 +166,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		const quern_real v2 = cloud_square(&s->use[FILL_VELOCITY], i, s->dim);
 		fastest = v2 > fastest ? v2 : fastest;
 	}
-	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES);
+	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY);
 	fastest = sqrt(fastest);
 	fastest = bodies > fastest ? bodies : fastest;
 	const quern_real modulus = s->dim * p->bulk > 2 * p->shear ? s->dim * p->bulk : 2 * p->shear;

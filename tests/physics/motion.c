@@ -126,6 +126,64 @@ static void a_wall_that_comes_is_a_grain_that_comes(void **state) {
 	}
 }
 
+/* Against a wall that swings, an elastic grain's rebound converges with the order of the integrator, since wall and grain are
+ * looked at at one time. */
+static double rebound(const char *integrator, double step) {
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [-1, -1], upper: [1, 1]}, time: {end: "
+		"0.08, step: %.17g}, "
+		"output: {every: 0.08},\n"
+		"bodies: [{plane: {point: [0, 0], normal: [1, 0], motion: {sinus: {amplitude: [0.02, 0], frequency: "
+		"5}}}}],\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.01}}, contact: {linear: {stiffness: 1e5, "
+		"restitution: 1, friction: "
+		"0}}, integrator: %s, place: [{position: [0.03, 0.1], velocity: [-0.5, 0]}]}}\n",
+		step, integrator);
+	harness_until(run, 0.08);
+	const double v = harness_field(run, "grain.velocity").real[0][0];
+	harness_close(run);
+	return v;
+}
+
+static void a_wall_and_a_grain_are_at_one_time(void **state) {
+	(void)state;
+	const double right = rebound("velocity_verlet", 1e-6);
+	double error[3];
+	for (int k = 0; k < 3; k++) error[k] = fabs(rebound("velocity_verlet", 8e-5 / (1 << k)) - right);
+	print_message("elastic rebound from a swinging wall: %.9g m/s, off by %.2g, %.2g, %.2g\n", right,
+		error[0], error[1], error[2]);
+	assert_true(right > 0.6 && error[0] > 3 * error[1] && error[1] > 3 * error[2] && error[0] < 1e-3);
+}
+
+/* A wall that sets off late, or leaps in its table, limits the step from the beginning: nothing is run through. */
+static void nothing_is_run_through(void **state) {
+	static const char *const courses[] = { "velocity: [20, 0], from: 0.01",
+		"sinus: {amplitude: [0.05, 0], frequency: 60, phase: -90 deg}",
+		"table: [{time: 0.01}, {time: 0.012, shift: [0.05, 0]}]" };
+	(void)state;
+	for (size_t k = 0; k < sizeof courses / sizeof *courses; k++) {
+		quern_run *run = harness_open(1,
+			"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [-1, -1], upper: [10, 1]}, time: "
+			"{end: 0.02}, output: "
+			"{every: 0.02},\n"
+			"bodies: [{box: {lower: [-0.05, -0.1], upper: [0, 0.1], motion: {%s}}}],\n"
+			"grains: {material: {density: 2500, radius: {mean: 0.01}}, overlap: {most: 0}, contact: {linear: "
+			"{stiffness: 1e8, "
+			"restitution: 1, friction: 0}}, place: [{position: [0.0101, 0]}]}, observe: [energy, "
+			"{wall_torque: {body: 0}}]}\n",
+			courses[k]);
+		harness_until(run, 0.02);
+		const double v = harness_field(run, "grain.velocity").real[0][0],
+					 m = harness_field(run, "grain.mass").real[0][0];
+		const double work = harness_field(run, "body.work").real[0][0];
+		print_message("%s: the grain leaves with %.4g m/s, of %.6g J work %.6g\n", courses[k], v,
+			0.5 * m * v * v, work);
+		assert_true(v > 10);
+		assert_near(0.5 * m * v * v, work, 0.02 * work);
+		harness_close(run);
+	}
+}
+
 /* What a body is told to have given is what the grains have got: momentum, moment about its pivot, and work. */
 static double kinetic(quern_run *run, int dim, double momentum[3], double moment[3], const double pivot[3]) {
 	const quern_column x = harness_field(run, "grain.position"), v = harness_field(run, "grain.velocity"),
@@ -408,6 +466,8 @@ int main(void) {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(they_are_where_their_keys_say),
 		cmocka_unit_test(a_wall_that_comes_is_a_grain_that_comes),
+		cmocka_unit_test(a_wall_and_a_grain_are_at_one_time),
+		cmocka_unit_test(nothing_is_run_through),
 		cmocka_unit_test(what_a_turning_box_gives_is_booked),
 		cmocka_unit_test(a_belt_takes_a_grain_along),
 		cmocka_unit_test(lists_follow_what_moves),

@@ -28,7 +28,7 @@ def newer_headers(folder):
     longer = 0
     for header in (SOURCE / "include/quern").iterdir():
         text = header.read_text().replace(f"#define QUERN_ABI_MINOR {MINOR}u", f"#define QUERN_ABI_MINOR {MINOR + 1}u")
-        text, n = re.subn(LONGER, r"\tuint64_t later[3];\n} \1;", text)
+        text, n = re.subn(LONGER, r"\tuint64_t grown[3];\n} \1;", text)
         longer += n
         (place / header.name).write_text(text)
     assert longer > 25, f"only {longer} structs are longer"

@@ -105,7 +105,6 @@ TABLES = [
     (library(rows=f"{{ {ROW}, .offset = 60 }},"), "lies at bytes 60 to 68 of 64"),
     (library(rows=f"{{ {ROW}, .offset = 4 }},"), "lies at byte 4, where its type cannot"),
     (library(rows=f"{{ {ROW}, .type = 77 }},"), "'a' has the unknown type 77"),
-    (library(rows=f"{{ {ROW}, .flags = 128 }},"), "'a' has unknown flags"),
     (library(rows=f"{{ {ROW}, .min = 1, .max = -1 }},"), "the range of 'a' is empty"),
     (library(rows=f"{{ {ROW}, .def = NAN }},"), "the default nan of 'a' is no number"),
     (library(rows=f"{{ {ROW}, .type = QUERN_T_INT, .def = 1e300 }},"), "of 'a' is no whole number"),

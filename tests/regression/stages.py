@@ -121,9 +121,77 @@ def stages_of_one_value_change_nothing(place):
     print("two grains, with stages that change nothing: the same")
 
 
+PADDLE = """
+quern: 1
+dimension: 2
+gravity: [0, -9.81]
+domain: {lower: [-0.05, -0.05], upper: [0.05, 0.05]}
+time: {end: 60 ms}
+grains:
+  material: {density: 2500, radius: {mean: 3 mm}}
+  contact: {linear: {stiffness: 1e5, restitution: 0.5, friction: 0.3}}
+  fill: {region: {box: {lower: [-0.04, -0.04], upper: [0.04, -0.02]}}, settle: true}
+bodies:
+  - plane: {name: floor, point: [0, -0.05], normal: [0, 1]}
+  - box: {name: paddle, lower: [-0.04, 0.02], upper: [-0.03, 0.04], motion: {velocity: [0.5, 0]}}
+  - plane: {name: left, point: [-0.05, 0], normal: [1, 0]}
+  - plane: {name: right, point: [0.05, 0], normal: [-1, 0]}
+stages: STAGES
+output: {every: 10 ms}
+"""
+
+
+def courses_lead_on(place):
+    """A paddle that another stage leaves where it has come to goes on; one that would jump ends the run by a sentence."""
+    def paddle(name, stages, status=0):
+        out = place / name
+        return out, lab.run(write(place, name, PADDLE.replace("STAGES", stages)), out, status=status)
+
+    out, _ = paddle("on", "[{for: 25 ms}, {set: {bodies.paddle.motion: {velocity: [0.5, 0], until: 25 ms}}}]")
+    with last(out) as file:
+        assert abs(file["bodies/position"][1, 0] - 0.0125) < 1e-12
+    _, said = paddle("jump", "[{for: 25 ms}, {set: {bodies.paddle.motion.velocity: [0.1, 0]}}]", status=3)
+    assert "body 'paddle', a body.box would jump by 0.01 m" in said, said
+    # gravity may go once all is at rest
+    out, _ = paddle("off", "[{for: 20 ms}, {set: {gravity: [0, 0]}}]")
+    print("courses lead on, or are refused; gravity may go")
+
+
+def frames_stand_alone(place):
+    """Where a stage ends with a frame but for round-off, there is one frame and no step of no length."""
+    for every, first, second in (("10 ms", "10 ms", "50 ms"), ("0.3", "0.1", "0.2"), ("0.1", "0.1", "0.2")):
+        out = place / f"frames_{every.replace(' ', '')}_{first.replace(' ', '')}"
+        text = FLIGHT.format(stages=f"[{{for: {first}}}, {{for: {second}}}, {{set: {{gravity: [1, 0]}}}}]")
+        text = text.replace("every: 0.1", f"every: {every}")
+        lab.run(write(place, "frames", text), out)
+        times = []
+        for path in lab.frames(out):
+            with h5py.File(path) as file:
+                times.append(float(file.attrs["time"]))
+        gaps = [b - a for a, b in zip(times, times[1:])]
+        assert min(gaps) > 0.3 * max(gaps), f"{every}, {first}, {second}: frames at {times}"
+    print("frames where stages end stand alone")
+
+
+def substeps_change(place):
+    """Another number of substeps from a stage on: bodies are where their time says, in every one of them."""
+    text = lab.scene("column")
+    out = place / "substeps"
+    sets = [*lab.SMALL["column"], "--set=time.end=8 ms", "--set=output.every=2 ms", "--set=bodies.2.plane.motion.velocity=[1, 0]",
+            "--set=bodies.2.plane.while=always", "--set=bodies.2.plane.motion.from=3 ms",
+            "--set=stages=[{for: 3.3 ms}, {set: {hybrid.substeps: 7}}]"]
+    lab.run(pathlib.Path(text), out, *sets)
+    lab.run(pathlib.Path(text), place / "stopped", *sets, "--until=5 ms")
+    lab.run(pathlib.Path(text), place / "stopped", *sets, resume=True)
+    lab.same(out, place / "stopped", "a hybrid whose substeps change, stopped and resumed")
+    with last(out) as file:
+        assert abs(file["bodies/position"][2, 0] - 0.005) < 1e-12
+
+
 if __name__ == "__main__":
     assert math.isclose(9.81 * math.sin(math.radians(25)), 4.15, rel_tol=2e-3)
     os.environ["QUERN_CACHE"] = ""
     with lab.workplace() as name:
-        for test in (gravity_turns, a_block_begins_to_slide, a_gate_opens, stages_of_one_value_change_nothing):
+        for test in (gravity_turns, a_block_begins_to_slide, a_gate_opens, stages_of_one_value_change_nothing, courses_lead_on,
+                     frames_stand_alone, substeps_change):
             test(pathlib.Path(name))
