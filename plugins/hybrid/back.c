@@ -74,7 +74,7 @@ static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool l
 			quern_set_component(&own[r], shape, k, m->rows[r][k]);
 		}
 	}
-	trips_call(&w->trips, &m->trip, velocity, own, n, last);
+	trips_call(&w->trips, &m->trip, NULL, velocity, own, n, last);
 	for (uint32_t r = 0; r < transfer->n_uses; r++) {
 		const uint8_t shape = transfer->uses[r].shape;
 		if (transfer->uses[r].access == QUERN_READ) continue;

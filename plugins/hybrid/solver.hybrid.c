@@ -152,6 +152,10 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
 	const size_t n = s->host->set(s->run, "cell").n;
 	(void)self;
+	if (((const quern_transfer_ops *)slot[SLOT_TRANSFER][0].ops)->affine)
+		return setup->host->fail(err, QUERN_E_PARAM, "transfer",
+			"%s makes a matrix that grains have no way to send: take picflip, mixed or xpic here",
+			slot[SLOT_TRANSFER][0].id);
 	out[SUM_OWED] =
 		s->host->sum(s->run, n, u[U_GRAIN_OWED].real[0]) + s->host->sum(s->run, n, u[U_POINT_OWED].real[0]);
 	for (uint32_t k = 0; k < s->dim; k++)
