@@ -50,7 +50,9 @@
 	X(U_DISPLACEMENT, "total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY) \
 	X(U_UNSORTED, "total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX) \
 	X(U_MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR) \
-	X(U_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR)
+	X(U_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR) \
+	X(U_WEIGHT, "cell.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "ramped", \
+		.doc = "Share of the continuum: 0 where there are grains alone, 1 where there are none.")
 QUERN_USE_ENUM(UPDATE_USES);
 
 #define SAMPLE_USES(X) \

@@ -178,6 +178,9 @@ BROKEN = [
     ("marks the end of numbers", "oracle", [("height - up[i];", "(height - up[i]) / (up[i] > 0.5 ? 0 : 1);")],
      "levels are numbers"),
     ("wishes for more", "oracle", [(": QUERN_CONTINUUM;", ": 7;")], "wishes are zones"),
+    ("shares more than there is", "oracles/oracle.fixed.c", [
+        ("at.zone == QUERN_CONTINUUM && at.to_discrete < p->ramp;", "true;"), ("->ramp > 0 ? QUERN_ORACLE_WEIGHT : 0", "->ramp >= 0"
+         " ? QUERN_ORACLE_WEIGHT : 0"), ("0.5 - 0.5 * quern_cos", "1.5 + 0 * quern_cos")], "shares are shares"),
     ("leaves the region", "packer", [("!job->inside(job, spot.x) || ", "")], "inside the region"),
     ("makes grains small", "packer", [(".radius = job->radius(job)", ".radius = 0.9 * job->radius(job)")],
      "the radius that waits"),
