@@ -20,7 +20,7 @@ typedef struct hybrid {
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
-	bool affine;
+	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
 	int32_t weights;
 	bool ramped; /* shares of hybrid cells are a field: cell.weight */
 } hybrid;

@@ -26,6 +26,8 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.choices = weightings),
 	QUERN_PARAM(hybrid, ramped, NULL, "Keep shares by cell; set by itself where they are not all a half.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(
+		hybrid, solves, NULL, "The coupling sees all nodes at once; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(hybrid, diameter, "grain.diameter", "m", "Mean diameter of grains that are placed.",
 		.from = "grain.diameter", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, radii.spread, "grain.spread", "1", "Spread of their radii.",
@@ -155,6 +157,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 			"%s makes a matrix that grains have no way to send: take picflip, mixed or xpic here",
 			slot[SLOT_TRANSFER][0].id);
 	h->affine = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->affine != 0;
+	h->solves = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->solve != NULL;
 	h->ramped =
 		h->ramped || h->weights == WEIGHTS_RAMP || wants_shares(slot[SLOT_ORACLE], n_slot[SLOT_ORACLE]);
 	return QUERN_OK;
