@@ -146,17 +146,20 @@ static quern_real mass_held(const update *d, uint32_t c) {
 	return sum;
 }
 
-/* Mass that a cell's points may still be given. On a ramp little is carried of much: what is owed may be many times what
- * there is room for, and waits until the material has moved on. */
-static quern_real room_for(const update *d, uint32_t c, quern_real held) {
-	const quern_real most = 1.1 * d->full * (d->open[c] > 0.125 ? d->open[c] : 0.125);
-	return !d->h->ramped ? INFINITY : most > held ? most - held : 0;
+/* What giving to a cell's points or taking from them would change, of the mass that they stand for. On a ramp little is
+ * carried of much, and a debt may be many times what there is room for, or all that there is: points go no farther than
+ * from half of what the cell holds to that or what fills it, and the rest waits until the material has moved on. */
+static quern_real within(const update *d, uint32_t c, quern_real mass, quern_real held) {
+	const quern_real all = d->mass[c], fills = 1.1 * d->full * (d->open[c] > 0.125 ? d->open[c] : 0.125);
+	const quern_real more = (fills > all ? fills : all) - held, less = 0.5 * all - held;
+	if (!d->h->ramped) return mass;
+	if (mass > 0) return more < 0 ? 0 : mass < more ? mass : more;
+	return less > 0 ? 0 : mass > less ? mass : less;
 }
 
 static void settle(update *d, uint32_t c) {
-	const quern_real held = mass_held(d, c), room = room_for(d, c, held), weight = point_share(d, c),
-					 all = d->u[U_POINT_OWED].real[0][c], mass = all / weight > room ? room : all / weight,
-					 owed = weight * mass;
+	const quern_real held = mass_held(d, c), weight = point_share(d, c), all = d->u[U_POINT_OWED].real[0][c],
+					 mass = within(d, c, all / weight, held), owed = weight * mass;
 	quern_real v[3] = { 0 };
 	quern_hybrid_owed_velocity(d, c, all, d->u[U_POINT_OWED_MOMENTUM], v);
 	if (owed > 0 && held > 0) {
