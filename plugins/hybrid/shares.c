@@ -45,7 +45,8 @@ quern_status quern_hybrid_shares(update *d) {
 	if (d->h->weights == WEIGHTS_RAMP) status = ramp_zone(d);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		if (d->zone[c] != QUERN_HYBRID) continue;
-		const quern_real share = d->asked[c] >= 0 ? d->asked[c] : d->share[c];
+		const quern_real own = d->share[c], asked = d->asked[c] >= 0 ? d->asked[c] : own;
+		const quern_real share = d->h->weights == WEIGHTS_RAMP ? quern_min(own, asked) : asked;
 		d->share[c] = quern_clamp(share, least, 1 - least);
 	}
 	return status;
