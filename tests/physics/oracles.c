@@ -21,7 +21,7 @@ typedef double (*way_of)(double x, double y);
 
 /* A domain full of grains on a lattice, four in a cell, but where it is solid; without forces. Four steps, so that updates are
  * over. */
-static quern_run *box(const char *bodies, way_of solid, const char *oracle) {
+static quern_run *box(const char *bodies, way_of solid, const char *oracle, const char *weights) {
 	char path[HARNESS_PATH];
 	FILE *out = harness_file(path);
 	fprintf(out, "x y\n");
@@ -37,8 +37,8 @@ static quern_run *box(const char *bodies, way_of solid, const char *oracle) {
 		"grains: {material: {density: 2500, radius: {mean: 0.999 mm}}, file: %s,\n"
 		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}}\n"
 		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-		"hybrid: {oracle: [%s], substeps: 1, update: 1, guard: 10}\n",
-		bodies, path, cell, oracle);
+		"hybrid: {oracle: [%s], substeps: 1, update: 1, guard: 10, weights: %s}\n",
+		bodies, path, cell, oracle, weights);
 	unlink(path);
 	harness_steps(run, 4);
 	return run;
@@ -96,11 +96,35 @@ static void drawn_zones(void **state) {
 	table_head("cells in another zone than was drawn; worst share");
 	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
 		double off;
-		quern_run *run = box("", NULL, scenes[k].oracle);
+		quern_run *run = box("", NULL, scenes[k].oracle, "half");
 		/* depths within the box are negative outside */
 		const int wrong = misplaced(run, scenes[k].way, NULL, 0, scenes[k].width, 1e-9, &off);
 		good &= table_row(scenes[k].oracle, wrong, 0, 0);
 		good &= table_row("  share", off, 0, 1e-12);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+/* With `weights: ramp` the cells of a drawn zone get shares by their place between its sides; half shares else. */
+static void ramps_across_a_zone(void **state) {
+	(void)state;
+	bool good = true;
+	table_head("share of the continuum in the cells across a zone");
+	for (int ramp = 0; ramp <= 1; ramp++) {
+		quern_run *run = box("", NULL,
+			"{fixed: {boxes: [{lower: [-1, -1], upper: [0.04, 1]}, {lower: [0, -1], upper: [0.056, 1], zone: "
+			"hybrid}]}}",
+			ramp ? "ramp" : "half");
+		const quern_grid_view *g = quern_host_table.grid(run);
+		for (int k = -1; k <= 4; k++) {
+			char name[40];
+			const int32_t c = quern_grid_entry(g, (const int32_t[3]) { 10 + k, 15, 0 });
+			const double asked = k < 0 ? 0 : k > 3 ? 1 : 0.5 - 0.5 * cos(pi * (k + 0.5) / 4);
+			snprintf(name, sizeof name, "cell %d behind the grains", k + 1);
+			if (ramp) good &= table_row(name, harness_field(run, "cell.weight").real[0][c], asked, 1e-12);
+		}
+		assert_true(ramp || !harness_has(run, "cell.weight"));
 		harness_close(run);
 	}
 	assert_true(good);
@@ -126,7 +150,7 @@ static void zones_near_bodies(void **state) {
 		char oracle[120];
 		double off;
 		snprintf(oracle, sizeof oracle, "{near_bodies: {distance: 10 mm, width: 8 mm%s}}", scenes[k].which);
-		quern_run *run = box(bodies, from_either, oracle);
+		quern_run *run = box(bodies, from_either, oracle, "half");
 		/* within the hysteresis a zone stays what it was: discrete at first */
 		good &= table_row(
 			oracle, misplaced(run, scenes[k].way, from_either, 0.01, 0.008, 0.75e-3 + 1e-9, &off), 0, 0);
@@ -159,7 +183,7 @@ static void faces_and_bodies_that_are_meant(void **state) {
 	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
 		const way_of solid = k == 2 ? from_rods : NULL;
 		double off;
-		quern_run *run = box(k == 2 ? rods : "", solid, scenes[k].oracle);
+		quern_run *run = box(k == 2 ? rods : "", solid, scenes[k].oracle, "half");
 		const double slack = k == 2 ? 1.1 * cell : 0.75e-3 + 1e-9; /* steps count from cell to cell */
 		good &= table_row(
 			scenes[k].name, misplaced(run, scenes[k].way, solid, 0.008, 3 * cell, slack, &off), 0, 0);
@@ -177,7 +201,7 @@ static void faces_and_bodies_that_are_meant(void **state) {
 }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(drawn_zones), cmocka_unit_test(zones_near_bodies),
-		cmocka_unit_test(faces_and_bodies_that_are_meant) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(drawn_zones), cmocka_unit_test(ramps_across_a_zone),
+		cmocka_unit_test(zones_near_bodies), cmocka_unit_test(faces_and_bodies_that_are_meant) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
