@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Transfers with matrices and round trips, and shares on a ramp, leave the same bits: for any number of threads, batch and
-instruction set, and across a stop."""
+instruction set, and across a stop; with QUERN_OTHER, of another compiler's program too."""
+import os
 import pathlib
 
 import lab
@@ -26,6 +27,9 @@ def check(name, options, folder):
     for number, (way, (more, threads)) in enumerate(WAYS.items()):
         lab.run("column", folder / str(number), *options, *more, threads=threads)
         lab.same(base, folder / str(number), way)
+    if os.environ.get("QUERN_OTHER"):
+        lab.run("column", folder / "other", *options, program=os.environ["QUERN_OTHER"])
+        lab.same(base, folder / "other", "another compiler")
     out = folder / "stopped"
     lab.run("column", out, *options, "--until", "10 ms")
     lab.run("column", out, *options, resume=True)
