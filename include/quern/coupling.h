@@ -25,7 +25,7 @@ typedef struct quern_coupling_system {
 	quern_real *velocity[3];    /* m/s, by node: of the continuum after forces, in and out */
 	const uint32_t *row, *node; /* n_grains + 1; by entry of the matrix */
 	const quern_real
-		*value; /* 1, by entry: of the shape function; a row's sum is 1 if all its nodes hold continuum */
+		*value; /* by entry: of the shape function; a row sums to 1 if all its nodes hold continuum */
 	const quern_real *way[3];                    /* m, by entry: from the grain to the node */
 	const quern_real *grain_mass, *grain_weight; /* kg, not weighted; its share, more than 0 */
 	quern_real *grain_velocity[3];               /* m/s, in and out */

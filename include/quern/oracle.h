@@ -28,8 +28,8 @@ typedef struct quern_cell_batch {
 	quern_real time, dt;     /* s; dt of the continuum's step */
 	quern_real gravity[3];   /* m/s^2 */
 	/* m from the cell's centre to the nearest of the bodies that this oracle means and that are there now, less than 0
-	 * inside, infinite where there is none; moved by half the hysteresis while deciding, as distance is. NULL where the
-	 * oracle does not want it */
+	 * inside, infinite where there is none; moved by up to half the hysteresis while deciding, as distance is. NULL where
+	 * the oracle does not want it */
 	const quern_real *gap;
 	/* deciding: the continuum's share in the cell if it becomes hybrid, from 0 to 1; the least of all oracles wins; -1:
 	 * what the solver takes. NULL where the oracle does not want it */

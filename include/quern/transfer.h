@@ -19,13 +19,13 @@ typedef struct quern_transfer_batch {
 	quern_real *send[3];         /* m/s, what to send next; NULL in the last pass */
 	quern_real *velocity[3];     /* m/s, in: old, out (last pass only): new */
 	const quern_column *use;
-	/* The last three are NULL but in the last pass of a transfer whose table says `affine`. Tensors are row-major. */
-	const quern_real
-		*fit[9]; /* 1/s, sum S v_i (x_i - x) over sum S (x_i - x)^2, axis by axis: a linear field's slope */
-	/* The second of these sums here over what it will be where the point goes in this step: `fit` times that,
-	 * sent from there, has the moment that the nodes have now. 1 where shape functions have none to keep */
-	const quern_real *shift[3];
-	quern_real *affine[9]; /* 1/s, out: C; in the next step the point sends velocity + C (x_i - x) */
+	/* The last three are NULL but in the last pass of a transfer whose table says `affine`; row-major. With B = sum S v_i
+	 * (x_i - x) and D = sum S (x_i - x)^2, axis by axis: the slope B/D of the linear field around the point, 1/s; D over
+	 * what it will be where the point goes in this step, 1 where shape functions have no D all over; and out, 1/s, the
+	 * matrix C with which the point sends velocity + C (x_i - x) in the next step. B/D keeps slopes, and that times
+	 * `shift` keeps B, the moment. */
+	const quern_real *fit[9], *shift[3];
+	quern_real *affine[9];
 } quern_transfer_batch;
 
 typedef struct quern_transfer_ops {
