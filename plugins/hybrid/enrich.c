@@ -28,7 +28,7 @@ static quern_real waiting(const enriching *e) {
 
 /* Half a grain over would never be paid back: a grain is placed while more than all of it is owed. */
 static bool is_owed(const enriching *e) {
-	return e->rest > grain_share(e->d->zone[e->c]) * mass_of(e->d->h, waiting(e));
+	return e->rest > grain_share(e->d, e->c) * mass_of(e->d->h, waiting(e));
 }
 
 /* ---- what a packer may ask ---- */
@@ -57,7 +57,7 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 		d->cap_grains = cap;
 	}
 	new_grain *g = &d->grains[d->n_new_grains++];
-	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d->zone[e->c]), .cell = (int32_t)e->c };
+	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d, e->c), .cell = (int32_t)e->c };
 	memcpy(g->position, spot->x, sizeof g->position);
 	quern_placer_add(&e->placer, spot);
 	e->rest -= g->weight * mass_of(d->h, g->radius);

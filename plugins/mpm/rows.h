@@ -84,7 +84,8 @@ QUERN_USE_ENUM(WALLS_USES);
 	X(GATHER_GRADIENT, "point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Velocity gradient of the last step.") \
 	X(GATHER_AFFINE, "point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
-		.with = "point.affine", .doc = "The same, sent to the nodes with the velocity.") \
+		.with = "point.affine", \
+		.doc = "What points send with their velocity: the same, or what the transfer gives in its place.") \
 	X(GATHER_PRESSURE, "point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
 		.doc = "Minus the mean normal stress.") \
 	X(GATHER_ENERGY, "point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
+#include "../common/fit.h"
 #include "../common/height.h"
 #include "mpm.h"
 #include <math.h>
@@ -24,7 +25,9 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill)),
 	QUERN_PARAM(mpm, rasterise, "1",
 		"What points send to the nodes: their velocity (plain), or with it the velocity gradient of the last "
-		"step (affine); auto: affine where a hybrid's coupling asks for it.",
+		"step, or what the transfer gives in its place (affine); auto: affine where a hybrid's coupling or "
+		"the "
+		"transfer asks for it.",
 		.choices = rasters),
 	QUERN_PARAM(mpm, affine, NULL, "Keep the gradient that points send; set by itself where one is needed.",
 		.flags = QUERN_ADVANCED),
@@ -147,7 +150,14 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 			"grains and continuum do not feel each other without a section hybrid; add it, or keep one of "
 			"them "
 			"with 'model: grains' or 'model: continuum'");
-	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE];
+	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE],
+					  *transfer = slot[SLOT_TRANSFER];
+	p->matrix = ((const quern_transfer_ops *)transfer->ops)->affine != 0;
+	p->moments = p->matrix && fit_has_moments(shape, setup->dim);
+	if (p->matrix && p->rasterise == RASTERISE_PLAIN)
+		return setup->host->fail(err, QUERN_E_PARAM, "rasterise",
+			"is plain, and %s makes a matrix that points send with their velocity: take auto", transfer->id);
+	p->affine = p->affine || p->matrix;
 	((const quern_material_ops *)material->ops)
 		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);

@@ -127,6 +127,9 @@ BROKEN = [
      "uniform motion"),
     ("loses momentum", "transfers/transfer.mixed.c", [("quern_vec_add(quern_vec_sub(flip, r), back)",
                                                        "quern_vec_sub(flip, r)")], "momentum"),
+    ("bends lines", "transfers/transfer.apic.c", [("fit[i] * shift[i] : fit[i]", "0.99 * fit[i] * shift[i] : fit[i]")],
+     "linear motion"),
+    ("adds a little", "transfers/transfer.xpic.c", [("pic[i] - echo[i]", "pic[i] - echo[i] + 1e-9 * v[i]")], "momentum"),
     ("drives nodes", "hybrid/coupling.lumped.c", [("exchange(job);", "exchange(job); job->velocity[0][0] += 1e-3;")],
      "momentum node by node"),
     ("kicks", VERLET, [("nv[i] = v[i] + (a[i] == a[i] ? 0.5 * dt * (now - a[i]) : dt * now);\n\t\t\tnx",
@@ -175,6 +178,9 @@ BROKEN = [
     ("marks the end of numbers", "oracle", [("height - up[i];", "(height - up[i]) / (up[i] > 0.5 ? 0 : 1);")],
      "levels are numbers"),
     ("wishes for more", "oracle", [(": QUERN_CONTINUUM;", ": 7;")], "wishes are zones"),
+    ("shares more than there is", "oracles/oracle.fixed.c", [
+        ("at.zone == QUERN_CONTINUUM && at.to_discrete < p->ramp;", "true;"), ("->ramp > 0 ? QUERN_ORACLE_WEIGHT : 0", "->ramp >= 0"
+         " ? QUERN_ORACLE_WEIGHT : 0"), ("0.5 - 0.5 * quern_cos", "1.5 + 0 * quern_cos")], "shares are shares"),
     ("leaves the region", "packer", [("!job->inside(job, spot.x) || ", "")], "inside the region"),
     ("makes grains small", "packer", [(".radius = job->radius(job)", ".radius = 0.9 * job->radius(job)")],
      "the radius that waits"),
