@@ -280,7 +280,8 @@ typedef struct quern_setup {
 	quern_real lower[3], upper[3];
 	bool periodic[3];
 	const quern_host *host;
-	void *scene; /* opaque */
+	void *scene;     /* opaque */
+	bool open[2][3]; /* faces of the domain that let material out: lower, upper; by axis */
 } quern_setup;
 
 /* ==== plugin and library ==== */
