@@ -21,6 +21,8 @@ typedef struct hybrid {
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
 	bool affine;
+	bool passes;         /* books are kept of what leaves and comes */
+	quern_real pourings; /* sources of grains */
 } hybrid;
 
 /* slots, in the order of the solver's table */

@@ -112,7 +112,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_rea
 	}
 }
 
-/* A face of the domain without a body is closed: nothing passes, nothing rubs. */
+/* A face of the domain without a body is closed unless the scene opens it: nothing passes, nothing rubs. */
 static void close_faces(const grid_work *w, uint32_t b, quern_real *impulse) {
 	const quern_grid_view *g = w->g;
 	for (uint32_t k = 0; k < g->dim; k++) {
@@ -124,7 +124,8 @@ static void close_faces(const grid_work *w, uint32_t b, quern_real *impulse) {
 			const quern_real mass = w->node[(size_t)b * N + i][0];
 			quern_grid_cell_of(g, b * N + i, at);
 			if (!(mass > 0)) continue;
-			if ((at[k] == 0 && (*motion)[k] < 0) || (at[k] == g->cells[k] && (*motion)[k] > 0))
+			if ((at[k] == 0 && (*motion)[k] < 0 && !w->s->open[0][k]) ||
+				(at[k] == g->cells[k] && (*motion)[k] > 0 && !w->s->open[1][k]))
 				change_velocity(motion, k, g->dim, 0, mass, impulse);
 		}
 	}

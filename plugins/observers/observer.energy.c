@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section
  * 6 */
+#include "../common/books.h"
 #include "../common/radius.h"
 #include "observers.h"
 #include <quern/observer.h>
@@ -22,12 +23,33 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 	X(SHEARED, "total.sheared", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(DAMPED, "total.damped", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(RUBBED, "total.rubbed", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
-	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED)
+	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_LEFT, "grain_face.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_LEFT_HEIGHT, "grain_face.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_LEFT, "point_face.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_LEFT_HEIGHT, "point_face.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_POURED, "grain_source.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_POURED_HEIGHT, "grain_source.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_POURED, "point_source.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_POURED_HEIGHT, "point_source.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
 static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 
-enum { KINETIC, SPINNING, POINTS, POTENTIAL, SPRINGS, TANGENTIAL, ELASTIC, DASHPOTS, SLIDING, COUPLING, SUM };
+enum {
+	KINETIC,
+	SPINNING,
+	POINTS,
+	POTENTIAL,
+	SPRINGS,
+	TANGENTIAL,
+	ELASTIC,
+	DASHPOTS,
+	SLIDING,
+	COUPLING,
+	PASSED,
+	SUM
+};
 static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = "Kinetic, of grains." },
 	{ .name = "spin", .unit = "J", .doc = "Kinetic, of their rotation." },
 	{ .name = "points", .unit = "J", .doc = "Kinetic, of points." },
@@ -38,6 +60,10 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 	{ .name = "damped", .unit = "J", .doc = "Lost in dashpots so far." },
 	{ .name = "rubbed", .unit = "J", .doc = "Lost to sliding contacts so far." },
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
+	{ .name = "passed",
+		.unit = "J",
+		.doc = "Taken out through open faces, less what sources brought: of motion, of height and stored in "
+			   "points." },
 	{ .name = "budget", .unit = "J", .doc = "All of it: constant for grains alone." }, { .name = NULL } };
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
@@ -59,6 +85,8 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const int rows[] = { STORED, SHEARED, DAMPED, RUBBED, EXCHANGED },
 			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
 	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;
+	for (int row = GRAINS_LEFT; row <= POINTS_POURED_HEIGHT; row++)
+		out[PASSED] += (row < GRAINS_POURED ? 1 : -1) * book_total(u[row].real[0], b->count[row]);
 	for (int k = 0; k < SUM; k++) out[SUM] += out[k];
 	return QUERN_OK;
 }
