@@ -2,7 +2,6 @@
 #include "outlets.h"
 #include "radius.h"
 #include <math.h>
-#include <string.h>
 
 /* The face that entry i has passed, the first in their order; -1: none. What is fixed stays wherever it is. */
 static int32_t passed(const quern_step *s, const outlets *o, uint32_t i) {

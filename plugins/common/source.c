@@ -75,7 +75,7 @@ bool quern_source_acts(const source *p, const quern_step *s) {
 }
 
 quern_real quern_source_due(const source *p, quern_real time) {
-	const quern_real end = time < p->until ? time : isnan(p->until) ? time : p->until;
+	const quern_real end = time > p->until ? p->until : time;
 	quern_real due = 0;
 	if (p->keep == SOURCE_BY_RATE) due = end > p->from ? p->rate * (end - p->from) : 0;
 	else due = time >= p->from && !(time >= p->until) ? INFINITY : 0;
@@ -90,8 +90,6 @@ void quern_source_note(const quern_step *s, uint32_t i, const char *section, con
 	if (!waits || *late) return;
 	*late = 1;
 	s->host->log(s->run, 2,
-		"%s.source.%u has no room at t = %.4g s: %.3g kg wait; from now on the column `waiting` of the "
-		"observer "
-		"outflow says how much does",
+		"%s.source.%u has no room at t = %.4g s: %.3g kg wait; observe outflow to see how much does later",
 		section, i, s->time, waiting);
 }

@@ -45,13 +45,13 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	cloud_sums grains, points;
 	(void)self;
 	if (!u[GRAIN_OWED].real[0]) return QUERN_OK;
-	const quern_real whole = u[MASS].real[0][0] - (u[PASSED].real[0] ? u[PASSED].real[0][0] : 0);
-	if (!(whole > 0)) return QUERN_OK;
+	const quern_real mass = u[MASS].real[0][0] - (u[PASSED].real[0] ? u[PASSED].real[0][0] : 0);
+	if (!(mass > 0)) return QUERN_OK;
 	if (!size || !observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < n; i++)
 		size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
-	out[0] = host->sum(run, n, size) / whole;
-	out[1] = (cloud_total(&grains) + cloud_total(&points)) / whole - 1;
+	out[0] = host->sum(run, n, size) / mass;
+	out[1] = (cloud_total(&grains) + cloud_total(&points)) / mass - 1;
 	out[2] = host->sum(run, n, u[GRAIN_OWED].real[0]);
 	out[3] = host->sum(run, n, u[POINT_OWED].real[0]);
 	for (int k = 0; k < 3; k++) out[4 + k] = u[MASS_DEFECT + k].real[0][0];

@@ -12,6 +12,10 @@ HYBRID = [*lab.SMALL["column"], *lab.sets(
     grains__fill__0__region__box="{lower: [0, -0.7 mm], upper: [0.052, -0.7 mm]}",
     hybrid__oracle="[{packing_fraction: {depth: 4.1 mm, half_width: 4 mm}}]", continuum__fill=[],
     grains__source="[{region: {box: {lower: [0.01, 0.06], upper: [0.03, 0.08]}}, rate: 8, velocity: [0, -0.5]}]")]
+CONTINUUM = [*lab.SMALL["column"], *lab.sets(
+    model="continuum", domain__upper="[0.052, 0.32]", domain__open="[upper_x]", time__end="100 ms", output__fields="[point.velocity]",
+    observe="[outflow, mass]", continuum__fill="{region: {box: {lower: [0, 0], upper: [0.04, 0.044]}}}",
+    continuum__source="{region: {box: {lower: [0.012, 0.06], upper: [0.028, 0.08]}}, rate: 8, velocity: [0, -0.5]}")]
 HOPPER = lab.sets(
     time__end="160 ms", output__every="10 ms", grains__contact__linear__stiffness="1e5 N/m", grains__settle__energy=1e-3,
     grains__fill__region__box="{lower: [0.02, 0.051], upper: [0.1, 0.08]}", grains__overlap__most=0,
@@ -61,6 +65,10 @@ def drain(folder):
     assert s["mass_final"] + owed < 0.02 * s["mass_initial"]
 
 
+def continuum(folder):
+    books("continuum", same("column", CONTINUUM, folder))
+
+
 def hopper(folder):
     s = books("hopper", same("hopper", HOPPER, folder))
     assert s["observers"]["outflow"]["rate"]["last"] > 0
@@ -68,7 +76,7 @@ def hopper(folder):
 
 if __name__ == "__main__":
     with lab.workplace() as place:
-        for test in (hybrid, drain, hopper):
+        for test in (hybrid, drain, continuum, hopper):
             folder = pathlib.Path(place) / test.__name__
             folder.mkdir()
             test(folder)
