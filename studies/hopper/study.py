@@ -4,7 +4,7 @@
 
     studies/hopper/study.py [--run DIR]... [--from 0.2] [--to 0.6]
 
-Without --run it runs configs/hopper.yaml with four widths of the orifice, into out/hopper, and writes docs/validation/hopper.md. With
+Without --run it runs configs/hopper.yaml with four widths of the orifice, into out/hopper_study, and writes docs/validation/hopper.md. With
 --run it prints the same numbers of runs that are there. In two dimensions, per metre of slab, W = C rho_b sqrt(g) (L - k D)^(3/2): L is the
 width, D the mean diameter, rho_b the bulk density above the orifice, and k D the rim that no grain's centre passes."""
 import argparse
@@ -79,7 +79,7 @@ def main():
     if args.run:
         print(table([look(folder, args.begin, args.to) for folder in args.run]))
         return
-    rows = [look(run(ROOT / "out/hopper" / str(width), width), args.begin, args.to) for width in WIDTHS]
+    rows = [look(run(ROOT / "out/hopper_study" / str(width), width), args.begin, args.to) for width in WIDTHS]
     (ROOT / "docs/validation/hopper.md").write_text(PAGE.format(table=table(rows), k=K, begin=args.begin, end=args.to,
                                                                  provenance=provenance.line(provenance.of())))
     print(table(rows))
