@@ -3,6 +3,7 @@
 #include "../common/placer.h"
 #include "dem.h"
 #include <math.h>
+#include <quern/math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -90,21 +91,42 @@ static bool is_near(const pouring *p, const quern_spot *spot) {
 	return true;
 }
 
-static bool gather_near(pouring *p, const quern_bound *body, uint32_t n_bodies) {
+static uint32_t grains_near(pouring *p, obstacle *near) {
 	const quern_step *s = p->s;
-	const uint32_t n = s->host->set(s->run, "grain").n;
-	obstacle *near = s->host->memory(s->run, ((size_t)n + 1) * sizeof *near);
 	uint32_t m = 0;
-	p->most = quern_radius_most(&p->law);
-	if (!near) return false;
-	for (uint32_t i = 0; i < n; i++) {
+	for (uint32_t i = 0; i < s->host->set(s->run, "grain").n; i++) {
 		obstacle o = { s->use[POUR_ID].id[i], { .radius = s->use[POUR_RADIUS].real[0][i] } };
 		for (uint32_t k = 0; k < s->dim; k++) o.spot.x[k] = s->use[POUR_POSITION].real[k][i];
-		if (!is_near(p, &o.spot)) continue;
-		near[m++] = o;
-		p->most = fmax(p->most, o.spot.radius);
+		if (is_near(p, &o.spot)) near[m++] = o;
 	}
 	qsort(near, m, sizeof *near, by_id);
+	return m;
+}
+
+/* Where a continuum stands for grains there is no room either: a point counts as a grain as wide as its own square or cube. */
+static uint32_t points_near(pouring *p, obstacle *near) {
+	const quern_step *s = p->s;
+	const quern_real *volume = s->use[POUR_POINT_VOLUME].real[0];
+	uint32_t m = 0;
+	if (!s->use[POUR_POINT].real[0] || !volume) return 0;
+	for (uint32_t i = 0; i < s->host->set(s->run, "point").n; i++) {
+		const quern_real width = s->dim == 2 ? sqrt(volume[i]) : quern_cbrt(volume[i]);
+		obstacle o = { 0, { .radius = 0.5 * width } };
+		for (uint32_t k = 0; k < s->dim; k++) o.spot.x[k] = s->use[POUR_POINT].real[k][i];
+		if (is_near(p, &o.spot)) near[m++] = o;
+	}
+	return m;
+}
+
+static bool gather_near(pouring *p, const quern_bound *body, uint32_t n_bodies) {
+	const quern_step *s = p->s;
+	const size_t all = (size_t)s->host->set(s->run, "grain").n + s->host->set(s->run, "point").n;
+	obstacle *near = s->host->memory(s->run, (all + 1) * sizeof *near);
+	if (!near) return false;
+	uint32_t m = grains_near(p, near);
+	m += points_near(p, near + m);
+	p->most = quern_radius_most(&p->law);
+	for (uint32_t q = 0; q < m; q++) p->most = fmax(p->most, near[q].spot.radius);
 	if (quern_placer_init(&p->placer, s->dim, s->lower, s->upper, s->periodic, p->most) != QUERN_OK)
 		return false;
 	p->placer.body = body, p->placer.n_bodies = n_bodies;

@@ -59,6 +59,8 @@ QUERN_USE_ENUM(OUTLET_USES);
 	X(POUR_RADIUS, "grain.radius", "m", QUERN_WRITE, QUERN_SCALAR) \
 	X(POUR_MASS, "grain.mass", "kg", QUERN_WRITE, QUERN_SCALAR) \
 	X(POUR_ID, "grain.id", "1", QUERN_READ, QUERN_ID) \
+	X(POUR_POINT, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_BEFORE) \
+	X(POUR_POINT_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_BEFORE) \
 	X(POUR_DISPLACEMENT, "total.displacement", "m", QUERN_WRITE, QUERN_SCALAR, .initial = INFINITY) \
 	BOOK_ROWS(X, POURED, "grain_source", "sources") \
 	X(POUR_DRAWS, "grain_source.draws", "1", QUERN_UPDATE, QUERN_INDEX, .when = "sources", \

@@ -65,6 +65,17 @@ def drain(folder):
     assert s["mass_final"] + owed < 0.02 * s["mass_initial"]
 
 
+def buried(folder):
+    """A source that keeps a region full finds no room in a column, be it of grains or of points."""
+    lab.run("column", folder / "base", *lab.SMALL["column"], *lab.sets(
+        time__end="40 ms", hybrid__oracle="[{packing_fraction: {depth: 5 mm, half_width: 4 mm}}]",
+        grains__source="{region: {box: {lower: [0.004, 0.004], upper: [0.036, 0.016]}}, keep: full, every: 1}"))
+    s = lab.summary(folder / "base")
+    poured = s["sums"]["poured"]["value"] / s["mass_initial"]
+    print(f"buried: {poured:.4f} of the mass was poured, {s['points']} points")
+    assert poured < 0.03 and s["points"] > 50 and abs(s["mass_defect"]) < 1e-12 and s["invariant_defect"] < 1e-12, s
+
+
 def continuum(folder):
     books("continuum", same("column", CONTINUUM, folder))
 
@@ -76,7 +87,7 @@ def hopper(folder):
 
 if __name__ == "__main__":
     with lab.workplace() as place:
-        for test in (hybrid, drain, continuum, hopper):
+        for test in (hybrid, drain, buried, continuum, hopper):
             folder = pathlib.Path(place) / test.__name__
             folder.mkdir()
             test(folder)
