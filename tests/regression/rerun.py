@@ -11,7 +11,11 @@ import lab
 SHORT = {"two_grains": lab.sets(time__end="5 ms"), "incline": lab.sets(time__end="50 ms"),
          "elastic_bar": lab.sets(time__end="2"),
          "column": [*lab.SMALL["column"], *lab.sets(time__end="20 ms")],
-         "column_3d": [*lab.SMALL["column_3d"], *lab.sets(time__end="5 ms")]}
+         "column_3d": [*lab.SMALL["column_3d"], *lab.sets(time__end="5 ms")],
+         "heap": lab.sets(time__end="60 ms", output__every="20 ms"),
+         "hopper": lab.sets(
+             time__end="60 ms", output__every="20 ms", grains__contact__linear__stiffness="1e5 N/m", grains__settle__energy=1e-2,
+             grains__fill__region__box="{lower: [0.02, 0.051], upper: [0.1, 0.08]}", grains__overlap__most=0)}
 TWINS = {"column": ("all", "grains", "continuum"), "column_3d": ("all", "grains")}
 TWIN = ["--set=output.fields=[grain.velocity, point.velocity]"]
 FILED = """
