@@ -103,13 +103,16 @@ static void look_at_sums(const short_run *s) {
 	const quern_account a = quern_run_account(s->run);
 	const double begun = s->run->mass_initial, time = quern_run_time(s->run);
 	const double now = quern_account_of(&a, "mass") + quern_account_of(&a, "owed");
+	const double passed = quern_account_of(&a, "left") - quern_account_of(&a, "poured");
 	for (size_t k = 0; k < a.n; k++)
 		quern_check_expect(s->sums, isfinite(a.sum[k].value), "the sum %s is %g at t = %.6g s", a.sum[k].name,
 			a.sum[k].value, time);
 	if (begun > 0)
-		quern_check_measure(s->mass, fabs(now - begun) / begun, 1e-9,
-			"mass and what is owed are %.12g kg at t = %.6g s, and were %.12g kg after the set-up", now, time,
-			begun);
+		quern_check_measure(s->mass, fabs(quern_run_mass_defect(s->run, &a)), 1e-9,
+			"mass and what is owed are %.12g kg at t = %.6g s, %.12g kg have left beyond what was poured, "
+			"and it "
+			"was %.12g kg after the set-up",
+			now, time, passed, begun);
 }
 
 static void save(const short_run *s, const char *name) {

@@ -289,6 +289,12 @@ static json_t *scene_schema(const context *c) {
 			"Directions in which the domain repeats itself.", "type", "array", "items", defined("switch"),
 			"minItems", 2, "maxItems", 3),
 		false);
+	json_t *faces = json_array();
+	for (int k = 0; k < 6; k++) json_array_append_new(faces, json_string(quern_face_name(k % 2, k / 2)));
+	put(scene, "domain.open",
+		json_pack("{s:s, s:s, s:{s:o}, s:i}", "description", "Faces of the domain that let material out.",
+			"type", "array", "items", "enum", faces, "maxItems", 6),
+		false);
 	put(scene, "output.fields",
 		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out: SET.NAME.", "type", "array",
 			"items", "type", "string"),

@@ -320,13 +320,10 @@ static bool read_all(
 	return rejoin(run, why);
 }
 
-/* What is carried and owed is what the run began with, but for round-off. */
+/* What is carried, owed and has left is what the run began with and what was poured, but for round-off. */
 static bool mass_holds(quern_run *run, quern_text *why) {
 	const quern_account a = quern_run_account(run);
-	const double defect =
-		fabs(quern_account_of(&a, "mass") + quern_account_of(&a, "owed") - run->mass_initial);
-	return !(run->mass_initial > 0) || defect <= 1e-6 * run->mass_initial ||
-		   fault(why, "the masses", "the run");
+	return fabs(quern_run_mass_defect(run, &a)) <= 1e-6 || fault(why, "the masses", "the run");
 }
 
 quern_status quern_checkpoint_read(

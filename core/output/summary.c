@@ -162,8 +162,7 @@ bool quern_summary_write(
 	json_object_set_new(root, "mass_initial", number(run->mass_initial));
 	json_object_set_new(root, "mass_final", number(mass));
 	json_object_set_new(root, "mass_ledger", number(owed));
-	json_object_set_new(
-		root, "mass_defect", number(run->mass_initial > 0 ? (mass + owed) / run->mass_initial - 1 : 0));
+	json_object_set_new(root, "mass_defect", number(quern_run_mass_defect(run, &a)));
 	json_object_set_new(root, "invariant_defect", number(quern_account_of(&a, "defect")));
 	json_object_set_new(root, "momentum", vector(momentum, dim));
 	json_object_set_new(root, "energy",

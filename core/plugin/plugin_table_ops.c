@@ -168,6 +168,13 @@ static bool has_slot(const quern_solver_ops *ops, const char *name) {
 	return false;
 }
 
+/* A parameter that a set or a stage hangs on. */
+static bool hangs(quern_table_reader *r, const char *what, const char *name, const char *when) {
+	if (!when) return true;
+	if (is_label(when) && quern_param_find(r->table->params, when)) return true;
+	return quern_table_refuse(r, "%s %s hangs on the parameter '%.60s', and there is none", what, name, when);
+}
+
 static bool set(quern_table_reader *r, const quern_solver_ops *ops, const quern_set *s) {
 	if (!is_short_name(s->name))
 		return quern_table_refuse(r, "set '%.60s': a word of at most 23 letters is wanted", s->name);
@@ -179,7 +186,7 @@ static bool set(quern_table_reader *r, const quern_solver_ops *ops, const quern_
 		return quern_table_refuse(r, "set %s: a step of one entry costs less than a second", s->name);
 	if (!is_label(s->slot) || (s->slot && !has_slot(ops, s->slot)))
 		return quern_table_refuse(r, "set %s hangs on the slot '%.60s', and there is none", s->name, s->slot);
-	return true;
+	return hangs(r, "set", s->name, s->when);
 }
 
 /* "fill.packer" sits in the items of the list "fill". */
@@ -239,7 +246,7 @@ static bool stage(quern_table_reader *r, quern_stage *s) {
 		return quern_table_refuse(r, "stage %s: only what runs in QUERN_SUBSTEP settles", s->name);
 	if (!quern_table_uses(r, s->name, s->uses, MOST_STAGE_USES, r->table->params, &uses, &n)) return false;
 	s->uses = uses;
-	return true;
+	return hangs(r, "stage", s->name, s->when);
 }
 
 static bool sections(quern_table_reader *r, const char *what, const char *const *list) {
@@ -280,6 +287,8 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 	quern_slot *own_slots = copy(r, ops->slots, ops->slot_size, sizeof *own_slots, n_slots);
 	quern_stage *own_stages = copy(r, ops->stages, ops->stage_size, sizeof *own_stages, n_stages);
 	ops->sets = own_sets, ops->slots = own_slots, ops->stages = own_stages;
+	if (own_stages[0].when)
+		return quern_table_refuse(r, "stage %.60s: the first one hangs on no parameter", own_stages[0].name);
 	for (size_t i = 0; i < n_stages; i++)
 		if (!stage(r, &own_stages[i])) return false;
 	for (size_t i = 0; i < n_sets; i++)

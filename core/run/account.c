@@ -54,6 +54,14 @@ double quern_run_carries(quern_run *run, const char *name) {
 	return quern_account_of(&a, name);
 }
 
+/* Where nothing leaves or is poured this is (mass + owed)/initial - 1 to the bit. */
+double quern_run_mass_defect(const quern_run *run, const quern_account *a) {
+	const double whole = run->mass_initial + quern_account_of(a, "poured");
+	const double now =
+		quern_account_of(a, "mass") + quern_account_of(a, "owed") + quern_account_of(a, "left");
+	return whole > 0 ? now / whole - 1 : 0;
+}
+
 quern_status quern_run_check_account(quern_run *run) {
 	const quern_account a = quern_run_account(run);
 	for (size_t k = 0; k < a.n; k++)

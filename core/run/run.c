@@ -286,6 +286,7 @@ quern_step quern_run_record(quern_run *run, const quern_section *section) {
 	memcpy(step.lower, g->lower, sizeof step.lower);
 	memcpy(step.upper, g->upper, sizeof step.upper);
 	memcpy(step.periodic, g->periodic, sizeof step.periodic);
+	memcpy(step.open, g->open, sizeof step.open);
 	for (size_t k = 0; k < run->plan->n_stages && section; k++)
 		if (run->plan->stages[k].section == section) {
 			step.use = run->plan->stages[k].column;

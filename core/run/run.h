@@ -104,6 +104,8 @@ typedef struct quern_account {
 quern_account quern_run_account(quern_run *);
 double quern_account_of(const quern_account *, const char *name); /* 0 if nobody gives it */
 double quern_run_carries(quern_run *, const char *name);
+/* What is carried, owed and has left, over what there was and was poured, less 1; 0 where there never was any mass. */
+double quern_run_mass_defect(const quern_run *, const quern_account *);
 /* Whether all solvers can go on from the state as it is; else `why` says which cannot, and the run stays what it was. */
 bool quern_run_accept(quern_run *, quern_text *why);
 /* QUERN_E_NUMERIC with run->message if a sum over all that is carried is not finite. */

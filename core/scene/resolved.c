@@ -119,6 +119,9 @@ quern_node *quern_scene_tree(const quern_scene *s, const quern_naming *naming) {
 	quern_node *periodic = quern_node_put_list(root, "domain.periodic");
 	for (int k = 0; k < s->general.dimension; k++)
 		quern_node_append(periodic, s->general.periodic[k] ? "true" : "false");
+	quern_node *open = quern_node_put_list(root, "domain.open");
+	for (int k = 0; k < 2 * s->general.dimension; k++)
+		if (s->general.open[k % 2][k / 2]) quern_node_append(open, quern_face_name(k % 2, k / 2));
 	quern_node *fields = quern_node_put_list(root, "output.fields");
 	for (size_t k = 0; k < s->n_fields; k++) quern_node_append(fields, s->fields[k]);
 	for (size_t i = 0; i < s->n_sections; i++) put_section(&w, &s->sections[i], root);

@@ -53,6 +53,8 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 const quern_general_list quern_general_lists[] = {
 	{ "domain.periodic", "true or false",
 		"Directions in which the domain repeats itself, one per dimension; default: none." },
+	{ "domain.open", "lower_x, upper_x, lower_y, upper_y, lower_z or upper_z",
+		"Faces of the domain that let material out and book it (docs/theory/flow.md); default: none." },
 	{ "output.fields", "text",
 		"Fields to write out beside those that frames always have: SET.NAME, as `quern plan` lists them." },
 	{ "stages", "{for: TIME, set: {path.to.key: value}}",
@@ -109,6 +111,7 @@ quern_setup quern_scene_setup(const quern_scene *s, const char *path) {
 	memcpy(setup.lower, s->general.lower, sizeof setup.lower);
 	memcpy(setup.upper, s->general.upper, sizeof setup.upper);
 	memcpy(setup.periodic, s->general.periodic, sizeof setup.periodic);
+	memcpy(setup.open, s->general.open, sizeof setup.open);
 	return setup;
 }
 
@@ -151,6 +154,62 @@ static void read_periodic(quern_scene *s, const quern_node *domain) {
 			quern_report_add(s->report, value->mark, "scene: domain.periodic is %s, must be true or false",
 				quern_node_say(value, say));
 	}
+}
+
+/* ---- faces ---- */
+
+static const char *const face_names[] = { "lower_x", "upper_x", "lower_y", "upper_y", "lower_z", "upper_z",
+	NULL };
+
+const char *quern_face_name(int side, int axis) { return face_names[2 * axis + side]; }
+
+/* Which face a text names; as many as there are if none. */
+static int face_named(const quern_node *node, int n) {
+	int face = 0;
+	while (node->kind == QUERN_NODE_SCALAR && face < n && strcmp(node->text, face_names[face]) != 0) face++;
+	return node->kind == QUERN_NODE_SCALAR ? face : n;
+}
+
+static void miss_face(quern_scene *s, const quern_node *node, int n) {
+	const char *known[7] = { NULL }, *near = NULL;
+	char say[64];
+	memcpy(known, face_names, (size_t)n * sizeof *known);
+	if (node->kind == QUERN_NODE_SCALAR) near = quern_nearest(node->text, known);
+	quern_report_add(s->report, node->mark,
+		"scene: domain.open: %s is no face of a domain in %d-D, must be lower_x, upper_x%s%s%s%s",
+		quern_node_say(node, say), s->general.dimension,
+		n == 6 ? ", lower_y, upper_y, lower_z or upper_z" : ", lower_y or upper_y",
+		near ? "; did you mean '" : "", near ? near : "", near ? "'?" : "");
+}
+
+static void open_face(quern_scene *s, const quern_node *node) {
+	const int n = 2 * s->general.dimension, face = face_named(node, n);
+	if (face == n) {
+		miss_face(s, node, n);
+		return;
+	}
+	bool *open = &s->general.open[face % 2][face / 2];
+	if (s->general.periodic[face / 2])
+		quern_report_add(s->report, node->mark,
+			"scene: domain.open: %s cannot be open, since the domain is periodic along axis %d",
+			face_names[face], face / 2);
+	else if (*open)
+		quern_report_add(
+			s->report, node->mark, "scene: domain.open: %s stands there twice", face_names[face]);
+	*open = true;
+}
+
+static void read_open(quern_scene *s, const quern_node *domain) {
+	const quern_node *node = quern_node_find(domain, "open");
+	char say[64];
+	if (!node) return;
+	if (node->kind != QUERN_NODE_LIST) {
+		quern_report_add(s->report, node->mark,
+			"scene: domain.open must be a list of faces, such as [lower_y, upper_x], not %s",
+			quern_node_say(node, say));
+		return;
+	}
+	for (size_t k = 0; k < node->n; k++) open_face(s, node->entries[k].value);
 }
 
 static void read_fields(quern_scene *s, const quern_node *output) {
@@ -230,6 +289,7 @@ static void read_general(quern_scene *s, quern_node *root, const char *const *al
 	s->general.every_given = !isnan(s->general.every);
 	if (!s->general.every_given) s->general.every = s->general.end > 0 ? s->general.end / 50 : 1;
 	read_periodic(s, quern_node_find(root, "domain"));
+	read_open(s, quern_node_find(root, "domain"));
 	read_fields(s, quern_node_find(root, "output"));
 	read_step(s, root);
 	check_frames(s, root);

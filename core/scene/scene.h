@@ -58,6 +58,7 @@ typedef struct quern_general {
 	const char *name, *model, *step_text;
 	quern_real gravity[3], lower[3], upper[3];
 	bool periodic[3];
+	bool open[2][3];                         /* lower, upper; by axis */
 	quern_real end, every, checkpoint, step; /* s; step 0: auto */
 	bool force;
 	bool compress;
@@ -111,6 +112,8 @@ quern_node *quern_scene_tree(const quern_scene *, const quern_naming *);
 char *quern_scene_resolved(const quern_scene *, const quern_naming *);
 /* The rows of the core's own keys, for schema and describe. */
 extern const quern_param quern_general_rows[];
+/* "lower_x": face side of axis k. */
+const char *quern_face_name(int side, int axis);
 /* Keys of the core that take lists, which rows do not describe; NULL-name terminated. */
 typedef struct quern_general_list {
 	const char *name, *item, *doc;

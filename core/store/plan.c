@@ -8,6 +8,12 @@
 const char *const quern_phase_names[] = { "setup", "begin", "substep", "deposit", "exchange", "advance",
 	"end", "output" };
 
+/* Whether a parameter of a plugin is not zero; NULL: whatever it is. */
+static bool holds(const quern_instance *it, const char *when) {
+	const quern_param *row = when ? quern_param_find(it->file->params, when) : NULL;
+	return !when || (row && quern_param_number(row, it->self) != 0);
+}
+
 /* ---- sets ---- */
 
 static bool slot_filled(const quern_section *section, const char *slot) {
@@ -43,7 +49,8 @@ static void gather_sets(quern_plan *p) {
 	for (size_t i = 0; i < p->scene->n_sections; i++) {
 		const quern_section *section = &p->scene->sections[i];
 		for (const quern_set *set = section->ops->sets; set && set->name; set++) {
-			if (set->slot && !slot_filled(section, set->slot)) continue;
+			if ((set->slot && !slot_filled(section, set->slot)) || !holds(section->solver, set->when))
+				continue;
 			check_name(p, section, set->name);
 			if (set->plural && strcmp(set->plural, set->name) != 0) check_name(p, section, set->plural);
 			add_set(p, set->name, set, set->rows != 0);
@@ -70,11 +77,6 @@ static int set_of(const quern_plan *p, const char *field) {
 }
 
 /* ---- uses ---- */
-
-static bool holds(const quern_instance *it, const char *when) {
-	const quern_param *row = when ? quern_param_find(it->file->params, when) : NULL;
-	return !when || (row && quern_param_number(row, it->self) != 0);
-}
 
 /* Where there are cases of their own, a row counts if it does in any of them. */
 static bool holds_refined(const quern_filling *f, const char *when, bool again) {
@@ -119,6 +121,7 @@ static void gather_stages(quern_plan *p) {
 	for (size_t i = 0; i < p->scene->n_sections; i++) {
 		const quern_section *section = &p->scene->sections[i];
 		for (const quern_stage *s = section->ops->stages; s && s->name; s++) {
+			if (!holds(section->solver, s->when)) continue;
 			add_stage(p, (quern_plan_stage) { .name = s->name,
 							 .doc = s->doc,
 							 .stage = s,

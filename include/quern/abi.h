@@ -288,8 +288,9 @@ typedef struct quern_setup {
 	quern_real lower[3], upper[3];
 	bool periodic[3];
 	const quern_host *host;
-	void *scene; /* opaque */
-	bool later;  /* since 2.1: the values of one of the scene's `stages`, which come after the release */
+	void *scene;     /* opaque */
+	bool later;      /* since 2.1: the values of one of the scene's `stages`, which come after the release */
+	bool open[2][3]; /* since 2.1: faces of the domain that let material out: lower, upper; by axis */
 } quern_setup;
 
 /* ==== plugin and library ==== */

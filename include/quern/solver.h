@@ -37,7 +37,8 @@ typedef struct quern_set {
 	uint32_t
 		counted; /* 1: series.csv and summary.json say how many there are, and how many steps they took */
 	quern_real
-		cost[2]; /* s that a step of one entry takes on one core in 2-D and 3-D, about: for estimates */
+		cost[2];      /* s that a step of one entry takes on one core in 2-D and 3-D, about: for estimates */
+	const char *when; /* parameter of this solver: the set is there only if that is not zero; NULL: always */
 } quern_set;
 
 typedef struct quern_slot {
@@ -97,6 +98,7 @@ typedef struct quern_step {
 	 * the last step; else -1 */
 	int64_t stage_step;
 	uint32_t within; /* since 2.1: which of n_substeps this is, from 0; 0 in other phases */
+	bool open[2][3]; /* since 2.1: faces of the domain that let material out: lower, upper; by axis */
 } quern_step;
 
 enum {
@@ -109,6 +111,9 @@ typedef struct quern_stage {
 	uint32_t phase, flags;
 	const quern_use *uses;
 	quern_status (*run)(const void *self, const quern_step *); /* [stage] */
+	const char
+		*when; /* parameter of this solver: the stage is there only if that is not zero; NULL: always. The
+	                     first stage of a solver always is */
 } quern_stage;
 
 typedef struct quern_solver_ops {
@@ -136,7 +141,8 @@ typedef struct quern_solver_ops {
 	/* [stage] after every substep while settling: true when at rest. NULL: nothing to settle */
 	bool (*settled)(const void *self, const quern_step *);
 	/* [stage] one number for each of `sums`, of what the solver carries now. Of the names, the program knows mass (kg; none
-	 * may get lost), owed (kg, of mass that is on its way between solvers), momentum_x, momentum_y, momentum_z (kg m/s),
+	 * may get lost), owed (kg, of mass that is on its way between solvers), left and poured (kg so far, out through faces of the
+	 * domain and in by sources), momentum_x, momentum_y, momentum_z (kg m/s),
 	 * kinetic, potential, elastic (J), discrete (kg of mass that single bodies carry), and defect (of the solver's own
 	 * invariants so far, relative); all others stand in summary.json under `sums`. NULL: nothing */
 	void (*account)(const void *self, const quern_step *, quern_real *sum);

@@ -13,6 +13,12 @@ enum { SUM_MASS, SUM_MOMENTUM, SUM_KINETIC = SUM_MOMENTUM + 3, SUM_POTENTIAL, SU
 		.name = "potential", .unit = "J", .doc = "In the field of gravity, from the origin on."              \
 	}
 
+/* Rows of what came and went. */
+#define FLOW_ROWS                                                                                            \
+	{ .name = "left", .unit = "kg", .doc = "Out through faces of the domain so far." }, {                    \
+		.name = "poured", .unit = "kg", .doc = "In by sources so far."                                       \
+	}
+
 /* Adds mass, momentum and the energy of height. */
 static inline void cloud_account(
 	const cloud_sums *c, const quern_column *x, const quern_column *v, const quern_step *s, quern_real *out) {

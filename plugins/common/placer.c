@@ -31,6 +31,24 @@ quern_status quern_placer_init(placer *p, uint32_t dim, const quern_real lower[3
 	return QUERN_OK;
 }
 
+bool quern_placer_bodies(placer *p, const quern_step *s, uint32_t slot, bool nodes) {
+	const size_t n = (size_t)s->n_slot[slot] + 1;
+	quern_bound *body = s->host->memory(s->run, n * sizeof(quern_bound));
+	body_pose *pose = quern_body_poses_now(s, slot);
+	if (!body || !pose) return false;
+	p->n_bodies = 0;
+	for (uint32_t b = 0; b < s->n_slot[slot]; b++) {
+		const body_item *item = s->slot[slot][b].item;
+		if (!quern_body_is_there(&s->slot[slot][b], s->settling)) continue;
+		if (nodes && item->boundary == BOUNDARY_NONE && isnan(item->friction)) continue;
+		pose[p->n_bodies] = pose[b];
+		body[p->n_bodies++] = s->slot[slot][b];
+	}
+	p->body = body;
+	p->pose = pose;
+	return true;
+}
+
 void quern_placer_finish(placer *p) {
 	if (!p) return;
 	free(p->spot);

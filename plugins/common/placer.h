@@ -27,6 +27,9 @@ typedef struct placer {
 quern_status quern_placer_init(placer *, uint32_t dim, const quern_real lower[3], const quern_real upper[3],
 	const bool periodic[3], quern_real most);
 void quern_placer_finish(placer *);
+/* [stage] What must not be touched: bodies of a slot that are there now, where they are now, and of these with `nodes` only those
+ * that act on the continuum. Until the stage returns; false if memory is gone. */
+bool quern_placer_bodies(placer *, const quern_step *, uint32_t slot, bool nodes);
 void quern_placer_add(placer *, const quern_spot *);
 /* No overlap with grains or bodies above 1e-9 of the spot's radius. */
 bool quern_placer_free(const placer *, const quern_spot *);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* checks - what is looked at now and then alone, since it costs: contacts that lie too deep for too long, and grains
  * out of the domain. docs/decisions/0015-too-deep.md */
+#include "../common/outlets.h"
 #include "forces.h"
 #include <math.h>
 #include <stdio.h>
@@ -75,8 +76,7 @@ void quern_dem_check_grains(const forces_shared *sh, uint32_t b) {
 		if (fixed && fixed[i]) continue;
 		for (uint32_t k = 0; k < s->dim; k++) {
 			const quern_real x = u[FORCE_POSITION].real[k][i];
-			if (!s->periodic[k] && !(x >= s->lower[k] && x <= s->upper[k]) && sh->outside[b] < 0)
-				sh->outside[b] = (int32_t)i;
+			if (outlet_refuses(s, k, x) && sh->outside[b] < 0) sh->outside[b] = (int32_t)i;
 		}
 		for (uint32_t k = 0; k < n_spin; k++)
 			turn2 += u[FORCE_SPIN].real[k][i] * s->dt * (u[FORCE_SPIN].real[k][i] * s->dt);
@@ -137,8 +137,7 @@ quern_status quern_dem_judge_grains(const forces_shared *sh, uint32_t n_blocks) 
 		if (i < 0) continue;
 		for (uint32_t k = 0; k < s->dim; k++) {
 			const quern_real x = sh->use[FORCE_POSITION].real[k][i];
-			if (!s->periodic[k] && !(x >= s->lower[k] && x <= s->upper[k]))
-				return quern_dem_left(s, sh->use[FORCE_ID].id[i], k, x);
+			if (outlet_refuses(s, k, x)) return quern_dem_left(s, sh->use[FORCE_ID].id[i], k, x);
 		}
 	}
 	return QUERN_OK;

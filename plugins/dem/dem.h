@@ -4,6 +4,7 @@
 #include "../bodies/bodies.h"
 #include "../common/account.h"
 #include "../common/radius.h"
+#include "../common/source.h"
 #include "../common/tools.h"
 #include "rows.h"
 #include <quern/contact.h>
@@ -22,7 +23,7 @@ typedef struct dem_material {
 typedef struct dem {
 	quern_real skin, rest, settle_step; /* from the scene */
 	dem_material alone;
-	quern_list materials, pairs, fill, place;
+	quern_list materials, pairs, fill, place, source;
 	const char *file;
 	quern_real overlap_most, overlap_start; /* over the smaller radius */
 	int32_t settle_most;
@@ -30,6 +31,7 @@ typedef struct dem {
 	bool fixed;    /* some grains do not move */
 	bool features; /* some bodies have several */
 	bool moving;   /* some bodies do */
+	bool outlets, sources;
 	bool settles;
 	quern_real reach;  /* m, of the laws beyond touching */
 	quern_real height; /* m, of the fill, or of the domain where there is none */
@@ -75,7 +77,15 @@ typedef struct dem_place {
 } dem_place;
 
 /* slots, in the order of the solver's table */
-enum { SLOT_CONTACT, SLOT_NEIGHBOURS, SLOT_INTEGRATOR, SLOT_BODIES, SLOT_PACKER, SLOT_SETTLING };
+enum {
+	SLOT_CONTACT,
+	SLOT_NEIGHBOURS,
+	SLOT_INTEGRATOR,
+	SLOT_BODIES,
+	SLOT_PACKER,
+	SLOT_SETTLING,
+	SLOT_SOURCE_PACKER
+};
 
 /* The integrator of this step. */
 QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
@@ -108,6 +118,8 @@ QUERN_INLINE int32_t dem_item_on(const dem *d, const int32_t *material, int32_t 
 QUERN_INLINE quern_real dem_diameter(const dem *d) { return 2 * d->material[0].radii.mean; }
 
 quern_status quern_dem_fill(const void *self, const quern_step *);
+quern_status quern_dem_pour(const void *self, const quern_step *);
+quern_status quern_dem_outlets(const void *self, const quern_step *);
 quern_status quern_dem_open(const void *self, const quern_step *);
 quern_status quern_dem_neighbours(const void *self, const quern_step *);
 quern_status quern_dem_forces(const void *self, const quern_step *);

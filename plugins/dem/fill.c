@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* fill - the first grains: packed cell by cell, given one by one, or read from a table; and when they have settled */
+#include "../common/outlets.h"
 #include "../common/placer.h"
 #include "dem.h"
 #include <math.h>
@@ -311,7 +312,7 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 			if (item[i].fixed == fixed)
 				fill_region(f, &item[i], &s->slot[SLOT_PACKER][i], (uint64_t)(i + 1) << 40);
 	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
-	if (!f->n)
+	if (!f->n && !d->source.n)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"no grain has room: is the region too small, or a body in it?");
 	s->host->log(s->run, 0, "%u grains placed", f->n);
@@ -340,11 +341,17 @@ static void warn_of_softness(const dem *d, const quern_step *s) {
 		d->height, 100 * d->sinks, d->stiffest, d->stiffness, d->stiffness * d->sinks / 0.005);
 }
 
+static quern_status open_books(const dem *d, const quern_step *s) {
+	const quern_status status = d->outlets ? book_open(s, "grain_face", outlet_faces(s)) : QUERN_OK;
+	return status == QUERN_OK && d->sources ? book_open(s, "grain_source", d->source.n) : status;
+}
+
 quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	if (refuse_two_steps(s) != QUERN_OK) return QUERN_E_PARAM;
 	filling f = { .d = self, .step = s };
 	grain_table table = { 0 };
-	quern_status status = read_file(f.d, s, &table);
+	quern_status status = open_books(f.d, s);
+	if (status == QUERN_OK) status = read_file(f.d, s, &table);
 	if (status == QUERN_OK) status = open_placer(&f, &table);
 	if (status == QUERN_OK) status = fill_all(&f, &table);
 	if (status == QUERN_OK) warn_of_softness(f.d, s);

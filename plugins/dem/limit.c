@@ -83,17 +83,23 @@ static void look_for_lightest(const quern_step *s, lightest *of) {
 	}
 }
 
-/* By material. Before there are grains, what the distributions may bring. */
+/* What a distribution may bring of a material. */
+static void expect(const dem *d, lightest *l, uint32_t k) {
+	const quern_real least = quern_radius_least(&d->material[k].radii),
+					 light = quern_radius_mass(least, d->material[k].density, d->dim);
+	if (light < l->mass[0]) l->mass[0] = light, l->radius = least;
+	if (light < l->mass[1]) l->mass[1] = light;
+}
+
+/* By material. Before there are grains, what the distributions may bring; sources bring the first material. */
 static void lightest_grains(const dem *d, const quern_step *s, lightest *of) {
 	bool any = false;
 	for (uint32_t k = 0; k < d->n_materials; k++)
 		of[k] = (lightest) { .mass = { INFINITY, INFINITY }, .radius = INFINITY };
 	look_for_lightest(s, of);
 	for (uint32_t k = 0; k < d->n_materials; k++) any = any || isfinite(of[k].mass[0]);
-	for (uint32_t k = 0; k < d->n_materials && !any; k++) {
-		of[k].radius = quern_radius_least(&d->material[k].radii);
-		of[k].mass[0] = of[k].mass[1] = quern_radius_mass(of[k].radius, d->material[k].density, d->dim);
-	}
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		if (!any || (!k && d->source.n)) expect(d, &of[k], k);
 }
 
 static contact_limit limit_of_two(const dem *d, const quern_step *s, const lightest *l, uint32_t k) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* neighbours - the stage that sorts grains, lists near pairs and near bodies, and carries their history over */
+#include "../common/outlets.h"
 #include "../common/sort.h"
 #include "dem.h"
 #include <math.h>
@@ -356,7 +357,9 @@ static quern_status check_periodic(const listing *l) {
 
 quern_status quern_dem_left(const quern_step *s, int64_t id, uint32_t axis, quern_real x) {
 	return s->host->stop(s->run, QUERN_E_NUMERIC, "grain", id,
-		"left the domain along axis %u, at %.4g m: put a body there or make the domain larger", axis, x);
+		"left the domain along axis %u, at %.4g m: put a body there, make the domain larger or open its face "
+		"(domain.open)",
+		axis, x);
 }
 
 /* A closed domain has bodies that keep grains inside; periodic axes bring them back here, where lists are remade. */
@@ -369,7 +372,7 @@ static quern_status keep_inside(const listing *l) {
 		const quern_real lower = s->lower[k], upper = s->upper[k];
 		for (uint32_t i = 0; i < n; i++) {
 			if (s->periodic[k]) x[i] = quern_brought_back(x[i], lower, upper);
-			else if (!(x[i] >= lower && x[i] <= upper) && !(fixed && fixed[i]))
+			else if (outlet_refuses(s, k, x[i]) && !(fixed && fixed[i]))
 				return quern_dem_left(s, s->use[NEAR_ID].id[i], k, x[i]);
 		}
 	}

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* rows - the uses of the grain solver's stages, and the numbers of their rows */
 #pragma once
+#include "../common/books.h"
 #include <math.h>
 #include <quern/abi.h>
 
@@ -31,7 +32,9 @@
 	X(FILL_MATERIAL, MATERIAL_USE(QUERN_WRITE, .flags = QUERN_SHOWN, .doc = "Number of its material, from 0.")) \
 	X(FILL_ID, "grain.id", "1", QUERN_WRITE, QUERN_ID, .flags = QUERN_SHOWN, \
 		.doc = "Number of the grain, for ever.") \
-	X(FILL_DISPLACEMENT, DISPLACEMENT_USE)
+	X(FILL_DISPLACEMENT, DISPLACEMENT_USE) \
+	X(FILL_LEFT, "grain_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
+	X(FILL_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "sources")
 QUERN_USE_ENUM(FILL_USES);
 
 #define OPEN_USES(X) \
@@ -42,6 +45,35 @@ QUERN_USE_ENUM(FILL_USES);
 	X(OPEN_FIXED, FIXED_USE(QUERN_READ)) \
 	X(OPEN_DISPLACEMENT, DISPLACEMENT_USE)
 QUERN_USE_ENUM(OPEN_USES);
+
+#define OUTLET_USES(X) \
+	X(OUT_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(OUT_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(OUT_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
+	X(OUT_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR) \
+	X(OUT_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(OUT_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(OUT_FIXED, FIXED_USE(QUERN_READ)) \
+	X(OUT_PULL, PULL_USE) \
+	BOOK_ROWS(X, LEFT, "grain_face", "outlets")
+QUERN_USE_ENUM(OUTLET_USES);
+
+/* new entries alone are written, before anybody else in the step looks at one */
+#define POUR_USES(X) \
+	X(POUR_POSITION, "grain.position", "m", QUERN_WRITE, QUERN_VECTOR) \
+	X(POUR_VELOCITY, "grain.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR) \
+	X(POUR_RADIUS, "grain.radius", "m", QUERN_WRITE, QUERN_SCALAR) \
+	X(POUR_MASS, "grain.mass", "kg", QUERN_WRITE, QUERN_SCALAR) \
+	X(POUR_ID, "grain.id", "1", QUERN_READ, QUERN_ID) \
+	X(POUR_POINT, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_BEFORE) \
+	X(POUR_POINT_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_BEFORE) \
+	X(POUR_DISPLACEMENT, "total.displacement", "m", QUERN_WRITE, QUERN_SCALAR, .initial = INFINITY) \
+	BOOK_ROWS(X, POURED, "grain_source", "sources") \
+	X(POUR_DRAWS, "grain_source.draws", "1", QUERN_UPDATE, QUERN_INDEX, .when = "sources", \
+		.doc = "Radii drawn so far.") \
+	X(POUR_WAITING, WAITING_USE("grain_source")) \
+	X(POUR_LATE, LATE_USE("grain_source"))
+QUERN_USE_ENUM(POUR_USES);
 
 /* positions are brought back through periodic faces in place, all of them before anybody looks at others */
 #define NEAR_USES(X) \

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.dem - grains: discs and spheres with contact laws. docs/theory/grains.md */
 #include "../common/height.h"
+#include "../common/outlets.h"
 #include "dem.h"
 #include <math.h>
 #include <quern/math.h>
@@ -37,7 +38,7 @@ static const quern_param place_rows[] = { QUERN_PARAM(
 	QUERN_END_PARAMS };
 #define MATERIAL_ROWS(T, member, before, ...)                                                                \
 	QUERN_PARAM_AS(T, member density, before "density", "kg/m^3", "Density of the grains' material.",        \
-		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6, __VA_ARGS__),                                  \
+		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e6, __VA_ARGS__),                     \
 		QUERN_PARAM_AS(T, member radii.mean, before "radius.mean", "m", "Mean radius.",                      \
 			.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6, __VA_ARGS__),                              \
 		QUERN_PARAM_AS(T, member radii.spread, before "radius.spread", "1",                                  \
@@ -73,6 +74,8 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 	QUERN_PARAM(dem, file, NULL,
 		"Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed] [material].",
 		.flags = QUERN_FILE),
+	QUERN_PARAM(dem, source, NULL, "Regions that pour grains, of the first material where there are several.",
+		.rows = quern_source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
@@ -101,6 +104,11 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(dem, moving, NULL, "Watch how far bodies have moved; set by itself where one does.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, outlets, NULL,
+		"Take out what passes an open face; set by itself where the domain has one.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, sources, NULL, "Keep books of sources; set by itself where there is one.",
+		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -116,6 +124,14 @@ static const quern_set sets[] = { { .name = "grain",
 		.plural = "touches",
 		.doc = "Grains near bodies, by block, body and grain.",
 		.slot = "bodies" },
+	{ .name = "grain_face",
+		.plural = "grain_faces",
+		.doc = "What grains took out through lower_x, upper_x, lower_y and so on.",
+		.when = "outlets" },
+	{ .name = "grain_source",
+		.plural = "grain_sources",
+		.doc = "What each source has poured.",
+		.when = "sources" },
 	{ .name = NULL } };
 
 static const quern_slot slots[] = {
@@ -149,10 +165,17 @@ static const quern_slot slots[] = {
 		.doc = "the step in time while settling",
 		.def = "damped",
 		.stage = { "dem.forces", "dem.open" } },
+	{ .name = "source.packer",
+		.kind = &quern_packer_kind,
+		.doc = "who places the grains",
+		.def = "random",
+		.stage = { "dem.pour" } },
 	{ .name = NULL }
 };
 
 static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
+static const quern_use pour_uses[] = QUERN_USE_ROWS(POUR_USES);
+static const quern_use outlet_uses[] = QUERN_USE_ROWS(OUTLET_USES);
 static const quern_use open_uses[] = QUERN_USE_ROWS(OPEN_USES);
 static const quern_use near_uses[] = QUERN_USE_ROWS(NEAR_USES);
 static const quern_use force_uses[] = QUERN_USE_ROWS(FORCE_USES);
@@ -163,6 +186,13 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 										  .phase = QUERN_SETUP,
 										  .uses = fill_uses,
 										  .run = quern_dem_fill },
+	{ .name = "dem.pour",
+		.doc = "New grains of sources.",
+		.phase = QUERN_BEGIN,
+		.flags = QUERN_SOMETIMES,
+		.uses = pour_uses,
+		.run = quern_dem_pour,
+		.when = "sources" },
 	{ .name = "dem.open",
 		.doc = "The integrator's part before the forces, if it has one.",
 		.phase = QUERN_SUBSTEP,
@@ -181,6 +211,13 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 		.flags = QUERN_SETTLES,
 		.uses = force_uses,
 		.run = quern_dem_forces },
+	{ .name = "dem.outlets",
+		.doc = "Takes out what has passed an open face.",
+		.phase = QUERN_SUBSTEP,
+		.flags = QUERN_SETTLES,
+		.uses = outlet_uses,
+		.run = quern_dem_outlets,
+		.when = "outlets" },
 	{ .name = "dem.list",
 		.doc = "The list of the release, before anything has moved.",
 		.phase = QUERN_OUTPUT,
@@ -230,8 +267,12 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	}
 	const dem_place *place = d->place.items;
 	for (uint32_t i = 0; i < d->place.n; i++) d->fixed = d->fixed || place[i].fixed;
-	if (!d->fill.n && !d->place.n && !d->file)
-		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place or file");
+	if (!d->fill.n && !d->place.n && !d->file && !d->source.n)
+		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place, file or source");
+	if (quern_sources_check(&d->source, true, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	d->outlets = d->outlets || outlets_any(setup->open);
+	d->sources = d->sources || d->source.n;
+	setup->host->publish(setup, "grain.sources", "1", d->source.n);
 	if (d->file) d->fixed = true; /* its header may say so */
 	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = dem_diameter(d);
 	if (d->settles && !(gravity > 0) && !setup->later)
@@ -366,9 +407,9 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	return QUERN_OK;
 }
 
-enum { SUM_DISCRETE = SUM_OWN };
+enum { SUM_DISCRETE = SUM_OWN, SUM_LEFT, SUM_POURED };
 static const quern_output sums[] = { ACCOUNT_ROWS,
-	{ .name = "discrete", .unit = "kg", .doc = "Carried by grains." }, { .name = NULL } };
+	{ .name = "discrete", .unit = "kg", .doc = "Carried by grains." }, FLOW_ROWS, { .name = NULL } };
 
 static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *use = s->use;
@@ -376,7 +417,8 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_real *radius = use[FILL_RADIUS].real[0], turning = quern_radius_inertia(s->dim);
 	const uint32_t n_spin = !use[FILL_SPIN].real[0] ? 0 : s->dim == 3 ? 3 : 1;
 	cloud_sums c;
-	(void)self;
+	out[SUM_LEFT] = book_total(use[FILL_LEFT].real[0], outlet_faces(s));
+	out[SUM_POURED] = book_total(use[FILL_POURED].real[0], ((const dem *)self)->source.n);
 	if (!grains.n || !cloud_open(&c, s->host, s->run, &grains)) return;
 	cloud_account(&c, &use[FILL_POSITION], &use[FILL_VELOCITY], s, out);
 	out[SUM_DISCRETE] += cloud_total(&c);

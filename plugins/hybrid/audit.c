@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* audit - the ledger's two invariants, asserted after every step: docs/theory/hybrid.md, section 5 */
+#include "../common/outlets.h"
 #include "hybrid.h"
 #include <math.h>
 
@@ -8,6 +9,7 @@ static const quern_real tolerance = 1e-12;
 typedef struct {
 	quern_real mass, carried, momentum[3], owed_momentum[3];
 	quern_real speed, kinetic; /* sums of w m |v| and w m v^2/2 */
+	quern_real left, poured;   /* kg so far, through faces and by sources */
 } sums;
 
 static bool add_cloud(const quern_step *s, const cloud *of, const quern_column *velocity, sums *out) {
@@ -25,13 +27,25 @@ static bool add_cloud(const quern_step *s, const cloud *of, const quern_column *
 	return true;
 }
 
-/* Impulses that came from outside since the start: whatever body, face or fixed grain gave them. */
+static uint32_t entries(const quern_step *s, const char *set) { return s->host->set(s->run, set).n; }
+
+/* What leaves takes momentum along, what comes brings some. */
+static quern_real flow(const quern_step *s, uint32_t axis) {
+	const quern_column *u = s->use;
+	return book_total(u[A_POURED_MOMENTUM].real[axis], entries(s, "grain_source")) -
+		   book_total(u[A_GRAIN_LEFT_MOMENTUM].real[axis], outlet_faces(s)) -
+		   book_total(u[A_POINT_LEFT_MOMENTUM].real[axis], outlet_faces(s)) -
+		   (u[A_OWED_LEFT_MOMENTUM].real[0] ? u[A_OWED_LEFT_MOMENTUM].real[axis][0] : 0);
+}
+
+/* Impulses that came from outside since the start: whatever body, face or fixed grain gave them, and what flows through
+ * faces and out of sources. */
 static quern_real impulse(const quern_step *s, uint32_t axis) {
 	const quern_column *u = s->use;
 	quern_real sum = u[A_GRAVITY].real[axis][0] + u[A_FACES].real[axis][0] + u[A_SUPPORT].real[axis][0];
 	const uint32_t bodies = u[A_BODY].real[axis] ? s->host->set(s->run, "body").n : 0;
 	for (uint32_t b = 0; b < bodies; b++) sum += u[A_BODY].real[axis][b];
-	return sum;
+	return u[A_PASSED].real[0] ? sum + flow(s, axis) : sum;
 }
 
 static bool take_sums(const quern_step *s, sums *out) {
@@ -46,6 +60,11 @@ static bool take_sums(const quern_step *s, sums *out) {
 		return false;
 	out->mass = out->carried + s->host->sum(s->run, cells, u[A_GRAIN_OWED].real[0]) +
 				s->host->sum(s->run, cells, u[A_POINT_OWED].real[0]);
+	if (u[A_PASSED].real[0]) {
+		out->poured = book_total(u[A_POURED].real[0], entries(s, "grain_source"));
+		out->left = book_total(u[A_GRAIN_LEFT].real[0], outlet_faces(s)) +
+					book_total(u[A_POINT_LEFT].real[0], outlet_faces(s)) + u[A_OWED_LEFT].real[0][0];
+	}
 	for (uint32_t k = 0; k < s->dim; k++)
 		out->owed_momentum[k] = s->host->sum(s->run, cells, u[A_GRAIN_OWED_MOMENTUM].real[k]) +
 								s->host->sum(s->run, cells, u[A_POINT_OWED_MOMENTUM].real[k]);
@@ -84,7 +103,8 @@ static quern_status judge_momentum(const quern_step *s, const sums *now) {
 static quern_status judge(const quern_step *s, const sums *now) {
 	const quern_column *u = s->use;
 	quern_real *worst = u[A_MASS_DEFECT].real[0];
-	const quern_real mass_defect = fabs(now->mass / u[A_MASS].real[0][0] - 1);
+	const quern_real whole = u[A_MASS].real[0][0] + now->poured;
+	const quern_real mass_defect = whole > 0 ? fabs((now->mass + now->left) / whole - 1) : 0;
 	*worst = fmax(*worst, mass_defect);
 	if (!(mass_defect <= tolerance))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
@@ -102,7 +122,7 @@ static quern_status judge(const quern_step *s, const sums *now) {
 static void begin(const quern_step *s, const sums *now) {
 	const quern_column *u = s->use;
 	u[A_AUDITS].index[0] = 1;
-	u[A_MASS].real[0][0] = now->mass;
+	u[A_MASS].real[0][0] = now->mass + now->left - now->poured;
 	u[A_ENERGY].real[0][0] = now->kinetic + quern_hybrid_held(s);
 	u[A_WORK].real[0][0] = 0;
 	for (uint32_t k = 0; k < s->dim; k++) {
@@ -111,10 +131,21 @@ static void begin(const quern_step *s, const sums *now) {
 	}
 }
 
+/* Of what has left in this step gravity has had a part. */
+static void book_flow(const quern_step *s, const sums *now) {
+	const quern_column *u = s->use;
+	if (!u[A_PASSED].real[0]) return;
+	u[A_PASSED].real[0][0] = now->left - now->poured;
+	for (uint32_t k = 0; k < s->dim && u[A_AUDITS].index[0]; k++)
+		u[A_GRAVITY].real[k][0] += u[A_PULL].real[0][0] * s->gravity[k];
+	u[A_PULL].real[0][0] = 0;
+}
+
 quern_status quern_hybrid_audit(const void *self, const quern_step *s) {
 	const quern_column *u = s->use;
 	sums now = { .mass = 0 };
 	if (!take_sums(s, &now)) return QUERN_E_MEMORY;
+	book_flow(s, &now);
 	if (!u[A_AUDITS].index[0]) begin(s, &now);
 	else
 		for (uint32_t k = 0; k < s->dim; k++) {

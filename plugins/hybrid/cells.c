@@ -306,20 +306,25 @@ quern_status quern_hybrid_normals(update *d) {
 	return QUERN_OK;
 }
 
+/* `mass`: by cell, of all whose home it is; NULL: nobody asks. */
 static void put_homes(
-	const update *d, uint32_t n, const quern_column *x, const int32_t *fixed, int32_t *home) {
+	const update *d, const cloud *of, const quern_column *x, int32_t *home, quern_real *mass) {
 	quern_grid_cursor last = { .block = -1 };
-	for (uint32_t i = 0; i < n; i++) {
-		const int32_t c = fixed && fixed[i] ? -1 : cell_of(d, x->real, i, &last);
+	for (uint32_t i = 0; i < of->n; i++) {
+		const int32_t c = of->fixed && of->fixed[i] ? -1 : cell_of(d, x->real, i, &last);
 		int32_t cell[3];
 		home[i] = -1;
-		if (c >= 0 && quern_grid_cell_of(d->g, (uint32_t)c, cell)) home[i] = quern_grid_number(d->g, cell);
+		if (c < 0 || !quern_grid_cell_of(d->g, (uint32_t)c, cell)) continue;
+		home[i] = quern_grid_number(d->g, cell);
+		if (mass) mass[c] += cloud_mass(of, i);
 	}
 }
 
 void quern_hybrid_homes(update *d) {
 	const quern_column *u = d->u;
-	put_homes(d, d->s->host->set(d->s->run, "grain").n, &u[U_GRAIN_POSITION], u[U_GRAIN_FIXED].index,
-		u[U_GRAIN_HOME].index);
-	put_homes(d, d->s->host->set(d->s->run, "point").n, &u[U_POINT_POSITION], NULL, u[U_POINT_HOME].index);
+	const cloud grains = moving_grains(d->s), points = all_points(d->s);
+	quern_real *mass = u[U_HOME_MASS].real[0];
+	if (mass) memset(mass, 0, d->n_cells * sizeof *mass);
+	put_homes(d, &grains, &u[U_GRAIN_POSITION], u[U_GRAIN_HOME].index, mass);
+	put_homes(d, &points, &u[U_POINT_POSITION], u[U_POINT_HOME].index, mass);
 }

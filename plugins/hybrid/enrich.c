@@ -217,22 +217,14 @@ static void enrich_cell(enriching *e, uint32_t c) {
 static bool place_obstacles(enriching *e) {
 	const update *d = e->d;
 	const quern_step *s = d->s;
-	quern_bound *body = s->host->memory(s->run, (s->n_slot[SLOT_BODIES] + 1) * sizeof(quern_bound));
-	body_pose *pose = s->host->memory(s->run, (s->n_slot[SLOT_BODIES] + 1) * sizeof(body_pose));
 	quern_real most = quern_radius_most(&d->h->radii);
 	for (uint32_t i = 0; i < d->n_grains; i++)
 		most = d->u[U_GRAIN_RADIUS].real[0][i] > most ? d->u[U_GRAIN_RADIUS].real[0][i] : most;
 	e->seed = s->host->memory(s->run, MOST_SEEDS * sizeof(quern_spot));
-	if (!body || !pose || !e->seed ||
-		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK)
+	if (!e->seed ||
+		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
+		!quern_placer_bodies(&e->placer, s, SLOT_BODIES, false))
 		return false;
-	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
-		if (!quern_body_is_there(&s->slot[SLOT_BODIES][b], s->settling)) continue;
-		body[e->placer.n_bodies] = s->slot[SLOT_BODIES][b];
-		pose[e->placer.n_bodies++] = d->pose[b];
-	}
-	e->placer.body = body;
-	e->placer.pose = pose;
 	for (uint32_t i = 0; i < d->n_grains; i++) {
 		quern_spot spot = { .radius = d->u[U_GRAIN_RADIUS].real[0][i] };
 		if (d->drop_grain[i]) continue;

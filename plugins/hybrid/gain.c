@@ -65,14 +65,17 @@ static quern_real by_bodies(const quern_step *s) {
  * as that; and, where nothing pulls, what round-off moves: a millionth of a diameter in a step. */
 quern_status quern_hybrid_judge_gain(
 	const hybrid *h, const quern_step *s, quern_real kinetic, quern_real carried) {
-	const quern_real had = s->use[A_ENERGY].real[0][0], work = s->use[A_WORK].real[0][0] + by_bodies(s);
+	const quern_real brought =
+		book_total(s->use[A_POURED_ENERGY].real[0], s->host->set(s->run, "grain_source").n);
+	const quern_real had = s->use[A_ENERGY].real[0][0] + brought,
+					 work = s->use[A_WORK].real[0][0] + by_bodies(s);
 	const quern_real still = 1e-6 * h->diameter / s->dt;
 	const quern_real lift = h->gain * quern_gravity_size(s->dim, s->gravity) * h->diameter;
 	const quern_real slack = carried * (lift + 0.5 * still * still);
 	if (!(h->gain > 0) || kinetic <= 2 * (had + fmax(work, 0)) + slack) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
-		"grains and points move with %.3g J, though they had %.3g J at first and gravity and bodies have "
-		"given "
-		"%.3g J since: steps of %.3g s make energy, they are too long (hybrid.gain)",
+		"grains and points move with %.3g J, though they had %.3g J at first or when they were poured, and "
+		"gravity and bodies have given %.3g J since: steps of %.3g s make energy, they are too long "
+		"(hybrid.gain)",
 		kinetic, had, work, s->dt);
 }

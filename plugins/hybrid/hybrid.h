@@ -23,7 +23,9 @@ typedef struct hybrid {
 	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
 	bool moving;         /* some bodies do */
 	int32_t weights;
-	bool ramped; /* shares of hybrid cells are a field: cell.weight */
+	bool ramped;         /* shares of hybrid cells are a field: cell.weight */
+	bool passes;         /* books are kept of what leaves and comes */
+	quern_real pourings; /* sources of grains */
 } hybrid;
 
 enum { WEIGHTS_HALF, WEIGHTS_RAMP };

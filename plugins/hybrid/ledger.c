@@ -72,6 +72,32 @@ static entry copy_of(update *d, entry e, quern_real *momentum[3]) {
 	return copy;
 }
 
+static void let_go(update *d, entry e, const entry old, uint32_t c, quern_real share) {
+	const quern_column *u = d->u;
+	const quern_real mass = share * old.mass[c];
+	e.mass[c] -= mass;
+	book_number(&u[U_OWED_LEFT].real[0][0], &u[U_OWED_LEFT_REST].real[0][0], mass);
+	for (uint32_t k = 0; k < d->s->dim; k++) {
+		const quern_real momentum = share * old.momentum[k][c];
+		e.momentum[k][c] -= momentum;
+		book_number(&u[U_OWED_LEFT_MOMENTUM].real[k][0], &u[U_OWED_LEFT_MOMENTUM_REST].real[k][0], momentum);
+	}
+}
+
+/* What has left the domain since the last update took its share along: what is missing of the mass that was at home in a
+ * cell then. Leaves that mass in `of_home`; a billionth of it is round-off. */
+static void release(update *d, entry grains, const entry old_grains, entry points, const entry old_points,
+	quern_real *of_home) {
+	const quern_real *before = d->u[U_HOME_MASS].real[0];
+	for (uint32_t c = 0; before && c < d->n_cells; c++) {
+		const quern_real gone = before[c] - of_home[c];
+		if (!(gone > 1e-9 * before[c])) continue;
+		let_go(d, grains, old_grains, c, gone / before[c]);
+		let_go(d, points, old_points, c, gone / before[c]);
+		of_home[c] = before[c];
+	}
+}
+
 /* A particle that has left a cell takes its share of what the cell owed: by mass, of both clouds together. */
 void quern_hybrid_move_entries(update *d) {
 	const quern_column *u = d->u;
@@ -91,6 +117,7 @@ void quern_hybrid_move_entries(update *d) {
 			const int32_t home = m->now[i] < 0 ? -1 : home_entry(d, m->home[i]);
 			if (home >= 0) of_home[home] += cloud_mass(&m->of, i);
 		}
+	release(d, grains, old_grains, points, old_points, of_home);
 	for (const movers *m = clouds; m < clouds + 2; m++)
 		for (uint32_t i = 0; i < m->of.n; i++) {
 			const int32_t now = m->now[i], home = now < 0 ? -1 : home_entry(d, m->home[i]);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* rows - the uses of the hybrid solver's stages, and the numbers of their rows */
 #pragma once
+#include "../common/books.h"
 #include <quern/abi.h>
 
 /* clang-format off */
@@ -52,7 +53,20 @@
 	X(U_MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR) \
 	X(U_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR) \
 	X(U_WEIGHT, "cell.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "ramped", \
-		.doc = "Share of the continuum: 0 where there are grains alone, 1 where there are none.")
+		.doc = "Share of the continuum: 0 where there are grains alone, 1 where there are none.") \
+	X(U_HOME_MASS, "cell.home_mass", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
+		.doc = "Carried at the last update by those whose home it is.") \
+	X(U_OWED_LEFT, "total.owed_left", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
+		.doc = "Of entries, taken along by what has left the domain.") \
+	X(U_OWED_LEFT_REST, "total.owed_left_rest", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
+		.doc = "What its last bit does not hold.") \
+	X(U_OWED_LEFT_MOMENTUM, "total.owed_left_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, .when = "passes", \
+		.doc = "Of entries, taken along by what has left the domain.") \
+	X(U_OWED_LEFT_MOMENTUM_REST, "total.owed_left_momentum_rest", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
+		.when = "passes", .doc = "What its last bit does not hold.") \
+	X(U_PASSED, "total.passed", "kg", QUERN_READ, QUERN_SCALAR, .when = "passes") \
+	X(U_LEFT, "grain_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(U_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
 QUERN_USE_ENUM(UPDATE_USES);
 
 #define SAMPLE_USES(X) \
@@ -156,6 +170,18 @@ QUERN_USE_ENUM(BACK_USES);
 	X(A_GRAIN_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR) \
 	X(A_GRAIN_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
 	X(A_POINT_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR) \
-	X(A_POINT_STRESS, "point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC)
+	X(A_POINT_STRESS, "point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC) \
+	X(A_GRAIN_LEFT, "grain_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(A_GRAIN_LEFT_MOMENTUM, "grain_face.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(A_POINT_LEFT, "point_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(A_POINT_LEFT_MOMENTUM, "point_face.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(A_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(A_POURED_MOMENTUM, "grain_source.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(A_POURED_ENERGY, "grain_source.energy", "J", QUERN_READ, QUERN_SCALAR, .with = "grain_source.mass") \
+	X(A_OWED_LEFT, "total.owed_left", "kg", QUERN_READ, QUERN_SCALAR, .when = "passes") \
+	X(A_OWED_LEFT_MOMENTUM, "total.owed_left_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR, .when = "passes") \
+	X(A_PULL, "total.outlet_pull", "kg s", QUERN_UPDATE, QUERN_SCALAR, .when = "passes") \
+	X(A_PASSED, "total.passed", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
+		.doc = "Has left the domain, less what was poured.")
 QUERN_USE_ENUM(AUDIT_USES);
 /* clang-format on */

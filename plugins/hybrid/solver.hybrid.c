@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.hybrid - who is where: zones, conversions, the coupling of grains and continuum. docs/theory/hybrid.md */
+#include "../common/outlets.h"
 #include "hybrid.h"
 
 static const char *const weightings[] = { "half", "ramp", NULL };
@@ -40,6 +41,11 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.from = "continuum.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM(hybrid, moving, NULL, "Ask for the work of bodies; set by itself where one moves.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, passes, NULL,
+		"Keep books of what leaves and comes; set by itself where a face is open or a source pours.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM_AS(hybrid, pourings, "grain.sources", "1", "How many sources of grains there are.",
+		.from = "grain.sources", .max = 1e9, .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -132,6 +138,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	h->radii.mean = 0.5 * h->diameter;
 	h->radii.law = h->law_number > 0.5 ? RADIUS_UNIFORM : RADIUS_NORMAL;
 	h->radii.stream = setup->stream;
+	h->passes = h->passes || outlets_any(setup->open) || h->pourings > 0;
 	h->every = (uint32_t)(h->update / h->substeps);
 	if (!h->every) h->every = 1;
 	h->sample_every = h->every * (uint32_t)h->substeps / (uint32_t)h->samples;
@@ -168,13 +175,13 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 
 static uint32_t substeps(const void *self) { return (uint32_t)((const hybrid *)self)->substeps; }
 
-enum { SUM_OWED, SUM_OWED_MOMENTUM, SUM_DEFECT = SUM_OWED_MOMENTUM + 3 };
+enum { SUM_OWED, SUM_OWED_MOMENTUM, SUM_DEFECT = SUM_OWED_MOMENTUM + 3, SUM_LEFT };
 static const quern_output sums[] = {
 	{ .name = "owed", .unit = "kg", .doc = "The ledger's sum over all cells." },
 	{ .name = "owed_momentum_x", .unit = "kg m/s" }, { .name = "owed_momentum_y", .unit = "kg m/s" },
 	{ .name = "owed_momentum_z", .unit = "kg m/s" },
 	{ .name = "defect", .unit = "1", .doc = "Of the ledger's invariants so far.", .combine = QUERN_MAX },
-	{ .name = NULL }
+	{ .name = "left", .unit = "kg", .doc = "Of entries, taken along by what left." }, { .name = NULL }
 };
 
 static void account(const void *self, const quern_step *s, quern_real *out) {
@@ -187,6 +194,7 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 		out[SUM_OWED_MOMENTUM + k] = s->host->sum(s->run, n, u[U_GRAIN_OWED_MOMENTUM].real[k]) +
 									 s->host->sum(s->run, n, u[U_POINT_OWED_MOMENTUM].real[k]);
 	const quern_real mass = u[U_MASS_DEFECT].real[0][0], momentum = u[U_MOMENTUM_DEFECT].real[0][0];
+	if (u[U_OWED_LEFT].real[0]) out[SUM_LEFT] = u[U_OWED_LEFT].real[0][0];
 	out[SUM_DEFECT] = mass > momentum ? mass : momentum;
 }
 

@@ -67,13 +67,21 @@ static quern_real carried_mass(const quern_step *s) {
 
 static void say(const quern_step *s, uint32_t changed) {
 	const quern_column *u = s->use;
-	const quern_real whole = u[U_MASS].real[0][0];
+	const quern_real passed = u[U_PASSED].real[0] ? u[U_PASSED].real[0][0] : 0;
+	const quern_real all = u[U_MASS].real[0][0] - passed, whole = all > 0 ? all : 1;
 	quern_real entries = 0;
 	for (uint32_t c = 0; c < s->host->set(s->run, "cell").n; c++)
 		entries += fabs(u[U_GRAIN_OWED].real[0][c]) + fabs(u[U_POINT_OWED].real[0][c]);
 	s->host->log(s->run, 0,
 		"update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",
-		u[U_UPDATES].index[0], (long long)s->step, changed, entries / whole, carried_mass(s) / whole - 1);
+		u[U_UPDATES].index[0], (long long)s->step, changed, entries / whole,
+		all > 0 ? carried_mass(s) / whole - 1 : 0);
+}
+
+/* What left while the grains settled, less what sources have poured at once: books of what passes know of both. */
+static quern_real passed_before(const quern_step *s) {
+	return book_total(s->use[U_LEFT].real[0], s->host->set(s->run, "grain_face").n) -
+		   book_total(s->use[U_POURED].real[0], s->host->set(s->run, "grain_source").n);
 }
 
 /* The first step only gathers contact stresses: without them new points would start unloaded. The first update then
@@ -84,7 +92,7 @@ quern_status quern_hybrid_update(const void *self, const quern_step *s) {
 	uint32_t changed = 0;
 	if (s->step == 0) {
 		update d = { .h = h, .s = s };
-		u[U_MASS].real[0][0] = carried_mass(s);
+		u[U_MASS].real[0][0] = carried_mass(s) + passed_before(s);
 		return quern_hybrid_sort(&d); /* so that there are cells to gather stress in */
 	}
 	if ((s->step - 1) % h->every) return QUERN_OK;

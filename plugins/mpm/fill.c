@@ -1,28 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* fill - the first points: a lattice in each region, with the stress of the overburden if wished */
+#include "../common/outlets.h"
 #include "../common/stressed.h"
-#include "mpm.h"
+#include "lattice.h"
 #include <math.h>
-
-enum { MOST_POINTS = 1 << 30 };
-
-typedef struct {
-	uint32_t count[3], n;
-	quern_real spacing[3], wanted; /* how many points it would be, whether or not they can be counted */
-} lattice;
-
-static lattice lattice_of(const mpm *p, const mpm_fill *item) {
-	lattice l = { .count = { 1, 1, 1 }, .n = 1, .wanted = 1 };
-	for (uint32_t k = 0; k < p->dim; k++) {
-		const quern_real extent = item->upper[k] - item->lower[k], wanted = extent / p->cell * p->points;
-		l.wanted *= wanted > 1 ? wanted : 1;
-		if (l.wanted > MOST_POINTS) continue;
-		l.count[k] = wanted > 1 ? (uint32_t)(wanted + 0.5) : 1;
-		l.spacing[k] = extent / l.count[k];
-		l.n *= l.count[k];
-	}
-	return l;
-}
 
 /* The axis along which gravity is strongest. */
 static uint32_t steepest(const quern_step *s) {
@@ -51,14 +32,12 @@ static void weigh(const mpm *p, const quern_step *s, const mpm_fill *item, const
 
 static void place(const mpm *p, const quern_step *s, const mpm_fill *item, const lattice *l, uint32_t first) {
 	const quern_column *u = s->use;
-	quern_real volume = 1;
-	for (uint32_t k = 0; k < p->dim; k++) volume *= l->spacing[k];
+	const quern_real volume = lattice_volume(l, p->dim);
 	for (uint32_t i = 0; i < l->n; i++) {
-		const uint32_t at[3] = { i % l->count[0], i / l->count[0] % l->count[1],
-			i / (l->count[0] * l->count[1]) };
 		quern_real x[3] = { 0 };
+		lattice_place(l, item->lower, i, p->dim, x);
 		for (uint32_t k = 0; k < p->dim; k++) {
-			u[FILL_POSITION].real[k][first + i] = x[k] = item->lower[k] + (at[k] + 0.5) * l->spacing[k];
+			u[FILL_POSITION].real[k][first + i] = x[k];
 			u[FILL_VELOCITY].real[k][first + i] = item->velocity[k];
 		}
 		u[FILL_MASS].real[0][first + i] = p->density * volume;
@@ -138,7 +117,7 @@ static quern_status count_points(const mpm *p, const quern_step *s, uint32_t *to
 	const mpm_fill *item = p->fill.items;
 	quern_real wanted = 0;
 	for (uint32_t f = 0; f < p->fill.n; f++) {
-		const lattice l = lattice_of(p, &item[f]);
+		const lattice l = lattice_of(p, item[f].lower, item[f].upper);
 		wanted += l.wanted;
 		if (wanted > MOST_POINTS) break;
 		*total += l.n;
@@ -146,7 +125,13 @@ static quern_status count_points(const mpm *p, const quern_step *s, uint32_t *to
 	if (wanted > MOST_POINTS)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"asks for about %.2g points, more than %d: make cells larger", wanted, MOST_POINTS);
-	return *total ? QUERN_OK : s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill");
+	if (*total || p->source.n) return QUERN_OK;
+	return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill or source");
+}
+
+static quern_status open_books(const mpm *p, const quern_step *s) {
+	const quern_status status = p->outlets ? book_open(s, "point_face", outlet_faces(s)) : QUERN_OK;
+	return status == QUERN_OK && p->sources ? book_open(s, "point_source", p->source.n) : status;
 }
 
 /* A hybrid starts from all grains: its oracle decides where points go. */
@@ -159,8 +144,9 @@ quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 		return s->host->stop(s->run, QUERN_E_PARAM, "rasterise", -1,
 			"is plain, and the hybrid's coupling compares velocities at one place, for which points must "
 			"send their gradient: take affine, or hybrid.coupling: lumped");
-	if (s->host->has(s->run, "hybrid")) return QUERN_OK;
-	quern_status status = count_points(p, s, &total);
+	quern_status status = open_books(p, s);
+	if (s->host->has(s->run, "hybrid") || status != QUERN_OK) return status;
+	status = count_points(p, s, &total);
 	if (status != QUERN_OK) return status;
 	int32_t *from = s->host->memory(s->run, ((size_t)total + 1) * sizeof(int32_t));
 	if (!from) return QUERN_E_MEMORY;
@@ -168,11 +154,11 @@ quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 	status = s->host->remap(s->run, "point", total, from, 0, NULL);
 	if (status != QUERN_OK) return status;
 	for (uint32_t f = 0, first = 0; f < p->fill.n; f++) {
-		const lattice l = lattice_of(p, &item[f]);
+		const lattice l = lattice_of(p, item[f].lower, item[f].upper);
 		place(p, s, &item[f], &l, first);
 		first += l.n;
 	}
-	status = clip(s, &total);
+	status = total ? clip(s, &total) : QUERN_OK;
 	if (status != QUERN_OK) return status;
 	s->host->log(s->run, 0, "%u points placed", total);
 	const quern_column *u = s->use;

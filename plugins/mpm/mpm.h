@@ -3,6 +3,7 @@
 #pragma once
 #include "../bodies/bodies.h"
 #include "../common/account.h"
+#include "../common/source.h"
 #include "../common/tools.h"
 #include "rows.h"
 #include <quern/grid.h>
@@ -13,7 +14,9 @@
 typedef struct mpm {
 	quern_real cell, cut; /* from the scene */
 	int32_t points, rasterise;
-	quern_list fill;
+	quern_list fill, source;
+	bool outlets, sources;
+	uint64_t stream;                            /* of random numbers */
 	bool affine;                                /* points send their gradient, hybrid or not */
 	bool matrix, moments;                       /* or what the transfer gives; whose moment can be kept */
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
@@ -37,6 +40,8 @@ QUERN_INLINE uint32_t motion_change(uint32_t dim) { return dim; }
 QUERN_INLINE uint32_t motion_density(uint32_t dim) { return 2 * dim; }
 
 quern_status quern_mpm_fill(const void *self, const quern_step *);
+quern_status quern_mpm_pour(const void *self, const quern_step *);
+quern_status quern_mpm_outlets(const void *self, const quern_step *);
 quern_status quern_mpm_sort(const void *self, const quern_step *);
 quern_status quern_mpm_scatter(const void *self, const quern_step *);
 quern_status quern_mpm_nodes(const void *self, const quern_step *);

@@ -142,19 +142,22 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_rea
 	}
 }
 
-/* A face of the domain without a body is closed: nothing passes, nothing rubs. */
+/* A face of the domain without a body is closed unless the scene opens it: nothing passes, nothing rubs. */
 static void close_faces(const grid_work *w, uint32_t b, quern_real *impulse) {
 	const quern_grid_view *g = w->g;
 	for (uint32_t k = 0; k < g->dim; k++) {
 		const int32_t first = g->at[b][k] * (int32_t)g->edge;
-		if (g->periodic[k] || (first > 0 && first + (int32_t)g->edge <= g->cells[k])) continue;
+		const bool lower = first == 0 && !w->s->open[0][k],
+				   upper = first + (int32_t)g->edge > g->cells[k] && !w->s->open[1][k];
+		if (g->periodic[k] || (!lower && !upper)) continue;
 		for (uint32_t i = 0; i < N; i++) {
 			int32_t at[3];
 			quern_row *motion = &w->motion[(size_t)b * N + i];
 			const quern_real mass = w->node[(size_t)b * N + i][0];
-			quern_grid_cell_of(g, b * N + i, at);
 			if (!(mass > 0)) continue;
-			if ((at[k] == 0 && (*motion)[k] < 0) || (at[k] == g->cells[k] && (*motion)[k] > 0))
+			quern_grid_cell_of(g, b * N + i, at);
+			if ((lower && at[k] == 0 && (*motion)[k] < 0) ||
+				(upper && at[k] == g->cells[k] && (*motion)[k] > 0))
 				change_velocity(motion, k, g->dim, 0, mass, impulse);
 		}
 	}

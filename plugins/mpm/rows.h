@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* rows - the uses of the continuum solver's stages, and the numbers of their rows */
 #pragma once
+#include "../common/books.h"
 #include <quern/abi.h>
 
 /* clang-format off */
@@ -25,8 +26,33 @@
 	X(FILL_ENERGY, "point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
 		.doc = "Stored elastic energy.") \
 	X(FILL_UNSORTED, UNSORTED_USE) \
-	X(FILL_AFFINE, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL)
+	X(FILL_AFFINE, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL) \
+	X(FILL_LEFT, "point_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
+	X(FILL_POURED, "point_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "sources")
 QUERN_USE_ENUM(FILL_USES);
+
+/* new entries alone are written, before anybody else in the step looks at one */
+#define POUR_USES(X) \
+	X(POUR_POSITION, "point.position", "m", QUERN_WRITE, QUERN_VECTOR) \
+	X(POUR_VELOCITY, "point.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR) \
+	X(POUR_POINT_MASS, "point.mass", "kg", QUERN_WRITE, QUERN_SCALAR) \
+	X(POUR_VOLUME, "point.volume", "m^3", QUERN_WRITE, QUERN_SCALAR) \
+	X(POUR_STRESS, "point.stress", "Pa", QUERN_WRITE, QUERN_SYMMETRIC) \
+	X(POUR_UNSORTED, UNSORTED_USE) \
+	BOOK_ROWS(X, POURED, "point_source", "sources") \
+	X(POUR_WAITING, WAITING_USE("point_source")) \
+	X(POUR_LATE, LATE_USE("point_source"))
+QUERN_USE_ENUM(POUR_USES);
+
+#define OUTLET_USES(X) \
+	X(OUT_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(OUT_VELOCITY, "point.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(OUT_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(OUT_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(OUT_ENERGY, "point.energy", "J/kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(OUT_PULL, PULL_USE) \
+	BOOK_ROWS(X, LEFT, "point_face", "outlets")
+QUERN_USE_ENUM(OUTLET_USES);
 
 #define SORT_USES(X) \
 	X(SORT_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR) \

@@ -2,7 +2,8 @@
 /* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
 #include "../common/fit.h"
 #include "../common/height.h"
-#include "mpm.h"
+#include "../common/outlets.h"
+#include "lattice.h"
 #include <math.h>
 #include <stdio.h>
 
@@ -23,6 +24,8 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, points, "1", "Points per cell and axis at the start.", .def = 2, .min = 1, .max = 8),
 	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill)),
+	QUERN_PARAM(mpm, source, NULL, "Regions that pour material; in a hybrid its grains are poured alone.",
+		.rows = quern_source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(mpm, rasterise, "1",
 		"What points send to the nodes: their velocity (plain), or with it the velocity gradient of the last "
 		"step, or what the transfer gives in its place (affine); auto: affine where a hybrid's coupling or "
@@ -30,6 +33,11 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		"transfer asks for it.",
 		.choices = rasters),
 	QUERN_PARAM(mpm, affine, NULL, "Keep the gradient that points send; set by itself where one is needed.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, outlets, NULL,
+		"Take out what passes an open face; set by itself where the domain has one.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, sources, NULL, "Keep books of sources; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
 		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
@@ -42,7 +50,16 @@ static const quern_set sets[] = { { .name = "point",
 									  .cost = { 40e-9, 100e-9 },
 									  .doc = "Material points, sorted by grid block and cell." },
 	{ .name = "node", .doc = "What points bring to the nodes.", .rows = 8 },
-	{ .name = "motion", .doc = "How nodes move.", .rows = 8 }, { .name = NULL } };
+	{ .name = "motion", .doc = "How nodes move.", .rows = 8 },
+	{ .name = "point_face",
+		.plural = "point_faces",
+		.doc = "What points took out through lower_x, upper_x, lower_y and so on.",
+		.when = "outlets" },
+	{ .name = "point_source",
+		.plural = "point_sources",
+		.doc = "What each source has poured.",
+		.when = "sources" },
+	{ .name = NULL } };
 
 static const quern_slot slots[] = { { .name = "material",
 										.kind = &quern_material_kind,
@@ -63,6 +80,8 @@ static const quern_slot slots[] = { { .name = "material",
 	{ .name = NULL } };
 
 static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
+static const quern_use pour_uses[] = QUERN_USE_ROWS(POUR_USES);
+static const quern_use outlet_uses[] = QUERN_USE_ROWS(OUTLET_USES);
 static const quern_use sort_uses[] = QUERN_USE_ROWS(SORT_USES);
 static const quern_use scatter_uses[] = QUERN_USE_ROWS(SCATTER_USES);
 static const quern_use nodes_uses[] = QUERN_USE_ROWS(NODES_USES);
@@ -74,6 +93,13 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 										  .phase = QUERN_SETUP,
 										  .uses = fill_uses,
 										  .run = quern_mpm_fill },
+	{ .name = "mpm.pour",
+		.doc = "New points of sources.",
+		.phase = QUERN_BEGIN,
+		.flags = QUERN_SOMETIMES,
+		.uses = pour_uses,
+		.run = quern_mpm_pour,
+		.when = "sources" },
 	{ .name = "mpm.sort",
 		.doc = "Orders points by block and cell, allocates blocks.",
 		.phase = QUERN_DEPOSIT,
@@ -100,7 +126,31 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 		.phase = QUERN_ADVANCE,
 		.uses = gather_uses,
 		.run = quern_mpm_gather },
+	{ .name = "mpm.outlets",
+		.doc = "Takes out what has passed an open face.",
+		.phase = QUERN_ADVANCE,
+		.uses = outlet_uses,
+		.run = quern_mpm_outlets,
+		.when = "outlets" },
 	{ .name = NULL } };
+
+/* In a hybrid there is none. */
+static quern_status check_sources(mpm *p, const quern_setup *setup, quern_err *err) {
+	const source *item = p->source.items;
+	char param[40];
+	p->outlets = p->outlets || outlets_any(setup->open);
+	p->sources = (p->sources || p->source.n) && !setup->host->keeps(setup, "hybrid");
+	p->stream = setup->stream;
+	if (quern_sources_check(&p->source, false, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	for (uint32_t i = 0; i < p->source.n; i++) {
+		snprintf(param, sizeof param, "source.%u", i);
+		const lattice l = lattice_of(p, item[i].lower, item[i].upper);
+		if (l.wanted > MOST_POINTS)
+			return setup->host->fail(err, QUERN_E_PARAM, param,
+				"the region holds about %.2g points, more than %d: make cells larger", l.wanted, MOST_POINTS);
+	}
+	return QUERN_OK;
+}
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mpm *p = self;
@@ -132,6 +182,11 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			return setup->host->fail(err, QUERN_E_PARAM, "fill", "the velocity is beyond that of light");
 		fill_height_add(&loose, fill[i].lower, fill[i].upper);
 	}
+	if (check_sources(p, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	/* where nothing lies at first, what is poured piles up from the domain's end */
+	const source *pours = p->source.items;
+	for (uint32_t i = 0; i < p->source.n && !p->fill.n; i++)
+		fill_height_add(&loose, setup->lower, pours[i].upper);
 	const quern_real height = fill_height_all(&loose);
 	setup->host->publish(setup, "fill.height", "m", height);
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
@@ -177,6 +232,11 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		fastest = v2 > fastest ? v2 : fastest;
 	}
 	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY);
+	for (uint32_t i = 0; i < p->source.n && p->sources; i++) {
+		const quern_real *v = ((const source *)p->source.items)[i].velocity;
+		const quern_real v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+		fastest = v2 > fastest ? v2 : fastest;
+	}
 	fastest = sqrt(fastest);
 	fastest = bodies > fastest ? bodies : fastest;
 	const quern_real modulus = s->dim * p->bulk > 2 * p->shear ? s->dim * p->bulk : 2 * p->shear;
@@ -188,9 +248,9 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	return 0.9 / rate;
 }
 
-enum { SUM_ELASTIC = SUM_OWN };
+enum { SUM_ELASTIC = SUM_OWN, SUM_LEFT, SUM_POURED };
 static const quern_output sums[] = { ACCOUNT_ROWS,
-	{ .name = "elastic", .unit = "J", .doc = "Stored in the material, where energy is observed." },
+	{ .name = "elastic", .unit = "J", .doc = "Stored in the material, where energy is observed." }, FLOW_ROWS,
 	{ .name = NULL } };
 
 static void account(const void *self, const quern_step *s, quern_real *out) {
@@ -198,7 +258,8 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 	const cloud points = { u[FILL_MASS].real[0], u[FILL_WEIGHT].real[0], NULL,
 		s->host->set(s->run, "point").n };
 	cloud_sums c;
-	(void)self;
+	out[SUM_LEFT] = book_total(u[FILL_LEFT].real[0], outlet_faces(s));
+	out[SUM_POURED] = book_total(u[FILL_POURED].real[0], ((const mpm *)self)->source.n);
 	if (!points.n || !cloud_open(&c, s->host, s->run, &points)) return;
 	cloud_account(&c, &u[FILL_POSITION], &u[FILL_VELOCITY], s, out);
 	CLOUD_ADD(&c, i, 0.5 * cloud_square(&u[FILL_VELOCITY], i, s->dim), out[SUM_KINETIC]);

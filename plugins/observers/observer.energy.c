@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section
  * 6 */
+#include "../common/books.h"
 #include "../common/radius.h"
 #include "observers.h"
 #include <quern/observer.h>
@@ -23,7 +24,15 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 	X(DAMPED, "total.damped", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(RUBBED, "total.rubbed", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
-	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED)
+	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_LEFT, "grain_face.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_LEFT_HEIGHT, "grain_face.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_LEFT, "point_face.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_LEFT_HEIGHT, "point_face.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_POURED, "grain_source.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(GRAINS_POURED_HEIGHT, "grain_source.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_POURED, "point_source.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(POINTS_POURED_HEIGHT, "point_source.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
 static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
@@ -40,6 +49,7 @@ enum {
 	SLIDING,
 	COUPLING,
 	BODIES,
+	PASSED,
 	SUM
 };
 static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = "Kinetic, of grains." },
@@ -53,6 +63,10 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 	{ .name = "rubbed", .unit = "J", .doc = "Lost to sliding contacts so far." },
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
 	{ .name = "driven", .unit = "J", .doc = "Done by bodies that move so far, with a minus." },
+	{ .name = "passed",
+		.unit = "J",
+		.doc = "Taken out through open faces, less what sources brought: of motion, of height and stored in "
+			   "points." },
 	{ .name = "budget", .unit = "J", .doc = "All of it: constant for grains alone." }, { .name = NULL } };
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
@@ -75,6 +89,8 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
 	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;
 	for (uint32_t i = 0; u[WORK].real[0] && i < b->count[WORK]; i++) out[BODIES] -= u[WORK].real[0][i];
+	for (int row = GRAINS_LEFT; row <= POINTS_POURED_HEIGHT; row++)
+		out[PASSED] += (row < GRAINS_POURED ? 1 : -1) * book_total(u[row].real[0], b->count[row]);
 	for (int k = 0; k < SUM; k++) out[SUM] += out[k];
 	return QUERN_OK;
 }

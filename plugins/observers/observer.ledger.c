@@ -15,13 +15,17 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 	X(MASS, "total.mass_initial", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
-	X(EXCHANGE_DEFECT, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
+	X(EXCHANGE_DEFECT, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(PASSED, "total.passed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
 static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
 static const quern_output outputs[] = {
 	{ .name = "entries", .unit = "1", .doc = "Sum of |entries| over the mass." },
-	{ .name = "carried", .unit = "1", .doc = "Carried mass over that at the release, minus 1." },
+	{ .name = "carried",
+		.unit = "1",
+		.doc = "Carried mass over that at the release, with what was poured and without what has left, minus "
+			   "1." },
 	{ .name = "grains_owed", .unit = "kg", .doc = "Owed to the grains." },
 	{ .name = "points_owed", .unit = "kg", .doc = "Owed to the continuum." },
 	{ .name = "mass_defect", .unit = "1", .doc = "Of the mass invariant: the worst so far." },
@@ -40,12 +44,14 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	quern_real *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
 	cloud_sums grains, points;
 	(void)self;
-	if (!u[GRAIN_OWED].real[0] || !(u[MASS].real[0][0] > 0)) return QUERN_OK;
+	if (!u[GRAIN_OWED].real[0]) return QUERN_OK;
+	const quern_real mass = u[MASS].real[0][0] - (u[PASSED].real[0] ? u[PASSED].real[0][0] : 0);
+	if (!(mass > 0)) return QUERN_OK;
 	if (!size || !observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < n; i++)
 		size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
-	out[0] = host->sum(run, n, size) / u[MASS].real[0][0];
-	out[1] = (cloud_total(&grains) + cloud_total(&points)) / u[MASS].real[0][0] - 1;
+	out[0] = host->sum(run, n, size) / mass;
+	out[1] = (cloud_total(&grains) + cloud_total(&points)) / mass - 1;
 	out[2] = host->sum(run, n, u[GRAIN_OWED].real[0]);
 	out[3] = host->sum(run, n, u[POINT_OWED].real[0]);
 	for (int k = 0; k < 3; k++) out[4 + k] = u[MASS_DEFECT + k].real[0][0];

@@ -224,6 +224,19 @@ def change_periodic(tree, r):
     tree["domain"]["periodic"] = [r.random() < 0.5 for _ in range(tree["dimension"])]
 
 
+def change_open(tree, r):
+    faces = [f"{side}_{axis}" for axis in "xyz"[:tree["dimension"]] for side in ("lower", "upper")]
+    tree["domain"]["open"] = r.sample(faces, r.randint(1, len(faces)))
+
+
+def change_source(tree, r):
+    corners = place_in(tree, r, 0), place_in(tree, r, 0)
+    source = {"region": {"box": {"lower": list(map(min, *corners)), "upper": list(map(max, *corners))}},
+              "velocity": [10.0 ** r.uniform(-2, 1) * r.uniform(-1, 1) for _ in range(tree["dimension"])]}
+    source.update(r.choice([{"rate": 10.0 ** r.uniform(-3, 3)}, {"keep": "full"}, {"rate": 10.0 ** r.uniform(-3, 3), "every": 1}]))
+    tree[r.choice([p for p in ("grains", "continuum") if p in tree])]["source"] = source
+
+
 def change_gravity(tree, r):
     size = 10.0 ** r.uniform(-2, 3)
     tree["gravity"] = [size * r.gauss(0, 1) for _ in range(tree["dimension"])]
@@ -249,9 +262,9 @@ def change_integrator(tree, r):
     tree["grains"]["skin"] = r.choice([0.001, 0.01, 0.1, 1, 2])
 
 
-CHANGES = {None: [add_plane, add_box, change_step, change_periodic, change_gravity],
-           "grains": [add_grain, change_contact, change_contact, change_integrator, change_fill],
-           "continuum": [change_material, change_fill]}
+CHANGES = {None: [add_plane, add_box, change_step, change_periodic, change_open, change_gravity],
+           "grains": [add_grain, change_contact, change_contact, change_integrator, change_fill, change_source],
+           "continuum": [change_material, change_fill, change_source]}
 
 
 def mistake(tree, r):

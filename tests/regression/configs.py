@@ -99,8 +99,42 @@ def two_grains(place):
     near("two_grains: restitution", -read(out)[-1][2], 0.5, 0.01)
 
 
+def hopper(place):
+    """Shorter and softer: Beverloo's constant is of order 1, and the flow does not fade as the hopper empties."""
+    out = place / "hopper"
+    lab.run("hopper", out, "--set=time.end=0.42 s", "--set=grains.contact.linear.stiffness=4e5", "--set=grains.overlap.most=0")
+    header, rows = lab.series(out)
+    time, mass, fraction = (header.index(name) for name in ("time [s]", "outflow.mass [kg]", "packing_fraction.fraction [1]"))
+
+    def flow(begin, end):
+        first, last = (min(rows, key=lambda row: abs(row[time] - t)) for t in (begin, end))
+        return (last[mass] - first[mass]) / (last[time] - first[time])
+
+    bulk = 2500 * sum(row[fraction] for row in rows) / len(rows)
+    law = bulk * math.sqrt(9.81) * (0.024 - 1.4 * 0.002) ** 1.5
+    near("hopper: Beverloo's C", flow(0.1, 0.42) / law, 1.3, 0.25)
+    near("hopper: flow of the second half over that of the first", flow(0.26, 0.42) / flow(0.1, 0.26), 1, 0.15)
+    assert abs(lab.summary(out)["mass_defect"]) < 1e-12
+
+
+def heap(place):
+    """Shorter and softer: what is poured is the rate times the time, and it lies at an angle, since it resists rolling."""
+    angles = {}
+    for rolling in (0, 0.15):
+        out = place / f"heap_{rolling}"
+        lab.run("heap", out, "--set=time.end=1.3 s", "--set=grains.source.until=1 s", "--set=grains.contact.0.linear.stiffness=1e5",
+                f"--set=grains.contact.1.rolling.friction={rolling}", "--set=grains.contact.1.rolling.stiffness=1e4")
+        s = lab.summary(out)
+        near(f"heap, rolling friction {rolling}: poured, kg", s["observers"]["outflow"]["poured"]["last"], 6, 0.002)
+        assert abs(s["mass_defect"]) < 1e-12
+        header, rows = lab.series(out)
+        angles[rolling] = -math.degrees(rows[-1][header.index("repose.angle [rad]")])
+    print("heap: angle of the right flank " + ", ".join(f"{a:.1f} degree at rolling friction {r}" for r, a in angles.items()))
+    assert 15 < angles[0.15] < 40 and angles[0.15] > angles[0] + 2, angles
+
+
 if __name__ == "__main__":
     assert math.isclose(math.hypot(3.3552, 9.2184), 9.81, rel_tol=1e-4)
     with lab.workplace() as name:
-        for test in (incline, elastic_bar, mixture, two_grains, drum):
+        for test in (incline, elastic_bar, mixture, two_grains, drum, hopper, heap):
             test(pathlib.Path(name))

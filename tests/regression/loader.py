@@ -164,6 +164,8 @@ TABLES = [
     (observer(OUTPUT % "o", ""), "ops has map, with the set that it runs over, or whole"),
     (solver(set_name="a name"), "set 'a name': a word of at most 23 letters"),
     (solver(set_slot='"b"'), "set s hangs on the slot 'b', and there is none"),
+    (solver(set_slot='0, .when = "b"'), "set s hangs on the parameter 'b', and there is none"),
+    (solver(stage='.when = "a"'), "stage bad.go: the first one hangs on no parameter"),
     (solver(slot='.kind = &quern_solver_kind'), "slot a: a solver sits in no slot"),
     (solver(slot='.kind = 0'), "slot a: there is no kind; use QUERN_KIND"),
     (solver(slot='.repeat = "s"'), "slot a: repeat and again are a pair of sets"),

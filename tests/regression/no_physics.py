@@ -14,7 +14,7 @@ CORE = pathlib.Path(os.environ["QUERN_SOURCE"]) / "core"
 DOCUMENTED = {
     "output/summary.c": {"grains", "grain_steps", "points", "point_steps", "discrete_share", "observer.discrete_share",
                          "mass", "momentum", "energy", "elastic"},
-    "output/checkpoint.c": {"mass"},
+    "run/account.c": {"mass"},
     "check/check_scene.c": {"mass"},
     "run/run.c": {"mass"},
     "output/frame.c": {".position"},  # the first dataset of a group, by which programs place the others

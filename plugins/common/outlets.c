@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: MIT */
+#include "outlets.h"
+#include "radius.h"
+#include <math.h>
+
+/* The face that entry i has passed, the first in their order; -1: none. What is fixed stays wherever it is. */
+static int32_t passed(const quern_step *s, const outlets *o, uint32_t i) {
+	if (o->of.fixed && o->of.fixed[i]) return -1;
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real x = o->position->real[k][i];
+		if (s->open[0][k] && x < s->lower[k]) return (int32_t)(2 * k);
+		if (s->open[1][k] && x > s->upper[k]) return (int32_t)(2 * k + 1);
+	}
+	return -1;
+}
+
+/* Seldom does anybody leave, so that a look along the columns comes first. */
+static bool any_outside(const quern_step *s, const outlets *o) {
+	int outside = 0;
+	for (uint32_t k = 0; k < s->dim; k++) {
+		if (!s->open[0][k] && !s->open[1][k]) continue;
+		const quern_real *restrict x = o->position->real[k];
+		const quern_real lower = s->open[0][k] ? s->lower[k] : -INFINITY,
+						 upper = s->open[1][k] ? s->upper[k] : INFINITY;
+		for (uint32_t i = 0; i < o->of.n; i++) outside |= (x[i] < lower) | (x[i] > upper);
+	}
+	return outside;
+}
+
+static void book_entry(const quern_step *s, const outlets *o, uint32_t i, uint32_t face) {
+	const quern_real mass = cloud_mass(&o->of, i);
+	booking b = { .mass = mass, .count = o->of.weight ? o->of.weight[i] : 1 };
+	quern_real each = 0.5 * cloud_square(o->velocity, i, s->dim) + (o->energy ? o->energy[i] : 0);
+	for (uint32_t k = 0; k < s->dim; k++) b.momentum[k] = mass * o->velocity->real[k][i];
+	if (o->spin && o->spin->real[0])
+		each += 0.5 * quern_radius_inertia(s->dim) * o->radius[i] * o->radius[i] *
+				cloud_square(o->spin, i, s->dim == 3 ? 3 : 1);
+	b.energy = mass * each;
+	b.potential = mass * cloud_height(o->position, i, s->dim, s->gravity);
+	book_add(o->books, face, s->dim, &b);
+	if (o->pull) *o->pull += mass * o->moving;
+}
+
+quern_status quern_outlets_run(const quern_step *s, const outlets *o) {
+	if (!any_outside(s, o)) return QUERN_OK;
+	const quern_set_view set = s->host->set(s->run, o->set);
+	int32_t *from = s->host->memory(s->run, ((size_t)set.n + 1) * sizeof(int32_t));
+	uint32_t *block = s->host->memory(s->run, ((size_t)set.n_blocks + 1) * sizeof(uint32_t));
+	uint32_t kept = 0, b = 0;
+	if (!from || !block) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < set.n; i++) {
+		const int32_t face = passed(s, o, i);
+		for (; set.block && b < set.n_blocks && set.block[b] <= i; b++) block[b] = kept;
+		if (face < 0) from[kept++] = (int32_t)i;
+		else book_entry(s, o, i, (uint32_t)face);
+	}
+	for (; b <= set.n_blocks; b++) block[b] = kept;
+	if (kept == set.n) return QUERN_OK;
+	return s->host->remap(s->run, o->set, kept, from, set.n_blocks, set.block ? block : NULL);
+}

@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: MIT */
+#include "source.h"
+#include "tools.h"
+#include <math.h>
+#include <stdio.h>
+
+static const char *const keeps[] = { "rate", "full", NULL };
+
+const quern_param quern_source_rows[] = { QUERN_PARAM_AS(source, lower, "region.box.lower", "m",
+											  "Lower corner of the region in which new centres lie.",
+											  .flags = QUERN_REQUIRED),
+	QUERN_PARAM_AS(source, upper, "region.box.upper", "m", "Upper corner.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM(source, velocity, "m/s", "Velocity of what is poured."),
+	QUERN_PARAM(source, rate, "kg/s", "Mass poured per second; in 2-D of a slab one metre thick.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
+	QUERN_PARAM(source, keep, "1",
+		"What is kept: the rate, so that mass without room waits; or the region full, whatever that takes.",
+		.choices = keeps),
+	QUERN_PARAM(source, from, "s", "When it begins.", .max = 1e12),
+	QUERN_PARAM(source, until, "s", "When it ends; default: never.", .flags = QUERN_MAYBE | QUERN_MIN_OPEN,
+		.max = 1e12),
+	QUERN_PARAM_AS(source, most, "mass", "kg", "Mass after which it ends; default: none.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
+	QUERN_PARAM(source, every, "1", "Short steps between two looks for room.", .def = 100, .min = 1,
+		.max = 1e6, .flags = QUERN_ADVANCED),
+	QUERN_END_PARAMS };
+
+static quern_status check_region(
+	const source *p, uint32_t i, bool flat, const quern_setup *setup, quern_err *err) {
+	char param[60];
+	snprintf(param, sizeof param, "source.%u.region.box.upper", i);
+	for (uint32_t k = 0; k < setup->dim; k++) {
+		if (!(p->upper[k] > p->lower[k]) && !(flat && p->upper[k] == p->lower[k]))
+			return setup->host->fail(
+				err, QUERN_E_PARAM, param, "must be above the lower corner; axis %u is not", k);
+		if (p->lower[k] < setup->lower[k] || p->upper[k] > setup->upper[k])
+			return setup->host->fail(
+				err, QUERN_E_PARAM, param, "the region reaches out of the domain along axis %u", k);
+	}
+	return QUERN_OK;
+}
+
+static quern_status check_source(const source *p, uint32_t i, const quern_setup *setup, quern_err *err) {
+	char param[60];
+	const quern_host *host = setup->host;
+	snprintf(param, sizeof param, "source.%u.rate", i);
+	if (p->keep == SOURCE_BY_RATE && isnan(p->rate))
+		return host->fail(err, QUERN_E_PARAM, param, "say how much is poured in a second, or keep: full");
+	if (p->keep == SOURCE_FULL && !isnan(p->rate))
+		return host->fail(err, QUERN_E_PARAM, param,
+			"a source that keeps its region full has no rate: give one of the two");
+	snprintf(param, sizeof param, "source.%u.until", i);
+	if (p->until <= p->from)
+		return host->fail(
+			err, QUERN_E_PARAM, param, "%g s is not after the beginning, %g s", p->until, p->from);
+	snprintf(param, sizeof param, "source.%u.velocity", i);
+	if (quern_too_fast(p->velocity, 1))
+		return host->fail(err, QUERN_E_PARAM, param, "the velocity is beyond that of light");
+	return QUERN_OK;
+}
+
+quern_status quern_sources_check(
+	const quern_list *list, bool flat, const quern_setup *setup, quern_err *err) {
+	const source *p = list->items;
+	for (uint32_t i = 0; i < list->n; i++) {
+		if (check_region(&p[i], i, flat, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+		if (check_source(&p[i], i, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	}
+	return QUERN_OK;
+}
+
+bool quern_source_acts(const source *p, const quern_step *s) {
+	const int64_t steps = p->every / (int64_t)s->n_substeps;
+	return s->step % (steps > 1 ? steps : 1) == 0 && s->time >= p->from;
+}
+
+quern_real quern_source_due(const source *p, quern_real time) {
+	const quern_real end = time > p->until ? p->until : time;
+	quern_real due = 0;
+	if (p->keep == SOURCE_BY_RATE) due = end > p->from ? p->rate * (end - p->from) : 0;
+	else due = time >= p->from && !(time >= p->until) ? INFINITY : 0;
+	return due > p->most ? p->most : due;
+}
+
+void quern_source_note(const quern_step *s, uint32_t i, const char *section, const source *p,
+	quern_real waiting, const quern_column *row) {
+	const bool waits = waiting > 0 && p->keep == SOURCE_BY_RATE;
+	int32_t *late = &row[1].index[i];
+	row[0].real[0][i] = waits ? waiting : 0;
+	if (!waits || *late) return;
+	*late = 1;
+	s->host->log(s->run, 2,
+		"%s.source.%u has no room at t = %.4g s: %.3g kg wait; observe outflow to see how much does later",
+		section, i, s->time, waiting);
+}

@@ -1,0 +1,228 @@
+/* SPDX-License-Identifier: MIT */
+/* pour - sources of grains: a packer places what is due where there is room. docs/theory/flow.md, section 3 */
+#include "../common/placer.h"
+#include "dem.h"
+#include <math.h>
+#include <quern/math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_GRAINS = 1 << 30, MOST_SEEDS = 4096 };
+
+typedef struct {
+	const dem *d;
+	const quern_step *s;
+	const source *item;
+	uint32_t i;      /* number of the source */
+	radius_law law;  /* a stream of draws of its own */
+	placer placer;   /* what is near the region */
+	quern_real most; /* m, largest radius of that and of new grains */
+	quern_real rest; /* kg still due */
+	uint32_t draws;  /* radii of this source so far */
+	quern_spot *grain;
+	uint32_t n, cap;
+	bool failed;
+} pouring;
+
+/* Draws are numbered by source, so that the radius of its next grain does not depend on what others pour. */
+static quern_real waiting(const pouring *p) {
+	return quern_radius_draw(&p->law, p->s->host, (uint64_t)p->i << 32 | p->draws);
+}
+
+static quern_real mass_of(const pouring *p, quern_real radius) {
+	return quern_radius_mass(radius, p->d->material[0].density, p->s->dim);
+}
+
+static bool is_due(const pouring *p) { return p->rest >= mass_of(p, waiting(p)); }
+
+/* ---- what a packer may ask ---- */
+
+static quern_real job_radius(quern_pack_job *job) { return waiting(job->scene); }
+
+static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
+	const source *item = ((const pouring *)job->scene)->item;
+	for (uint32_t k = 0; k < job->dim; k++)
+		if (!(x[k] >= item->lower[k] && x[k] <= item->upper[k])) return false;
+	return true;
+}
+
+static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
+	return quern_placer_free(&((const pouring *)job->scene)->placer, spot);
+}
+
+static bool job_place(quern_pack_job *job, const quern_spot *spot) {
+	pouring *p = job->scene;
+	if (p->n == p->cap) {
+		const uint32_t cap = p->cap ? 2 * p->cap : 256;
+		quern_spot *grown = realloc(p->grain, cap * sizeof *grown);
+		if (!grown) return p->failed = true, false;
+		p->grain = grown, p->cap = cap;
+	}
+	p->grain[p->n++] = *spot;
+	quern_placer_add(&p->placer, spot);
+	p->rest -= mass_of(p, spot->radius);
+	p->draws++;
+	p->failed = p->failed || p->placer.failed;
+	return !p->failed && is_due(p);
+}
+
+/* ---- what is in the way ---- */
+
+/* In the order of ids, since packers see the order of their seeds, and that of the columns is the list's affair. */
+typedef struct {
+	int64_t id;
+	quern_spot spot;
+} obstacle;
+
+static int by_id(const void *a, const void *b) {
+	const obstacle *one = a, *other = b;
+	return (one->id > other->id) - (one->id < other->id);
+}
+
+/* Whether a new grain with its centre in the region may touch it. */
+static bool is_near(const pouring *p, const quern_spot *spot) {
+	const quern_real reach = 1.001 * (spot->radius + quern_radius_most(&p->law));
+	for (uint32_t k = 0; k < p->s->dim; k++) {
+		const quern_real half = 0.5 * (p->item->upper[k] - p->item->lower[k]),
+						 middle = p->item->lower[k] + half;
+		const quern_real length = p->s->periodic[k] ? p->s->upper[k] - p->s->lower[k] : 0;
+		if (fabs(quern_image_far(spot->x[k] - middle, length)) > half + reach) return false;
+	}
+	return true;
+}
+
+static uint32_t grains_near(pouring *p, obstacle *near) {
+	const quern_step *s = p->s;
+	uint32_t m = 0;
+	for (uint32_t i = 0; i < s->host->set(s->run, "grain").n; i++) {
+		obstacle o = { s->use[POUR_ID].id[i], { .radius = s->use[POUR_RADIUS].real[0][i] } };
+		for (uint32_t k = 0; k < s->dim; k++) o.spot.x[k] = s->use[POUR_POSITION].real[k][i];
+		if (is_near(p, &o.spot)) near[m++] = o;
+	}
+	qsort(near, m, sizeof *near, by_id);
+	return m;
+}
+
+/* Where a continuum stands for grains there is no room either: a point counts as a grain as wide as its own square or cube. */
+static uint32_t points_near(pouring *p, obstacle *near) {
+	const quern_step *s = p->s;
+	const quern_real *volume = s->use[POUR_POINT_VOLUME].real[0];
+	uint32_t m = 0;
+	if (!s->use[POUR_POINT].real[0] || !volume) return 0;
+	for (uint32_t i = 0; i < s->host->set(s->run, "point").n; i++) {
+		const quern_real width = s->dim == 2 ? sqrt(volume[i]) : quern_cbrt(volume[i]);
+		obstacle o = { 0, { .radius = 0.5 * width } };
+		for (uint32_t k = 0; k < s->dim; k++) o.spot.x[k] = s->use[POUR_POINT].real[k][i];
+		if (is_near(p, &o.spot)) near[m++] = o;
+	}
+	return m;
+}
+
+static bool gather_near(pouring *p) {
+	const quern_step *s = p->s;
+	const size_t all = (size_t)s->host->set(s->run, "grain").n + s->host->set(s->run, "point").n;
+	obstacle *near = s->host->memory(s->run, (all + 1) * sizeof *near);
+	if (!near) return false;
+	uint32_t m = grains_near(p, near);
+	m += points_near(p, near + m);
+	p->most = quern_radius_most(&p->law);
+	for (uint32_t q = 0; q < m; q++) p->most = fmax(p->most, near[q].spot.radius);
+	if (quern_placer_init(&p->placer, s->dim, s->lower, s->upper, s->periodic, p->most) != QUERN_OK ||
+		!quern_placer_bodies(&p->placer, s, SLOT_BODIES, false))
+		return false;
+	for (uint32_t q = 0; q < m; q++) quern_placer_add(&p->placer, &near[q].spot);
+	return !p->placer.failed;
+}
+
+/* ---- one source ---- */
+
+static void pack(pouring *p, const quern_bound *packer) {
+	const quern_step *s = p->s;
+	quern_spot *seed = s->host->memory(s->run, MOST_SEEDS * sizeof *seed);
+	if (!seed) {
+		p->failed = true;
+		return;
+	}
+	quern_pack_job job = { .dim = s->dim,
+		.stream = p->law.stream + 1,
+		.key = p->i,
+		.counter = (uint64_t)s->step << 24,
+		.host = s->host,
+		.seed = seed,
+		.radius = job_radius,
+		.inside = job_inside,
+		.free = job_free,
+		.place = job_place,
+		.scene = p };
+	memcpy(job.lower, p->item->lower, sizeof job.lower);
+	memcpy(job.upper, p->item->upper, sizeof job.upper);
+	const uint32_t n =
+		quern_placer_near(&p->placer, p->item->lower, p->item->upper, 2 * p->most, seed, MOST_SEEDS);
+	job.n_seed = n < MOST_SEEDS ? n : MOST_SEEDS;
+	((const quern_packer_ops *)packer->ops)->pack[s->dim - 2](packer->self, &job);
+}
+
+static void write_grains(const pouring *p, uint32_t old) {
+	const quern_step *s = p->s;
+	const quern_column *u = s->use;
+	const quern_real *v = p->item->velocity;
+	for (uint32_t q = 0; q < p->n; q++) {
+		const quern_spot *g = &p->grain[q];
+		booking b = { .mass = mass_of(p, g->radius), .count = 1 };
+		for (uint32_t k = 0; k < s->dim; k++) {
+			u[POUR_POSITION].real[k][old + q] = g->x[k];
+			u[POUR_VELOCITY].real[k][old + q] = v[k];
+			b.momentum[k] = b.mass * v[k];
+			b.energy += 0.5 * b.mass * v[k] * v[k];
+			b.potential -= b.mass * s->gravity[k] * g->x[k];
+		}
+		u[POUR_RADIUS].real[0][old + q] = g->radius;
+		u[POUR_MASS].real[0][old + q] = b.mass;
+		book_add(&u[POURED_MASS], p->i, s->dim, &b);
+	}
+}
+
+static quern_status add_grains(const pouring *p) {
+	const quern_step *s = p->s;
+	const uint32_t old = s->host->set(s->run, "grain").n;
+	if (p->n > MOST_GRAINS - old)
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+			"sources have poured more grains than can be numbered, %d", MOST_GRAINS);
+	int32_t *from = s->host->memory(s->run, ((size_t)old + p->n + 1) * sizeof(int32_t));
+	if (!from) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < old + p->n; i++) from[i] = i < old ? (int32_t)i : -1;
+	const quern_status status = s->host->remap(s->run, "grain", old + p->n, from, 0, NULL);
+	if (status != QUERN_OK) return status;
+	write_grains(p, old);
+	s->use[POUR_DISPLACEMENT].real[0][0] = INFINITY; /* the list misses new grains */
+	return QUERN_OK;
+}
+
+static quern_status pour_one(pouring *p) {
+	const quern_step *s = p->s;
+	int32_t *draws = &s->use[POUR_DRAWS].index[p->i];
+	p->draws = (uint32_t)*draws;
+	p->rest = quern_source_due(p->item, s->time) - s->use[POURED_MASS].real[0][p->i];
+	if (is_due(p)) {
+		p->failed = !gather_near(p);
+		if (!p->failed) pack(p, &s->slot[SLOT_SOURCE_PACKER][p->i]);
+		quern_placer_finish(&p->placer);
+		if (p->failed) return QUERN_E_MEMORY;
+	}
+	*draws = (int32_t)p->draws;
+	quern_source_note(s, p->i, "grains", p->item, is_due(p) ? p->rest : 0, &s->use[POUR_WAITING]);
+	return p->n ? add_grains(p) : QUERN_OK;
+}
+
+quern_status quern_dem_pour(const void *self, const quern_step *s) {
+	pouring p = { .d = self, .s = s, .law = ((const dem *)self)->material[0].radii };
+	quern_status status = QUERN_OK;
+	p.law.stream += 2; /* after those of the fill and of its packers */
+	for (p.i = 0; p.i < p.d->source.n && status == QUERN_OK; p.i++) {
+		p.item = (const source *)p.d->source.items + p.i;
+		p.n = 0;
+		if (quern_source_acts(p.item, s)) status = pour_one(&p);
+	}
+	free(p.grain);
+	return status;
+}
