@@ -253,7 +253,7 @@ int32_t quern_dem_mix(const dem *d, const quern_real share[MOST_MATERIALS],
 		if (share[m] > 0 && without > most) most = without, first = m;
 	}
 	if (most > heaviest) return (int32_t)first;
-	host->random(d->stream + 2, k, 0, u);
+	host->random(d->stream + 4, k, 0, u); /* after those of the fill, of its packers, and of sources */
 	quern_real at = u[0] * sum;
 	for (uint32_t m = 0; m < d->n_materials; m++) {
 		if (weight[m] > 0 && at < weight[m]) return (int32_t)m;
