@@ -17,6 +17,7 @@ static const quern_param fill_rows[] = { QUERN_PARAM_AS(mpm_fill, lower, "region
 		.choices = stresses),
 	QUERN_PARAM(mpm_fill, lateral, "1", "Horizontal over vertical stress at rest.", .def = 0.6, .max = 10),
 	QUERN_END_PARAMS };
+static const quern_param source_rows[] = SOURCE_ROWS(5);
 static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 										  "Cell of the grid; the domain is a whole number of them.",
 										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
@@ -24,7 +25,7 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill)),
 	QUERN_PARAM(mpm, source, NULL, "Regions that pour material; in a hybrid its grains are poured alone.",
-		.rows = quern_source_rows, .item_size = sizeof(source)),
+		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(mpm, rasterise, "1",
 		"What points send to the nodes: their velocity (plain), or with it the velocity gradient of the last "
 		"step (affine); auto: affine where a hybrid's coupling asks for it.",
