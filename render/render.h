@@ -5,6 +5,7 @@
 #include "scene.h"
 #include "text.h"
 #include <cairo.h>
+#include <quern/body.h>
 
 extern const quern_command quern_command_render;
 
@@ -28,6 +29,9 @@ typedef struct render_frame {
 	double time; /* s */
 	char name[128];
 	render_cloud grains, points, cells;
+	quern_pose
+		*pose; /* of bodies, where the frame says that they move; NULL: they stand where the scene put them */
+	size_t n_poses;
 	char field[64], unit[32]; /* of the values; "" if there are none */
 	bool signs;               /* a component, not a magnitude */
 	double cell;              /* m, edge of a cell */

@@ -253,6 +253,32 @@ static bool read_head(hid_t file, render_frame *f) {
 	return good;
 }
 
+/* Where bodies are, if they move. */
+static void read_poses(hid_t file, render_frame *f) {
+	const hid_t group = quern_h5_find(file, "bodies");
+	size_t rows = 0, columns = 0;
+	double *position = NULL, *turn = NULL;
+	if (group < 0) return;
+	if (quern_h5_read_size(group, "position", &rows, &columns) && rows && columns == 3)
+		position = read_table(group, "position", rows, &columns);
+	if (position) turn = read_table(group, "turn", rows, &columns);
+	if (turn && columns == 9) {
+		f->pose = quern_take(rows, sizeof *f->pose);
+		f->n_poses = rows;
+	}
+	for (size_t i = 0; i < 9 * f->n_poses; i++)
+		if (!(fabs(turn[i]) <= 2) || (i < 3 * f->n_poses && !(fabs(position[i]) < RENDER_FAR)))
+			f->n_poses = 0; /* damaged */
+	for (size_t b = 0; b < f->n_poses; b++) {
+		memcpy(f->pose[b].position, position + 3 * b, sizeof f->pose[b].position);
+		memcpy(f->pose[b].turn, turn + 9 * b, sizeof f->pose[b].turn);
+		if (f->dimension == 2) f->pose[b].turn[8] = 1;
+	}
+	free(position);
+	free(turn);
+	H5Gclose(group);
+}
+
 static int read_clouds(render_frame *f, hid_t file, const char *path, const char *field, quern_text *why) {
 	const hid_t group[3] = { quern_h5_find(file, "grains"), quern_h5_find(file, "points"),
 		quern_h5_find(file, "cells") };
@@ -270,6 +296,7 @@ static int read_clouds(render_frame *f, hid_t file, const char *path, const char
 		status = no_such_field(group, field, path, why);
 	for (int k = 0; k < 3; k++)
 		if (group[k] >= 0) H5Gclose(group[k]);
+	read_poses(file, f);
 	return status;
 }
 
@@ -362,5 +389,6 @@ void quern_render_frame_finish(render_frame *f) {
 	finish_cloud(&f->grains);
 	finish_cloud(&f->points);
 	finish_cloud(&f->cells);
+	free(f->pose);
 	if (f->scene) quern_scene_destroy(f->scene);
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "episodes.h"
 #include "param.h"
 #include "render.h"
 #include <math.h>
@@ -176,8 +177,8 @@ static void draw_borders(cairo_t *c, const render_style *s) {
 enum { RUN = 256 };
 
 /* The gaps of the pixels of one line, from pixel `begin` on. */
-static void gaps(const render_style *s, const quern_filling *body, int y, int begin, double gap[RUN]) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+static void gaps(const render_style *s, const quern_filling *body, const quern_pose *pose, int y, int begin,
+	double gap[RUN]) {
 	_Alignas(64) quern_real x[3][RUN], radius[RUN], normal[3][RUN], velocity[3][RUN];
 	for (int i = 0; i < RUN; i++) {
 		x[0][i] = s->view->left + (begin + i + 0.5) / s->view->scale;
@@ -187,7 +188,7 @@ static void gaps(const render_style *s, const quern_filling *body, int y, int be
 	const quern_body_batch batch = { .n = RUN,
 		.cap = RUN,
 		.dim = 2,
-		.pose = &still,
+		.pose = pose,
 		.position = { x[0], x[1], x[2] },
 		.radius = radius,
 		.gap = gap,
@@ -196,21 +197,32 @@ static void gaps(const render_style *s, const quern_filling *body, int y, int be
 	((const quern_body_ops *)body->instance->ops)->closest(body->instance->self, &batch);
 }
 
-/* A body that is there only while grains settle is gone in every frame. */
+/* A body that is there only while grains settle is gone in every frame; one that is never there too. */
 static bool is_there(const quern_section *bodies, const quern_filling *body) {
 	const quern_param *row = bodies->slots[0].slot->rows;
 	row = row ? quern_param_find(row, "while") : NULL;
-	return !row || !body->item || quern_param_number(row, body->item) != 1;
+	const double when = row && body->item ? quern_param_number(row, body->item) : 0;
+	return when != 1 && when != 3;
+}
+
+/* With the values of the scene's stage that led to the frame. */
+static const quern_section *bodies_of(const render_frame *f) {
+	const quern_scene *scene = f->scene;
+	if (!scene) return NULL;
+	int64_t k = quern_episode_at(scene, f->time);
+	if (k > 0 && scene->episodes[k].begin == f->time) k--;
+	if (k >= 0 && scene->episodes[k].scene) scene = scene->episodes[k].scene;
+	return quern_scene_section(scene, "bodies");
 }
 
 /* The distance to one body, in pixels, of every pixel; returns the least. */
-static float distances_to(
-	const render_style *s, const quern_filling *body, int width, int height, float *distance) {
+static float distances_to(const render_style *s, const quern_filling *body, const quern_pose *pose, int width,
+	int height, float *distance) {
 	float least = INFINITY;
 	for (int y = 0; y < height; y++)
 		for (int begin = 0; begin < width; begin += RUN) {
 			_Alignas(64) double gap[RUN];
-			gaps(s, body, y, begin, gap);
+			gaps(s, body, pose, y, begin, gap);
 			for (int i = 0; i < RUN && begin + i < width; i++) {
 				float *at = &distance[(size_t)y * (size_t)width + (size_t)(begin + i)];
 				*at = (float)(gap[i] * s->view->scale);
@@ -232,15 +244,18 @@ static float thickening(const render_style *s, const quern_filling *body, float 
 
 /* The distance to the nearest body, in pixels, of every pixel. */
 static float *distances(const render_style *s, int width, int height) {
-	const quern_section *bodies = s->frame->scene ? quern_scene_section(s->frame->scene, "bodies") : NULL;
+	const quern_section *bodies = bodies_of(s->frame);
 	const size_t n = (size_t)width * (size_t)height;
 	if (!bodies || !bodies->n_slots) return NULL;
 	float *nearest = quern_take(n, sizeof(float)), *one = quern_take(n, sizeof(float));
 	for (size_t i = 0; i < n; i++) nearest[i] = INFINITY;
+	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	const bool posed = s->frame->n_poses == bodies->slots[0].n;
 	for (size_t b = 0; b < bodies->slots[0].n; b++) {
 		const quern_filling *body = &bodies->slots[0].filling[b];
 		if (!is_there(bodies, body)) continue;
-		const float more = thickening(s, body, distances_to(s, body, width, height, one));
+		const float more = thickening(
+			s, body, distances_to(s, body, posed ? &s->frame->pose[b] : &still, width, height, one));
 		for (size_t i = 0; i < n; i++) nearest[i] = fminf(nearest[i], one[i] - more);
 	}
 	free(one);

@@ -65,13 +65,13 @@ quern_node *quern_node_append_map(quern_node *list) {
 	return attach(list, NULL, quern_node_create(QUERN_NODE_MAP));
 }
 
-static quern_node *clone(const quern_node *old) {
+quern_node *quern_node_copy(const quern_node *old) {
 	quern_node *node = quern_node_create(old->kind);
 	node->quoted = old->quoted;
 	node->mark = old->mark;
 	if (old->text) node->text = quern_copy(old->text);
 	for (size_t i = 0; i < old->n; i++) {
-		attach(node, old->entries[i].key, clone(old->entries[i].value));
+		attach(node, old->entries[i].key, quern_node_copy(old->entries[i].value));
 		node->entries[i].mark = old->entries[i].mark;
 	}
 	return node;
@@ -84,10 +84,10 @@ void quern_node_merge_entry(quern_node *map, const quern_entry *entry) {
 	} else if (found) {
 		quern_entry *mine = &map->entries[found - map->entries];
 		quern_node_destroy(mine->value);
-		mine->value = clone(entry->value);
+		mine->value = quern_node_copy(entry->value);
 		mine->mark = entry->mark;
 	} else {
-		attach(map, entry->key, clone(entry->value));
+		attach(map, entry->key, quern_node_copy(entry->value));
 		map->entries[map->n - 1].mark = entry->mark;
 	}
 }

@@ -59,6 +59,18 @@ void quern_report_warn(quern_report *report, quern_mark mark, const char *fmt, .
 	va_end(list);
 }
 
+void quern_report_take(quern_report *report, quern_report *from) {
+	for (size_t i = 0; i < from->n; i++) {
+		report->entries = quern_grow(report->entries, report->n, &report->capacity, sizeof(entry));
+		report->entries[report->n] = from->entries[i];
+		report->entries[report->n].order = report->n;
+		report->n++;
+	}
+	report->errors += from->errors;
+	report->follow += from->follow;
+	from->n = from->errors = from->follow = 0;
+}
+
 size_t quern_report_errors(const quern_report *report) { return report->errors; }
 
 static int by_place(const void *pa, const void *pb) {

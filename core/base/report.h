@@ -26,6 +26,8 @@ void quern_report_warn(quern_report *, quern_mark, const char *fmt, ...)
 	__attribute__((format(printf, 3, 4)));
 
 size_t quern_report_errors(const quern_report *);
+/* Takes over all that another one has. */
+void quern_report_take(quern_report *, quern_report *from);
 /* file:line:column: error: message, with the line and a caret below where the file can be read; returns how many faults
  * were shown */
 size_t quern_report_print(const quern_report *, FILE *);

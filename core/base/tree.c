@@ -400,11 +400,25 @@ const char *quern_node_say(const quern_node *node, char buffer[64]) {
 	return buffer;
 }
 
+/* The one thing in a list's item, {plane: {name: gate, ...}}, by its name, "gate", or by what it is if no other is: "plane". */
+static quern_entry *called(quern_node *list, const char *name) {
+	quern_entry *found = NULL;
+	size_t n = 0;
+	for (size_t i = 0; i < list->n; i++) {
+		quern_node *item = list->entries[i].value;
+		if (item->kind != QUERN_NODE_MAP || item->n != 1) continue;
+		const quern_node *own = quern_node_find(item->entries[0].value, "name");
+		if (own && own->kind == QUERN_NODE_SCALAR && !strcmp(own->text, name)) return &item->entries[0];
+		if (!strcmp(item->entries[0].key, name)) found = &item->entries[0], n++;
+	}
+	return n == 1 ? found : NULL;
+}
+
 /* One step of a path: the entry of that name or index, made if it is a map's new key. NULL: no such item. */
 static quern_entry *descend(quern_node *node, const char *key, quern_mark mark) {
 	if (node->kind == QUERN_NODE_LIST) {
 		const quern_entry *item = quern_node_item(node, key);
-		return item ? &node->entries[item - node->entries] : NULL;
+		return item ? &node->entries[item - node->entries] : called(node, key);
 	}
 	if (node->kind == QUERN_NODE_SCALAR) { /* a plugin's bare name is opened: affine -> {affine: {}} */
 		const bool bare = !strcmp(node->text, key);
@@ -425,6 +439,44 @@ static quern_entry *descend(quern_node *node, const char *key, quern_mark mark) 
 	return &node->entries[found - node->entries];
 }
 
+/* The entry at the end of a path, made where it is not there; NULL after one sentence if it cannot be reached. */
+static quern_entry *reach(quern_tree *tree, const char *where, quern_mark mark, quern_report *report) {
+	char *path = quern_copy(where), *rest = path, *key;
+	quern_node *node = tree->root;
+	quern_entry *entry = NULL;
+	while ((key = strsep(&rest, "."))) {
+		entry = descend(node, key, mark);
+		if (!entry) {
+			char say[64];
+			quern_report_add(report, mark, "'%s' cannot be reached: above it stands %s%s", key,
+				quern_node_say(node, say),
+				node->kind == QUERN_NODE_LIST
+					? " (name its items by number, from 0, by their 'name', or by what only one of them is)"
+					: "");
+			break;
+		}
+		node = entry->value;
+	}
+	free(path);
+	return entry;
+}
+
+void quern_tree_replace(
+	quern_tree *tree, const char *path, const quern_node *value, quern_mark mark, quern_report *report) {
+	quern_entry *entry = tree->root ? reach(tree, path, mark, report) : NULL;
+	if (!entry) return;
+	quern_node *given = quern_node_copy(value);
+	entry->mark = mark;
+	quern_node_destroy(entry->value);
+	entry->value = given;
+}
+
+quern_tree *quern_tree_copy(const quern_tree *tree) {
+	quern_tree *copy = quern_take(1, sizeof *copy);
+	if (tree->root) copy->root = quern_node_copy(tree->root);
+	return copy;
+}
+
 void quern_tree_set(quern_tree *tree, const char *assignment, quern_report *report) {
 	const char *equals = strchr(assignment, '=');
 	char *option = quern_format("--set %s", assignment);
@@ -435,22 +487,10 @@ void quern_tree_set(quern_tree *tree, const char *assignment, quern_report *repo
 		return;
 	}
 	if (!tree->root) return;
-	char *path = quern_copy(assignment), *rest = path, *key;
-	path[equals - assignment] = 0;
-	quern_node *node = tree->root;
-	quern_entry *entry = NULL;
-	while ((key = strsep(&rest, "."))) {
-		entry = descend(node, key, mark);
-		if (!entry) {
-			char say[64];
-			quern_report_add(report, mark, "'%s' cannot be reached: above it stands %s%s", key,
-				quern_node_say(node, say),
-				node->kind == QUERN_NODE_LIST ? " (name its items by number, from 0)" : "");
-			free(path);
-			return;
-		}
-		node = entry->value;
-	}
+	char *path = quern_format("%.*s", (int)(equals - assignment), assignment);
+	quern_entry *entry = reach(tree, path, mark, report);
+	free(path);
+	if (!entry) return;
 	quern_node *given = parse(tree, mark.file, equals + 1, strlen(equals + 1), true, report);
 	if (!given && !quern_report_errors(report)) { /* an empty value is null */
 		given = quern_take(1, sizeof *given);
@@ -462,5 +502,4 @@ void quern_tree_set(quern_tree *tree, const char *assignment, quern_report *repo
 		quern_node_destroy(entry->value);
 		entry->value = given;
 	}
-	free(path);
 }

@@ -40,8 +40,14 @@ void quern_tree_destroy(quern_tree *);
 const char *quern_tree_keep(quern_tree *, const char *);
 
 /* Applies "path.to.key=value" with value in YAML; null removes the key. Items of a list are named by their number from
- * 0, written as people do: 7, not 07 or +7. Faults are reported under the option's own text. */
+ * 0, written as people do: 7, not 07 or +7, or by the one thing in them: its `name`,
+ * or what it is if no other item is that. Faults are reported under the
+ * option's own text. */
 void quern_tree_set(quern_tree *, const char *assignment, quern_report *);
+/* The same with a value that is there: a copy of it takes the place, and the mark. */
+void quern_tree_replace(quern_tree *, const char *path, const quern_node *value, quern_mark, quern_report *);
+/* A tree of its own, whose marks name files by texts of the old one, which must live on. */
+quern_tree *quern_tree_copy(const quern_tree *);
 
 /* The value of a key, or NULL; NULL also where the value is null. */
 quern_node *quern_node_find(const quern_node *map, const char *key);
@@ -56,6 +62,7 @@ bool quern_node_bool(const quern_node *, bool *value);
 /* Building and writing: a dotted name opens maps on its way. Each returns the new node, owned by its parent. */
 quern_node *quern_node_create(quern_node_kind);
 void quern_node_destroy(quern_node *);
+quern_node *quern_node_copy(const quern_node *);
 quern_node *quern_node_put(quern_node *map, const char *name, const char *text);
 quern_node *quern_node_put_quoted(quern_node *map, const char *name, const char *text);
 quern_node *quern_node_put_list(quern_node *map, const char *name);

@@ -235,7 +235,9 @@ static void add_use(quern_check_kernel *open, uint32_t r, bool second) {
 	check_kernel *k = own(open);
 	const quern_use *row = &rows_of(open)[r];
 	int32_t *use = second ? k->use_second : k->use;
-	if (row->shape == QUERN_ID || !quern_check_counts(open->check, open->instance, row)) return;
+	if (row->shape == QUERN_ID || row->flags & QUERN_EXISTS ||
+		!quern_check_counts(open->check, open->instance, row))
+		return;
 	use[r] = same_field(k, row, use);
 	if (use[r] >= 0) return;
 	use[r] = (int32_t)open->n_columns;

@@ -90,6 +90,25 @@ static json_t *entries_of(const quern_run *run) {
 	return all;
 }
 
+/* When each begins, and what it sets. */
+static json_t *scene_stages_of(const quern_run *run) {
+	json_t *list = json_array();
+	const quern_node *items = quern_node_find(run->scene->tree->root, "stages");
+	for (size_t k = 0; k < run->scene->n_episodes; k++) {
+		const quern_node *set = quern_node_find(items->entries[k].value, "set");
+		json_t *sets = json_object();
+		for (size_t i = 0; set && i < set->n; i++) {
+			quern_text text = { 0 };
+			quern_node_print(set->entries[i].value, 0, &text);
+			json_object_set_new(sets, set->entries[i].key, json_string(quern_text_string(&text)));
+			quern_text_finish(&text);
+		}
+		json_array_append_new(
+			list, json_pack("{s:f, s:o}", "begin", run->scene->episodes[k].begin, "set", sets));
+	}
+	return list;
+}
+
 static json_t *whole(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	json_t *root = json_object();
@@ -97,6 +116,7 @@ static json_t *whole(quern_run *run) {
 	json_object_set_new(root, "dimension", json_integer(g->dimension));
 	json_object_set_new(root, "plugins", plugins_of(run));
 	json_object_set_new(root, "stages", stages_of(run));
+	if (run->scene->n_episodes) json_object_set_new(root, "scene_stages", scene_stages_of(run));
 	json_object_set_new(root, "sets", sets_of(run));
 	json_object_set_new(root, "skipped", skipped(run));
 	json_object_set_new(root, "entries", entries_of(run));
@@ -158,6 +178,20 @@ static void print_sets(const json_t *root) {
 	}
 }
 
+static void print_scene_stages(json_t *list) {
+	size_t i;
+	json_t *one, *value;
+	const char *key;
+	if (list) puts("\nstages of the scene");
+	json_array_foreach(list, i, one) {
+		printf("  %zu, from %.6g s on:%s", i, number_of(one, "begin"),
+			json_object_size(json_object_get(one, "set")) ? "" : " as the scene stands");
+		json_object_foreach(json_object_get(one, "set"), key, value)
+			printf(" %s: %s;", key, json_string_value(value));
+		puts("");
+	}
+}
+
 static void print(json_t *root) {
 	const char *name;
 	size_t i;
@@ -167,6 +201,7 @@ static void print(json_t *root) {
 		printf("  %-32s %s\n", text_of(one, "id"), text_of(one, "file"));
 	print_stages(root);
 	print_sets(root);
+	print_scene_stages(json_object_get(root, "scene_stages"));
 	printf("\nleft out:%s", json_array_size(json_object_get(root, "skipped")) ? "" : " nothing");
 	json_array_foreach(json_object_get(root, "skipped"), i, one) printf(" %s", json_string_value(one));
 	puts("");

@@ -259,6 +259,12 @@ static json_t *scene_schema(const context *c) {
 		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out: SET.NAME.", "type", "array",
 			"items", "type", "string"),
 		false);
+	put(scene, "stages",
+		json_pack("{s:s, s:s, s:i, s:{s:s, s:b, s:{s:{s:[{s:s, s:f}, o]}, s:{s:s}}}}", "description",
+			"Intervals of time, one after the other, in which keys have other values.", "type", "array",
+			"minItems", 1, "items", "type", "object", "additionalProperties", false, "properties", "for",
+			"anyOf", "type", "number", "exclusiveMinimum", 0.0, defined("quantity"), "set", "type", "object"),
+		false);
 	const quern_catalogue *known = quern_loader_catalogue(c->loader);
 	for (size_t i = 0; i < known->n_solvers; i++)
 		if (quern_section_is_claimed(&known->solvers[i]))

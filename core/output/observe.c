@@ -16,10 +16,26 @@ static const quern_observer_ops *ops_of(const quern_run *run, size_t e) {
 	return run->plan->observers[e]->bound.ops;
 }
 
-static uint32_t outputs_of(const quern_observer_ops *ops) {
+static uint32_t rows_of(const quern_observer_ops *ops) {
 	uint32_t n = 0;
 	while (ops->outputs[n].name) n++;
 	return n;
+}
+
+/* How often they come. */
+static uint32_t repeats(const quern_run *run, size_t e) {
+	enum { MOST = 1000 };
+	const quern_bound *bound = &run->plan->observers[e]->bound;
+	const quern_observer_ops *ops = bound->ops;
+	if (!ops->repeat) return 1;
+	quern_watch_enter(bound->id, "repeat");
+	const uint32_t n = ops->repeat(bound->self);
+	quern_watch_leave();
+	return n < 1 ? 1 : n < MOST ? n : MOST;
+}
+
+static uint32_t outputs_of(const quern_run *run, size_t e) {
+	return rows_of(ops_of(run, e)) * repeats(run, e);
 }
 
 const char *quern_observer_label(const quern_run *run, size_t e) {
@@ -113,13 +129,18 @@ static void add_columns(quern_series *s, const quern_run *run) {
 	for (size_t k = 0; k < run->plan->store.n_sets; k++)
 		if (quern_set_is_counted(&run->plan->store.sets[k]))
 			add_column(s, quern_copy(quern_set_plural(&run->plan->store.sets[k])), "1");
-	for (size_t e = 0; e < run->scene->observe.n; e++)
-		for (const quern_output *out = ops_of(run, e)->outputs; out->name; out++) {
-			quern_observed *c =
-				add_column(s, quern_format("%s.%s", quern_observer_label(run, e), out->name), out->unit);
-			c->output = out->name;
+	for (size_t e = 0; e < run->scene->observe.n; e++) {
+		const quern_observer_ops *ops = ops_of(run, e);
+		const char *label = quern_observer_label(run, e);
+		for (uint32_t k = 0, n = rows_of(ops); k < outputs_of(run, e); k++) {
+			const quern_output *out = &ops->outputs[k % n];
+			char *name = ops->repeat ? quern_format("%s.%s_%u", label, out->name, k / n)
+									 : quern_format("%s.%s", label, out->name);
+			quern_observed *c = add_column(s, name, out->unit);
+			c->output = c->name + strlen(label) + 1;
 			c->observer = e;
 		}
+	}
 }
 
 quern_status quern_series_init(quern_series *s, quern_run *run, int64_t rows) {
@@ -154,7 +175,7 @@ typedef struct {
 	const quern_bound *bound;
 	const quern_observer_ops *ops;
 	quern_observer_batch batch;
-	uint32_t n, n_outputs;
+	uint32_t n, n_rows, n_outputs;
 	bool *along;         /* by use: its column runs along the set that `map` runs over */
 	uint32_t *count;     /* by use: entries of its set */
 	quern_column *shift; /* by worker, by use: the columns from the leaf's first entry on */
@@ -186,7 +207,7 @@ static void fold(const asking *a, uint32_t leaves, double *out) {
 		for (uint32_t step = 1; step < leaves; step *= 2)
 			for (uint32_t i = 0; i + step < leaves; i += 2 * step)
 				a->partial[(size_t)i * a->n_outputs + k] =
-					combine(a->ops->outputs[k].combine, a->partial[(size_t)i * a->n_outputs + k],
+					combine(a->ops->outputs[k % a->n_rows].combine, a->partial[(size_t)i * a->n_outputs + k],
 						a->partial[(size_t)(i + step) * a->n_outputs + k]);
 		out[k] = leaves ? a->partial[k] : 0;
 	}
@@ -218,9 +239,11 @@ static quern_status ask_all(asking *a, quern_run *run, double *out) {
 
 static quern_status ask(quern_run *run, size_t e, double *out) {
 	const quern_bound *bound = &run->plan->observers[e]->bound;
-	const quern_general *g = &run->scene->general;
+	const quern_general *g = &run->plan->scene->general;
 	const size_t n_uses = (size_t)bound->n_uses + 1;
-	asking a = { .bound = bound, .ops = bound->ops, .n_outputs = outputs_of(bound->ops) };
+	asking a = {
+		.bound = bound, .ops = bound->ops, .n_rows = rows_of(bound->ops), .n_outputs = outputs_of(run, e)
+	};
 	a.batch = (quern_observer_batch) {
 		.dim = (uint32_t)g->dimension, .time = quern_run_time(run), .use = bound->column
 	};
@@ -243,7 +266,7 @@ static quern_status ask(quern_run *run, size_t e, double *out) {
 
 /* Numbers that are not finite come out nowhere: they end the run, which says whose they are. */
 static quern_status take_answers(quern_series *s, quern_run *run, size_t e, size_t first, const double *out) {
-	for (uint32_t k = 0; k < outputs_of(ops_of(run, e)); k++) {
+	for (uint32_t k = 0; k < outputs_of(run, e); k++) {
 		if (!isfinite(out[k]))
 			return quern_run_stop(run, QUERN_E_NUMERIC,
 				"observer %s: column %s is %s at t = %.6g s (step %lld)", quern_observer_label(run, e),
@@ -276,7 +299,7 @@ quern_status quern_series_add(quern_series *s, quern_run *run) {
 		if (quern_set_is_counted(&run->plan->store.sets[k]))
 			note(&s->column[c++], run->plan->store.sets[k].n);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
-		const uint32_t n = outputs_of(ops_of(run, e));
+		const uint32_t n = outputs_of(run, e);
 		double *out = calloc(n + 1u, sizeof *out);
 		quern_watch_enter(run->plan->observers[e]->bound.id, ops_of(run, e)->map ? "map" : "whole");
 		quern_status status = out ? ask(run, e, out) : QUERN_E_MEMORY;

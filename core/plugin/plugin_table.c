@@ -125,7 +125,6 @@ static bool param(quern_table_reader *r, const char *of, const quern_param *row,
 	if (row->offset % alignment(row->type))
 		return quern_table_refuse(
 			r, "%s: '%s' lies at byte %u, where its type cannot", of, row->name, row->offset);
-	if (row->flags & ~127u) return quern_table_refuse(r, "%s: '%s' has unknown flags", of, row->name);
 	if (row->flags & QUERN_FILE && row->type != QUERN_T_TEXT)
 		return quern_table_refuse(r, "%s: '%s' is a file, so its type must be const char *", of, row->name);
 	if (!is_unit(row->unit) || !is_doc(row->doc) || !is_doc(row->text) ||
@@ -181,7 +180,8 @@ bool quern_table_params(quern_table_reader *r, const char *of, const quern_param
 static bool use(quern_table_reader *r, const char *of, const quern_use *row, const quern_param *params) {
 	if (!is_field(row->field)) return quern_table_refuse(r, "%s: '%.60s' is no SET.NAME", of, row->field);
 	if (row->access < QUERN_READ || row->access > QUERN_ADD || row->shape < QUERN_SCALAR ||
-		row->shape > QUERN_ID || row->hook > 2 || row->flags > 2 * QUERN_RELEASED - 1)
+		row->shape > QUERN_ID || row->hook > 2 || row->flags > 2 * QUERN_EXISTS - 1 ||
+		(row->flags & QUERN_EXISTS && row->access != QUERN_READ))
 		return quern_table_refuse(r, "%s: access, shape, hook or flags of %s are unknown", of, row->field);
 	if (!is_unit(row->unit) || !is_doc(row->doc))
 		return quern_table_refuse(r, "%s: unit or doc of %s is no plain text", of, row->field);

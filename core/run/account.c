@@ -35,8 +35,8 @@ static void add_section(quern_account *a, const quern_section *s, const quern_st
 quern_account quern_run_account(quern_run *run) {
 	quern_account account = { .n = 0 };
 	quern_plan_refresh(run->plan);
-	for (size_t i = 0; i < run->scene->n_sections; i++) {
-		const quern_section *s = &run->scene->sections[i];
+	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
+		const quern_section *s = &run->plan->scene->sections[i];
 		const quern_step step = quern_run_record(run, s);
 		if (s->ops->account) add_section(&account, s, &step);
 	}
@@ -75,8 +75,8 @@ quern_status quern_run_check_account(quern_run *run) {
 bool quern_run_accept(quern_run *run, quern_text *why) {
 	bool good = run->status == QUERN_OK;
 	quern_plan_refresh(run->plan);
-	for (size_t i = 0; i < run->scene->n_sections && good; i++) {
-		const quern_section *s = &run->scene->sections[i];
+	for (size_t i = 0; i < run->plan->scene->n_sections && good; i++) {
+		const quern_section *s = &run->plan->scene->sections[i];
 		if (!s->ops->accept) continue;
 		const quern_step step = quern_run_record(run, s);
 		quern_watch_enter(s->solver->file->plugin.id, "accept");

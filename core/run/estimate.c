@@ -10,8 +10,8 @@ static const double day = 86400;
  * substeps, or else in whole steps. */
 static double price(const quern_run *run, bool substeps) {
 	double sum = 0;
-	for (size_t i = 0; i < run->scene->n_sections; i++) {
-		const quern_section *section = &run->scene->sections[i];
+	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
+		const quern_section *section = &run->plan->scene->sections[i];
 		if (quern_section_takes_substeps(section) != substeps) continue;
 		for (const quern_set *set = section->ops->sets; set->name; set++)
 			if (set->counted)

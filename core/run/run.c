@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "run.h"
 #include "identity.h"
+#include "run_episodes.h"
 #include "text.h"
 #include "watch.h"
 #include <math.h>
@@ -144,6 +145,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	check_substeps(scene);
 	check_sums(scene);
 	run->plan = quern_plan_create(scene, run->pool);
+	quern_run_plan_episodes(run);
 	run->has_grid = needs_grid(&run->plan->store);
 	if (run->has_grid && !quern_report_errors(scene->report)) {
 		const quern_general *g = &scene->general;
@@ -169,7 +171,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 
 void quern_run_destroy(quern_run *run) {
 	if (!run) return;
-	quern_plan_destroy(run->plan);
+	quern_run_finish_episodes(run);
 	if (run->has_grid) quern_grid_finish(&run->grid);
 	quern_pool_destroy(run->pool);
 	quern_scene_destroy(run->scene);
@@ -198,6 +200,17 @@ static double due(const quern_run *run, double time) {
 	return next >= ceil(last - slack(last)) ? g->end : next * g->every;
 }
 
+/* s, the end of an interval that begins at `time`: a frame, or the end of one of the scene's stages. */
+static double ends(const quern_run *run, double time) {
+	return fmin(due(run, time), quern_run_episode_end(run, time));
+}
+
+/* Where stages of the scene meet there is a frame only if its time has come. */
+static bool is_frame_time(const quern_run *run, double time) {
+	const double intervals = time / run->scene->general.every;
+	return !quern_run_is_seam(run, time) || fabs(intervals - floor(intervals + 0.5)) <= slack(intervals);
+}
+
 bool quern_run_over(const quern_run *run) {
 	const quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
@@ -221,7 +234,8 @@ bool quern_run_rejoin(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	const double now = quern_run_time(run), intervals = now / g->every;
 	if (c->frame >= 0 && g->end / g->every < intervals - slack(intervals)) return false;
-	const bool same = due(run, c->begin) == c->end || due(run, now) == c->end;
+	const bool same = ends(run, c->begin) == c->end || ends(run, now) == c->end;
+	quern_run_find_episode(run);
 	if (c->steps_in && !same) quern_run_cut(run);
 	return true;
 }
@@ -242,16 +256,17 @@ static uint32_t substeps_of(const quern_section *s) {
 /* Wishes are one, see check_substeps. */
 uint32_t quern_run_substeps(const quern_run *run) {
 	uint32_t n = 0;
-	for (size_t i = 0; i < run->scene->n_sections && !n; i++) n = substeps_of(&run->scene->sections[i]);
+	for (size_t i = 0; i < run->plan->scene->n_sections && !n; i++)
+		n = substeps_of(&run->plan->scene->sections[i]);
 	return n ? n : 1;
 }
 
 static size_t section_index(const quern_run *run, const quern_section *section) {
-	return section ? (size_t)(section - run->scene->sections) : 0;
+	return section ? (size_t)(section - run->plan->scene->sections) : 0;
 }
 
 quern_step quern_run_record(quern_run *run, const quern_section *section) {
-	const quern_general *g = &run->scene->general;
+	const quern_general *g = &run->plan->scene->general;
 	const size_t i = section_index(run, section);
 	quern_step step = { .step = run->clock.step,
 		.substep = run->clock.settled ? run->clock.substep : run->clock.settle_step,
@@ -264,7 +279,9 @@ quern_step quern_run_record(quern_run *run, const quern_section *section) {
 		.slot = section ? (const quern_bound *const *)run->plan->slots[i] : NULL,
 		.n_slot = section ? run->plan->n_slot[i] : NULL,
 		.host = &quern_host_table,
-		.run = run };
+		.run = run,
+		.stage_step = run->entered,
+		.within = run->within };
 	memcpy(step.gravity, g->gravity, sizeof step.gravity);
 	memcpy(step.lower, g->lower, sizeof step.lower);
 	memcpy(step.upper, g->upper, sizeof step.upper);
@@ -302,8 +319,8 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 	const uint32_t n = quern_run_substeps(run);
 	snprintf(reason, 200, "nothing");
 	snprintf(hard_reason, 200, "nothing");
-	for (size_t i = 0; i < run->scene->n_sections; i++) {
-		const quern_section *s = &run->scene->sections[i];
+	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
+		const quern_section *s = &run->plan->scene->sections[i];
 		if (!s->ops->limit) continue;
 		quern_step step = quern_run_record(run, s);
 		step.settling = false; /* the steps after the release are meant, whenever this is asked */
@@ -322,7 +339,7 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 }
 
 quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_reason, double recommended) {
-	const quern_general *g = &run->scene->general;
+	const quern_general *g = &run->plan->scene->general;
 	if (g->force || !(g->step > hard)) return QUERN_OK;
 	return quern_run_refuse(run, "time.step",
 		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it "
@@ -334,9 +351,10 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 static quern_status begin_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
-	const double end = due(run, c->end), length = end - c->end;
+	const double end = ends(run, c->end), length = end - c->end;
 	double hard;
 	char hard_reason[200];
+	if (run->scene->n_episodes) quern_run_enter_episode(run, c->end);
 	double limit = quern_run_limit(run, &hard, run->limit_reason, hard_reason);
 	if (quern_run_check_step(run, hard, hard_reason, limit) != QUERN_OK) return QUERN_E_PARAM;
 	if (g->step > 0) {
@@ -439,8 +457,8 @@ quern_status quern_run_setup(quern_run *run) {
 /* The least limit of those who settle. */
 static double settle_dt(quern_run *run) {
 	double least = INFINITY;
-	for (size_t i = 0; i < run->scene->n_sections; i++) {
-		const quern_section *s = &run->scene->sections[i];
+	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
+		const quern_section *s = &run->plan->scene->sections[i];
 		if (!settles(s) || !s->ops->limit) continue;
 		const quern_step step = quern_run_record(run, s);
 		double hard;
@@ -453,8 +471,8 @@ static double settle_dt(quern_run *run) {
 double quern_run_settling(quern_run *run, double *dt) {
 	double most = 0;
 	*dt = settle_dt(run);
-	for (size_t i = 0; i < run->scene->n_sections; i++) {
-		const quern_section *s = &run->scene->sections[i];
+	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
+		const quern_section *s = &run->plan->scene->sections[i];
 		if (!s->ops->settling) continue;
 		quern_step step = quern_run_record(run, s);
 		step.dt = *dt;
@@ -470,8 +488,8 @@ static void settle(quern_run *run) {
 	quern_clock *c = &run->clock;
 	bool rest = true;
 	if (c->settle_step == 0) c->settle_dt = settle_dt(run);
-	for (size_t i = 0; i < run->scene->n_sections; i++) {
-		const quern_section *s = &run->scene->sections[i];
+	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
+		const quern_section *s = &run->plan->scene->sections[i];
 		if (!s->ops->settled) continue;
 		const quern_step step = quern_run_record(run, s);
 		quern_watch_enter(s->solver->file->plugin.id, "settled");
@@ -494,7 +512,7 @@ static bool owns(const quern_section *section, const quern_set *set) {
 
 /* Steps of the entries that are counted: of those in substeps after these, of all others at the end. */
 static void count_steps(quern_run *run, bool substeps, uint32_t times) {
-	const quern_scene *scene = run->scene;
+	const quern_scene *scene = run->plan->scene;
 	for (size_t k = 0; k < run->plan->store.n_sets; k++) {
 		quern_set_store *set = &run->plan->store.sets[k];
 		for (size_t i = 0; i < scene->n_sections && set->table && set->table->counted; i++)
@@ -509,21 +527,25 @@ static quern_status do_step(quern_run *run) {
 	const uint32_t substeps = quern_run_substeps(run);
 	quern_status status = run_phase(run, QUERN_BEGIN, c->dt);
 	for (uint32_t k = 0; k < substeps && status == QUERN_OK; k++) {
+		run->within = k;
 		status = run_phase(run, QUERN_SUBSTEP, c->dt / substeps);
 		c->substep++;
 	}
+	run->within = 0;
 	count_steps(run, true, substeps);
 	for (int phase = QUERN_DEPOSIT; phase <= QUERN_END && status == QUERN_OK; phase++)
 		status = run_phase(run, (quern_phase)phase, c->dt);
 	count_steps(run, false, 1);
 	c->step++;
 	c->at++;
+	run->entered = -1;
 	return status;
 }
 
 bool quern_run_awaits_frame(const quern_run *run) {
 	const quern_clock *c = &run->clock;
-	return run->status == QUERN_OK && c->settled && (c->frame < 0 || (c->steps_in && c->at == c->steps_in));
+	const bool ended = c->steps_in && c->at == c->steps_in && is_frame_time(run, c->end);
+	return run->status == QUERN_OK && c->settled && (c->frame < 0 || ended);
 }
 
 quern_event quern_run_next(quern_run *run) {
@@ -535,6 +557,7 @@ quern_event quern_run_next(quern_run *run) {
 	if (run->status == QUERN_OK && quern_run_over(run)) return QUERN_OVER;
 	if (run->status == QUERN_OK && !run->clock.steps_in) begin_interval(run);
 	if (run->status == QUERN_OK) do_step(run);
+	if (run->clock.at == run->clock.steps_in && !is_frame_time(run, run->clock.end)) quern_run_cut(run);
 	return run->status == QUERN_OK ? QUERN_STEPPED : QUERN_STOPPED;
 }
 

@@ -26,7 +26,7 @@ typedef struct quern_arena {
 
 struct quern_run {
 	quern_scene *scene;
-	quern_plan *plan;
+	quern_plan *plan; /* the present one; plan->scene has the values that hold now */
 	quern_pool *pool;
 	quern_grid grid;
 	bool has_grid;
@@ -35,6 +35,12 @@ struct quern_run {
 	quern_log *log;
 	char *folder; /* NULL: nothing is written */
 	struct quern_sidecars *sidecars;
+	/* of the scene's `stages`: the present one, -1 before the first; this step if it begins with it, else -1; a plan
+	 * for each, NULL where that is the first one, which is the scene's own */
+	int64_t episode, entered;
+	uint32_t within; /* the substep that runs, of a step */
+	quern_plan **plans, *first_plan;
+	size_t n_plans;
 	const quern_plan_stage *stage; /* the one that runs, for messages; NULL between stages */
 	quern_status status;
 	char *message;                   /* why the run stopped */

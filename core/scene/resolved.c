@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* resolved - the scene with every default written out, so that it reruns the same */
-#include "scene.h"
+#include "episodes.h"
 #include "text.h"
 #include <stdlib.h>
 #include <string.h>
@@ -100,6 +100,7 @@ quern_node *quern_scene_tree(const quern_scene *s, const quern_naming *naming) {
 	for (size_t k = 0; k < s->n_fields; k++) quern_node_append(fields, s->fields[k]);
 	for (size_t i = 0; i < s->n_sections; i++) put_section(&w, &s->sections[i], root);
 	put_slot(&w, &s->observe, root);
+	quern_episodes_write(s, root);
 	return root;
 }
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "scene.h"
+#include "episodes.h"
 #include "section.h"
 #include "sections.h"
 #include "text.h"
@@ -56,6 +57,10 @@ const quern_general_list quern_general_lists[] = {
 		"Faces of the domain that let material out and book it (docs/theory/flow.md); default: none." },
 	{ "output.fields", "text",
 		"Fields to write out beside those that frames always have: SET.NAME, as `quern plan` lists them." },
+	{ "stages", "{for: TIME, set: {path.to.key: value}}",
+		"Intervals of time, one after the other, in which keys have other values than the scene gives them; "
+		"the "
+		"last one needs no `for`. Settling comes before them all." },
 	{ NULL, NULL, NULL }
 };
 
@@ -98,7 +103,8 @@ quern_setup quern_scene_setup(const quern_scene *s, const char *path) {
 	quern_setup setup = { .dim = (uint32_t)s->general.dimension,
 		.lanes = QUERN_LANES,
 		.host = s->host,
-		.scene = (void *)(uintptr_t)s };
+		.scene = (void *)(uintptr_t)s,
+		.later = s->later };
 	setup.stream =
 		quern_hash(path, strlen(path)) ^ ((uint64_t)(uint32_t)s->general.seed * 0x9e3779b97f4a7c15u);
 	memcpy(setup.gravity, s->general.gravity, sizeof setup.gravity);
@@ -382,6 +388,15 @@ quern_scene *quern_scene_read(const char *path, const char *const *sets, const q
 	s->tree = quern_tree_read(path, s->report);
 	for (; sets && *sets && s->tree->root; sets++) quern_tree_set(s->tree, *sets, s->report);
 	resolve(s);
+	if (!quern_report_errors(s->report)) quern_episodes_read(s);
+	return s;
+}
+
+quern_scene *quern_scene_vary(quern_tree *tree, const quern_host *host) {
+	quern_scene *s = create(host);
+	s->tree = tree;
+	s->later = true;
+	resolve(s);
 	return s;
 }
 
@@ -389,6 +404,7 @@ quern_scene *quern_scene_parse(const char *name, const char *data, size_t length
 	quern_scene *s = create(host);
 	s->tree = quern_tree_parse(name, data, length, s->report);
 	resolve(s);
+	if (!quern_report_errors(s->report)) quern_episodes_read(s);
 	return s;
 }
 
@@ -400,6 +416,7 @@ const quern_section *quern_scene_section(const quern_scene *s, const char *name)
 
 void quern_scene_destroy(quern_scene *s) {
 	if (!s) return;
+	quern_episodes_finish(s);
 	for (size_t i = 0; i < s->n_sections; i++) {
 		for (size_t k = 0; k < s->sections[i].n_slots; k++) quern_slot_finish(&s->sections[i].slots[k]);
 		free(s->sections[i].slots);

@@ -64,8 +64,15 @@ typedef struct quern_general {
 
 enum { QUERN_MOST_SECTIONS = 16 };
 
+/* An entry of `stages`: from `begin` to where the next one begins. */
+typedef struct quern_episode {
+	quern_real begin;          /* s */
+	struct quern_scene *scene; /* with the values that hold then; NULL: those of the scene itself */
+} quern_episode;
+
 typedef struct quern_scene {
 	quern_general general;
+	bool later; /* these are the values of a stage of another scene */
 	bool sound; /* dimension, gravity and domain may be relied on */
 	quern_report *report;
 	quern_units *units;
@@ -81,6 +88,8 @@ typedef struct quern_scene {
 	char **fields; /* output.fields */
 	quern_mark *field_marks;
 	size_t n_fields;
+	quern_episode *episodes; /* in the order of time; none: the scene is one */
+	size_t n_episodes;
 	quern_published *published;
 	size_t n_published, published_capacity;
 	quern_instance **instances;
@@ -91,6 +100,8 @@ typedef struct quern_scene {
 /* Reads and resolves; faults are in scene->report. `sets` are the --set options, NULL-terminated. Never NULL. */
 quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *);
 quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *);
+/* The scene of a tree, which it takes over; `stages` in it count for nothing. */
+quern_scene *quern_scene_vary(quern_tree *, const quern_host *);
 void quern_scene_destroy(quern_scene *);
 
 /* The scene with every default written out, in SI: a tree to destroy, or YAML to free(). */

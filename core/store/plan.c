@@ -407,7 +407,7 @@ static bool swapped_in(const quern_plan_stage *stage, int field) {
 }
 
 static quern_column column_of(const quern_plan *p, const quern_plan_use *u, const quern_plan_stage *stage) {
-	if (u->target < 0) return (quern_column) { .real = { NULL } };
+	if (u->target < 0 || u->row->flags & QUERN_EXISTS) return (quern_column) { .real = { NULL } };
 	const quern_field *field = &p->store.fields[u->target];
 	const bool other = stage && field->twice && quern_use_renews(u->row) && swapped_in(stage, u->target);
 	return quern_field_column(&p->store, field, other ? !field->now : field->now);

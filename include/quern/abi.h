@@ -40,7 +40,7 @@ extern "C" {
 #endif
 
 #define QUERN_ABI_MAJOR 2u
-#define QUERN_ABI_MINOR 0u
+#define QUERN_ABI_MINOR 1u
 #define QUERN_ABI (QUERN_ABI_MAJOR << 16 | QUERN_ABI_MINOR)
 #define QUERN_LANES 8u
 
@@ -82,7 +82,9 @@ enum {
 	QUERN_MAYBE = 8,     /* may be left out: the member is then NaN (every component), INT32_MIN or NULL */
 	QUERN_PLANAR = 16,   /* `planar` is the default in 2-D, `def` in 3-D */
 	QUERN_ADVANCED = 32, /* listed apart by `describe` */
-	QUERN_FILE = 64      /* T_TEXT: a file that must exist; relative to the scene's folder */
+	QUERN_FILE = 64,     /* T_TEXT: a file that must exist; relative to the scene's folder */
+	QUERN_ONCE =
+		128 /* since 2.1: it counts before the first step alone: stages of a scene cannot change it */
 };
 
 /* One row feeds the scene reader, `describe`, the JSON Schema, the resolved scene and the fuzzer. */
@@ -165,13 +167,15 @@ typedef enum {
 #define QUERN_NO_TARGET (-1) /* an INDEX that points at nothing */
 
 enum {
-	QUERN_OPTIONAL = 1, /* attaches to the field if somebody else needs it; its column is NULL otherwise */
-	QUERN_OTHERS = 2,   /* this READ looks at other entities: if its stage changes the field too, the
+	QUERN_OPTIONAL = 1,  /* attaches to the field if somebody else needs it; its column is NULL otherwise */
+	QUERN_OTHERS = 2,    /* this READ looks at other entities: if its stage changes the field too, the
 	                       field is kept twice and the stage writes every entry of the new copy */
-	QUERN_BEFORE = 4,   /* this READ wants the value from before this phase's changes */
-	QUERN_SHOWN = 8,    /* in every frame, asked for or not */
-	QUERN_WANTED = 16,  /* makes the field exist if anybody in the scene can write it; NULL otherwise */
-	QUERN_RELEASED = 32 /* nothing is changed through this use while settling */
+	QUERN_BEFORE = 4,    /* this READ wants the value from before this phase's changes */
+	QUERN_SHOWN = 8,     /* in every frame, asked for or not */
+	QUERN_WANTED = 16,   /* makes the field exist if anybody in the scene can write it; NULL otherwise */
+	QUERN_RELEASED = 32, /* nothing is changed through this use while settling */
+	QUERN_EXISTS =
+		64 /* since 2.1: this READ only makes the field exist; its column is NULL, and nothing is gathered */
 };
 
 /* One use of one field by one plugin. A field exists if and only if a counting, non-optional use names
@@ -281,7 +285,8 @@ typedef struct quern_setup {
 	bool periodic[3];
 	const quern_host *host;
 	void *scene;     /* opaque */
-	bool open[2][3]; /* faces of the domain that let material out: lower, upper; by axis */
+	bool later;      /* since 2.1: the values of one of the scene's `stages`, which come after the release */
+	bool open[2][3]; /* since 2.1: faces of the domain that let material out: lower, upper; by axis */
 } quern_setup;
 
 /* ==== plugin and library ==== */

@@ -24,10 +24,14 @@ typedef struct quern_observer_ops {
 		const void *self, const quern_observer_batch *, quern_real *partial); /* [batch] one per output */
 	quern_status (*whole)(const void *self, const quern_observer_batch *, quern_real *out, const quern_host *,
 		quern_run *); /* [stage] */
+	/* since 2.1: [setup] how often `outputs` come, 1 to 1000, all of them each time, with _0, _1, ... after their names, such as
+	 * a profile's bins; NULL: once, as they are called */
+	uint32_t (*repeat)(const void *self);
 } quern_observer_ops;
 
 QUERN_KIND(observer, quern_observer_ops, "Numbers about a state, a row each time.",
-	QUERN_OPTIONALLY(quern_observer_ops, map), QUERN_OPTIONALLY(quern_observer_ops, whole));
+	QUERN_OPTIONALLY(quern_observer_ops, map), QUERN_OPTIONALLY(quern_observer_ops, whole),
+	QUERN_OPTIONALLY(quern_observer_ops, repeat));
 
 #ifdef __cplusplus
 }

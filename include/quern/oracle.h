@@ -13,6 +13,7 @@ enum {
 	QUERN_SURFACE_FLOOD = 1, /* outside counts only where it is connected with an open boundary */
 	QUERN_SURFACE_WALLS = 2  /* walls and bodies count as surface */
 };
+enum { QUERN_ORACLE_GAP = 1, QUERN_ORACLE_WEIGHT = 2 }; /* what an oracle wants in its batches */
 
 typedef struct quern_cell_batch {
 	uint32_t n, cap, dim, pad;
@@ -24,6 +25,15 @@ typedef struct quern_cell_batch {
 	const quern_column *use; /* cell.* of this batch */
 	quern_real *level;       /* marking: > 0 inside, <= 0 outside; its zero contour is the surface */
 	int32_t *wish;           /* deciding: zone; the least continuous of all oracles wins */
+	quern_real time, dt;     /* s; dt of the continuum's step */
+	quern_real gravity[3];   /* m/s^2 */
+	/* m from the cell's centre to the nearest of the bodies that this oracle means and that are there now, less than 0
+	 * inside, infinite where there is none; moved by up to half the hysteresis while deciding, as distance is. NULL where
+	 * the oracle does not want it */
+	const quern_real *gap;
+	/* deciding: the continuum's share in the cell if it becomes hybrid, from 0 to 1; the least of all oracles wins; -1:
+	 * what the solver takes. NULL where the oracle does not want it */
+	quern_real *weight;
 } quern_cell_batch;
 
 typedef struct quern_oracle_ops {
@@ -31,10 +41,19 @@ typedef struct quern_oracle_ops {
 	void (*mark)(const void *self, const quern_cell_batch *);   /* [batch] */
 	void (*decide)(const void *self, const quern_cell_batch *); /* [batch] */
 	uint32_t (*surface)(const void *self);                      /* [setup] QUERN_SURFACE_*; NULL: 0 */
+	uint32_t (*wants)(const void *self);                        /* [setup] QUERN_ORACLE_*; NULL: 0 */
+	/* [setup] whether the oracle means body number b of the scene: `gap` leads to those alone, and of walls these alone
+	 * count as surface. NULL: all */
+	bool (*means)(const void *self, uint32_t b);
+	/* [setup] faces of the domain beyond which is open space, bit 2 axis for the lower and 2 axis + 1 for the upper
+	 * one; others count as closed, though no body stands there. NULL: all */
+	uint32_t (*faces)(const void *self);
 } quern_oracle_ops;
 
 QUERN_KIND(oracle, quern_oracle_ops, "Where grains are needed.", QUERN_ONE(quern_oracle_ops, mark),
-	QUERN_ONE(quern_oracle_ops, decide), QUERN_OPTIONALLY(quern_oracle_ops, surface));
+	QUERN_ONE(quern_oracle_ops, decide), QUERN_OPTIONALLY(quern_oracle_ops, surface),
+	QUERN_OPTIONALLY(quern_oracle_ops, wants), QUERN_OPTIONALLY(quern_oracle_ops, means),
+	QUERN_OPTIONALLY(quern_oracle_ops, faces));
 
 #ifdef __cplusplus
 }

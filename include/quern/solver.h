@@ -87,7 +87,11 @@ typedef struct quern_step {
 	const uint32_t *n_slot;
 	const quern_host *host;
 	quern_run *run;
-	bool open[2][3]; /* faces of the domain that let material out: lower, upper; by axis */
+	/* since 2.1: this step's number if one of the scene's `stages` begins with it, so that keys may have other values than in
+	 * the last step; else -1 */
+	int64_t stage_step;
+	uint32_t within; /* since 2.1: which of n_substeps this is, from 0; 0 in other phases */
+	bool open[2][3]; /* since 2.1: faces of the domain that let material out: lower, upper; by axis */
 } quern_step;
 
 enum {

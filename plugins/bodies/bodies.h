@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* bodies - what every body takes besides its own shape; the keys of a scene's `bodies` entries */
 #pragma once
+#include "motion.h"
 #include <math.h>
-#include <quern/body.h>
-#include <quern/solver.h>
 #include <stdio.h>
 
-enum { BODY_ALWAYS, BODY_SETTLING, BODY_RUNNING };
+enum { BODY_ALWAYS, BODY_SETTLING, BODY_RUNNING, BODY_NEVER };
 enum { BOUNDARY_SLIP, BOUNDARY_STICKY, BOUNDARY_NONE };
 
 typedef struct body_item {
@@ -14,6 +13,7 @@ typedef struct body_item {
 	int32_t boundary;    /* BOUNDARY_* on the continuum's grid */
 	quern_real friction; /* of the boundary; NaN: the choice above holds */
 	const char *name;    /* NULL: it has none */
+	body_motion motion;
 } body_item;
 
 enum { BODY_WORDS = 120 };
@@ -28,26 +28,73 @@ static inline const char *quern_body_say(const quern_bound *body, uint32_t i, ch
 
 QUERN_INLINE bool quern_body_is_there(const quern_bound *body, bool settling) {
 	const int32_t when = ((const body_item *)body->item)->when;
-	return when == BODY_ALWAYS || (when == BODY_SETTLING) == settling;
+	return when == BODY_ALWAYS || (when != BODY_NEVER && (when == BODY_SETTLING) == settling);
 }
 
-/* Gap of one sphere to a body that stands where the scene put it, or to one of its features, and the normal there
- * (may be NULL). */
-static inline quern_real quern_body_gap_of(const quern_bound *body, const int32_t *feature, uint32_t dim,
-	const quern_real x[3], quern_real radius, quern_real normal[3]) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+/* Poses of all bodies of a slot, with the velocities of the time `rate`, until the stage returns; NULL: no memory. While
+ * settling time has not begun. A body that never moves is where the scene put it, to the bit. */
+static inline body_pose *quern_body_poses(
+	const quern_step *s, uint32_t slot, quern_real time, quern_real rate) {
+	const uint32_t n = s->n_slot[slot];
+	body_pose *all = (body_pose *)s->host->memory(s->run, ((size_t)n + 1) * sizeof(body_pose));
+	for (uint32_t b = 0; b < n && all; b++) {
+		const body_motion *motion = &((const body_item *)s->slot[slot][b].item)->motion;
+		body_pivot pivot;
+		quern_motion_pivot(motion, &s->slot[slot][b], s->dim, &pivot);
+		all[b] = quern_motion_still;
+		for (int k = 0; k < 3; k++) all[b].pivot[k] = pivot.about[k];
+		if (!quern_motion_is_any(motion)) continue;
+		quern_motion_at(motion, &pivot, s->settling ? 0 : time, rate, &all[b]);
+		if (!s->settling) continue;
+		for (int k = 0; k < 3; k++) all[b].pose.velocity[k] = all[b].pose.spin[k] = 0;
+		all[b].moves = false;
+	}
+	for (uint32_t b = 0; b < n && all; b++)
+		quern_motion_repeat(&all[b], &s->slot[slot][b], s->dim, s->lower, s->upper, s->periodic);
+	return all;
+}
+
+/* The same as they are now: at the beginning of this substep, or of the step. */
+static inline body_pose *quern_body_poses_now(const quern_step *s, uint32_t slot) {
+	const quern_real now = s->time + (quern_real)s->within * s->dt;
+	return quern_body_poses(s, slot, now, now);
+}
+
+/* m/s, no less than the speed of any place of any body between two times. */
+static inline quern_real quern_bodies_speed(
+	const quern_step *s, uint32_t slot, quern_real from, quern_real to) {
+	quern_real most = 0;
+	for (uint32_t b = 0; b < s->n_slot[slot]; b++) {
+		const body_motion *motion = &((const body_item *)s->slot[slot][b].item)->motion;
+		if (!quern_motion_is_any(motion)) continue;
+		const quern_real speed = quern_motion_speed(motion, &s->slot[slot][b], s, from, to);
+		most = speed > most ? speed : most;
+	}
+	return most;
+}
+
+/* Whether any body of a slot ever moves. */
+static inline bool quern_bodies_move(const quern_bound *body, uint32_t n) {
+	for (uint32_t b = 0; b < n; b++)
+		if (quern_motion_is_any(&((const body_item *)body[b].item)->motion)) return true;
+	return false;
+}
+
+/* Gap of one sphere to a body, or to one of its features, and the normal there (may be NULL). */
+static inline quern_real quern_body_gap_of(const quern_bound *body, const body_pose *pose,
+	const int32_t *feature, uint32_t dim, const quern_real x[3], quern_real radius, quern_real normal[3]) {
 	_Alignas(64) quern_real at[3][QUERN_LANES], r[QUERN_LANES], gap[QUERN_LANES], n[3][QUERN_LANES],
 		v[3][QUERN_LANES];
 	_Alignas(64) int32_t which[QUERN_LANES];
 	for (uint32_t i = 0; i < QUERN_LANES; i++) {
-		for (uint32_t k = 0; k < 3; k++) at[k][i] = k < dim ? x[k] : 0;
+		for (uint32_t k = 0; k < 3; k++) at[k][i] = k < dim ? quern_motion_bring(pose, k, x[k]) : 0;
 		r[i] = radius;
 		which[i] = feature ? *feature : 0;
 	}
 	const quern_body_batch batch = { .n = 1,
 		.cap = QUERN_LANES,
 		.dim = dim,
-		.pose = &still,
+		.pose = &pose->pose,
 		.position = { at[0], at[1], at[2] },
 		.radius = r,
 		.feature = feature ? which : NULL,
@@ -60,7 +107,7 @@ static inline quern_real quern_body_gap_of(const quern_bound *body, const int32_
 }
 
 /* The same to its nearest place. */
-static inline quern_real quern_body_gap(
-	const quern_bound *body, uint32_t dim, const quern_real x[3], quern_real radius, quern_real normal[3]) {
-	return quern_body_gap_of(body, NULL, dim, x, radius, normal);
+static inline quern_real quern_body_gap(const quern_bound *body, const body_pose *pose, uint32_t dim,
+	const quern_real x[3], quern_real radius, quern_real normal[3]) {
+	return quern_body_gap_of(body, pose, NULL, dim, x, radius, normal);
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 #include "placer.h"
-#include "../bodies/bodies.h"
 #include "tools.h"
 #include <math.h>
 #include <stdlib.h>
@@ -30,6 +29,24 @@ quern_status quern_placer_init(placer *p, uint32_t dim, const quern_real lower[3
 	if (!p->head) return QUERN_E_MEMORY;
 	memset(p->head, 0xff, p->n_heads * sizeof(int32_t));
 	return QUERN_OK;
+}
+
+bool quern_placer_bodies(placer *p, const quern_step *s, uint32_t slot, bool nodes) {
+	const size_t n = (size_t)s->n_slot[slot] + 1;
+	quern_bound *body = s->host->memory(s->run, n * sizeof(quern_bound));
+	body_pose *pose = quern_body_poses_now(s, slot);
+	if (!body || !pose) return false;
+	p->n_bodies = 0;
+	for (uint32_t b = 0; b < s->n_slot[slot]; b++) {
+		const body_item *item = s->slot[slot][b].item;
+		if (!quern_body_is_there(&s->slot[slot][b], s->settling)) continue;
+		if (nodes && item->boundary == BOUNDARY_NONE && isnan(item->friction)) continue;
+		pose[p->n_bodies] = pose[b];
+		body[p->n_bodies++] = s->slot[slot][b];
+	}
+	p->body = body;
+	p->pose = pose;
+	return true;
 }
 
 void quern_placer_finish(placer *p) {
@@ -108,8 +125,11 @@ static quern_real overlap_of(const placer *p, const quern_spot *a, const quern_s
 }
 
 static bool meets_body(const placer *p, const quern_spot *s) {
-	for (uint32_t b = 0; b < p->n_bodies; b++)
-		if (quern_body_gap(&p->body[b], p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
+	static const body_pose still = { .pose = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } } };
+	for (uint32_t b = 0; b < p->n_bodies; b++) {
+		const body_pose *pose = p->pose ? &p->pose[b] : &still;
+		if (quern_body_gap(&p->body[b], pose, p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
+	}
 	return false;
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
 #pragma once
+#include "../bodies/bodies.h"
 #include <quern/packer.h>
-#include <quern/solver.h>
 #include <quern/space.h>
 
 typedef struct placer {
@@ -18,6 +18,7 @@ typedef struct placer {
 	int32_t *head;
 	uint32_t n_heads;        /* a power of two */
 	const quern_bound *body; /* bodies that grains must not touch */
+	const body_pose *pose;   /* where each of them is; NULL: where the scene put it */
 	uint32_t n_bodies;
 	bool failed; /* memory ran out */
 } placer;
@@ -26,6 +27,9 @@ typedef struct placer {
 quern_status quern_placer_init(placer *, uint32_t dim, const quern_real lower[3], const quern_real upper[3],
 	const bool periodic[3], quern_real most);
 void quern_placer_finish(placer *);
+/* [stage] What must not be touched: bodies of a slot that are there now, where they are now, and of these with `nodes` only those
+ * that act on the continuum. Until the stage returns; false if memory is gone. */
+bool quern_placer_bodies(placer *, const quern_step *, uint32_t slot, bool nodes);
 void quern_placer_add(placer *, const quern_spot *);
 /* No overlap with grains or bodies above 1e-9 of the spot's radius. */
 bool quern_placer_free(const placer *, const quern_spot *);

@@ -27,16 +27,10 @@ QUERN_INLINE void stencil_place(const quern_grid_view *g, uint32_t block, uint32
 			quern_image_at(x[index[i]] - g->lower[axis], middle, images.half[axis], images.length[axis]);
 }
 
-/* x: whole columns; the particles are entries begin .. begin + n, or those that `index` names. */
-QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shape, uint32_t block,
-	quern_real *const x[3], uint32_t begin, const int32_t *index, uint32_t n, stencil *s) {
+/* Weights and slopes at the positions that stand in s. */
+QUERN_INLINE void stencil_weigh(const quern_grid_view *g, const quern_bound *shape, uint32_t n, stencil *s) {
 	quern_shape_batch b = { .n = n, .cap = STENCIL, .dim = g->dim, .inverse_cell = 1 / g->cell };
 	for (uint32_t a = 0; a < g->dim; a++) {
-		const quern_real lower = g->lower[a];
-		const quern_real *restrict from = x[a] + begin;
-		if (index) stencil_place(g, block, a, x[a], index, n, s->position[a]);
-		else
-			for (uint32_t i = 0; i < n; i++) s->position[a][i] = from[i] - lower;
 		b.position[a] = s->position[a];
 		b.wall[a][0] = g->periodic[a] ? INT32_MIN : 0;
 		b.wall[a][1] = g->periodic[a] ? INT32_MAX : g->cells[a];
@@ -44,6 +38,19 @@ QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shap
 		for (int k = 0; k < 3; k++) b.value[a][k] = s->value[a][k], b.slope[a][k] = s->slope[a][k];
 	}
 	((const quern_shape_ops *)shape->ops)->weights(shape->self, &b);
+}
+
+/* x: whole columns; the particles are entries begin .. begin + n, or those that `index` names. */
+QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shape, uint32_t block,
+	quern_real *const x[3], uint32_t begin, const int32_t *index, uint32_t n, stencil *s) {
+	for (uint32_t a = 0; a < g->dim; a++) {
+		const quern_real lower = g->lower[a];
+		const quern_real *restrict from = x[a] + begin;
+		if (index) stencil_place(g, block, a, x[a], index, n, s->position[a]);
+		else
+			for (uint32_t i = 0; i < n; i++) s->position[a][i] = from[i] - lower;
+	}
+	stencil_weigh(g, shape, n, s);
 	const int32_t span = (int32_t)g->span;
 	for (uint32_t i = 0; i < n; i++) {
 		int32_t node = 0;
@@ -94,10 +101,10 @@ QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, c
 	}
 }
 
-/* The weighted sum of a tile's rows at one particle in out[0]; with `slopes`, in out[1 + axis] their sums with the
- * functions' slopes. */
-QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
-	const bool slopes, quern_row out[4], int32_t span) {
+/* The weighted sum of a tile's rows at one particle in out[0]; with `slopes`, in out[1 + axis] their sums with what
+ * `slope` has in place of the weights along that axis. */
+QUERN_INLINE void stencil_gather_by(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
+	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4], int32_t span) {
 	quern_row sum = { 0 }, sx = { 0 }, sy = { 0 }, sz = { 0 };
 	for (int z = 0; z < (dim == 3 ? 3 : 1); z++) {
 		quern_row u = { 0 }, ux = { 0 }, uy = { 0 };
@@ -107,19 +114,24 @@ QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *
 				s->value[0][0][i] * row[0] + s->value[0][1][i] * row[1] + s->value[0][2][i] * row[2];
 			u += s->value[1][y][i] * e;
 			if (!slopes) continue;
-			const quern_row d =
-				s->slope[0][0][i] * row[0] + s->slope[0][1][i] * row[1] + s->slope[0][2][i] * row[2];
+			const quern_row d = slope[0][0][i] * row[0] + slope[0][1][i] * row[1] + slope[0][2][i] * row[2];
 			ux += s->value[1][y][i] * d;
-			uy += s->slope[1][y][i] * e;
+			uy += slope[1][y][i] * e;
 		}
 		const quern_real v = dim == 3 ? s->value[2][z][i] : 1;
 		sum += v * u;
 		sx += v * ux;
 		sy += v * uy;
-		if (dim == 3) sz += s->slope[2][z][i] * u;
+		if (dim == 3) sz += slope[2][z][i] * u;
 	}
 	out[0] = sum;
 	if (slopes) out[1] = sx, out[2] = sy, out[3] = sz;
+}
+
+/* The same with the functions' own slopes. */
+QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
+	const bool slopes, quern_row out[4], int32_t span) {
+	stencil_gather_by(s, i, tile, dim, slopes, s->slope, out, span);
 }
 
 /* ---- all blocks, where they add to nodes ---- */

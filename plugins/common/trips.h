@@ -2,7 +2,7 @@
 /* trips - from nodes to particles through a transfer, and round trips before that: what a transfer sends goes to the
  * nodes with the particles' mass, and its echo comes back. For points and grains alike. */
 #pragma once
-#include "stencil.h"
+#include "fit.h"
 #include "tools.h"
 #include <quern/transfer.h>
 #include <string.h>
@@ -53,11 +53,13 @@ QUERN_INLINE void trips_hear_echo(const trips *t, trip_memory *m, uint32_t n, co
 	}
 }
 
-/* `own`: the columns of the transfer's uses. */
-static inline void trips_call(const trips *t, trip_memory *m, quern_real *const velocity[3],
+/* `own`: the columns of the transfer's uses; `fit`: of a transfer that sends a matrix, else NULL. */
+static inline void trips_call(const trips *t, trip_memory *m, fit_memory *fit, quern_real *const velocity[3],
 	const quern_column *own, uint32_t n, bool last) {
 	const uint32_t dim = t->s->dim;
 	quern_transfer_batch b = { .n = n, .cap = STENCIL, .pass = t->pass, .dt = t->s->dt, .use = own };
+	for (uint32_t k = 0; k < dim * dim && fit && last; k++)
+		b.fit[k] = fit->fit[k], b.affine[k] = fit->affine[k], b.shift[k / dim] = fit->shift[k / dim];
 	for (uint32_t k = 0; k < dim; k++) {
 		b.pic[k] = m->pic[k];
 		b.change[k] = m->change[k];
@@ -81,7 +83,7 @@ QUERN_INLINE void trips_send(const trips *t, trip_memory *m, uint32_t i, quern_r
 static inline quern_status trips_run(
 	trips *t, void (*send)(void *arg, uint32_t block, uint32_t worker), void *arg) {
 	const quern_step *s = t->s;
-	const uint32_t passes = ((const quern_transfer_ops *)t->transfer->ops)->passes;
+	const uint32_t passes = quern_transfer_trips(t->transfer->ops, t->transfer->self);
 	const size_t nodes = (size_t)t->g->n_blocks * QUERN_BLOCK_CELLS;
 	if (!passes) return QUERN_OK;
 	quern_row *echo = s->host->memory(s->run, nodes * sizeof(quern_row));

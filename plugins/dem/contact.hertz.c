@@ -22,7 +22,7 @@ static const quern_param params[] = { QUERN_PARAM(hertz, young, "Pa", "Young's m
 #define USES(X) \
 	X(SHEAR, "contact.shear", "N", QUERN_UPDATE, QUERN_AXIAL, .when = "friction", \
 		.doc = "Elastic tangential force; 2-D: along the normal turned left.") \
-	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS, .when = "friction", \
+	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_EXISTS, .when = "friction", \
 		.doc = "Angular velocity; a frictional contact turns its grains.")
 /* clang-format on */
 QUERN_USE_ENUM(USES);

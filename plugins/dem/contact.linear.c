@@ -32,7 +32,7 @@ static const quern_use uses[] = { { .field = "contact.slip",
 		.doc = "Angular velocity; a frictional contact turns its grains.",
 		.access = QUERN_READ,
 		.shape = QUERN_AXIAL,
-		.flags = QUERN_OTHERS,
+		.flags = QUERN_OTHERS | QUERN_EXISTS,
 		.when = "friction" },
 	QUERN_END_USES };
 

@@ -28,7 +28,7 @@ static const quern_param params[] = { QUERN_PARAM(rolling, stiffness, "N/m",
 	X(TWIST, "contact.twist", "m", QUERN_UPDATE, QUERN_SCALAR, .when = "twisting_friction", \
 		.doc = "Twisting spring, about the normal.") \
 	X(COUPLE, "contact.couple", "N m", QUERN_ADD, QUERN_AXIAL, .doc = "On the first.") \
-	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS, .doc = "Angular velocity.")
+	X(SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_EXISTS, .doc = "Angular velocity.")
 /* clang-format on */
 QUERN_USE_ENUM(USES);
 static const quern_use uses[] = QUERN_USE_ROWS(USES);

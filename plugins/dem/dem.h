@@ -21,6 +21,7 @@ typedef struct dem {
 	int32_t settle_most;
 	bool fixed;    /* some grains do not move */
 	bool features; /* some bodies have several */
+	bool moving;   /* some bodies do */
 	bool outlets, sources;
 	bool settles;
 	quern_real reach;  /* m, of the laws beyond touching */

@@ -12,6 +12,7 @@ typedef struct {
 	const dem *d;
 	const quern_step *step;
 	placer placer;
+	const body_pose *pose; /* by body */
 	dem_place *grain;
 	uint32_t n, cap;
 	uint64_t draws;
@@ -155,7 +156,8 @@ static bool may_stand(const filling *f, const dem_place *grain, char why[WORDS])
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES] && !grain->fixed; b++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
 		if (!quern_body_is_there(body, f->d->settles)) continue;
-		const quern_real in = -quern_body_gap(body, s->dim, spot.x, spot.radius, NULL) / spot.radius;
+		const quern_real in =
+			-quern_body_gap(body, &f->pose[b], s->dim, spot.x, spot.radius, NULL) / spot.radius;
 		if (!(in > (1 + 1e-9) * f->d->overlap_start)) continue;
 		char which[BODY_WORDS];
 		quern_body_say(body, b, which);
@@ -246,6 +248,8 @@ static quern_status open_placer(filling *f, const grain_table *table) {
 				s->upper[k] - s->lower[k], k);
 	const quern_status status = quern_placer_init(&f->placer, s->dim, s->lower, s->upper, s->periodic, most);
 	f->placer.body = s->slot[SLOT_BODIES];
+	f->placer.pose = f->pose = quern_body_poses_now(s, SLOT_BODIES);
+	if (!f->pose) return QUERN_E_MEMORY;
 	return status;
 }
 

@@ -54,6 +54,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	carve_columns(&c, &w->mass, 1, cap);
 	carve_columns(&c, &w->weight, 1, cap);
 	carve_columns(&c, w->force, dim, cap);
+	if (sh->works || sh->books) carve_columns(&c, w->wall, dim, cap);
 	carve_columns(&c, w->arm, 2, cap);
 	if (sh->spin) {
 		carve_columns(&c, w->spin, dim == 3 ? 3 : 1, cap);
@@ -135,8 +136,15 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 		sh->most_grains = n > sh->most_grains ? n : sh->most_grains;
 	}
 	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
-	sh->impulse =
-		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * 3 * sizeof(quern_real));
+	sh->booked =
+		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * N_BOOKED * sizeof(quern_real));
+	/* an integrator in two parts has moved the grains on already: bodies are where they will be then */
+	const quern_real ahead = !sh->looks && integrator->open[s->dim - 2] ? 1 : 0;
+	const quern_real now = s->time + ((quern_real)s->within + ahead) * s->dt;
+	sh->pose = quern_body_poses(s, SLOT_BODIES, now, now);
+	if (!sh->pose) return false;
+	sh->works = !sh->looks && s->use[FORCE_WORK].real[0];
+	sh->twists = !sh->looks && s->use[FORCE_TWIST].real[0];
 	sh->sums = s->host->memory(s->run, (size_t)grains.n_blocks * N_ENERGIES * sizeof(quern_real));
 	sh->farthest = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(quern_real));
 	sh->turned = s->host->memory(s->run, (size_t)grains.n_blocks * 2 * sizeof(quern_real));
@@ -150,7 +158,23 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	}
 	if (!sh->bad || !sh->outside) return false;
 	for (uint32_t b = 0; b < grains.n_blocks; b++) sh->bad[b] = sh->outside[b] = -1;
-	return sh->impulse && sh->sums && sh->farthest && sh->turned;
+	return sh->booked && sh->sums && sh->farthest && sh->turned;
+}
+
+/* How far bodies have come at most since the last list: at the speed at the beginning of the step or at its end. A list holds
+ * while neither two grains, nor a grain and a body, have used up the skin. */
+static quern_real farthest_with_bodies(const forces_shared *sh, quern_real farthest) {
+	const quern_step *s = sh->s;
+	quern_real *swept = sh->use[FORCE_SWEPT].real[0];
+	if (!swept || s->settling) return farthest;
+	const quern_real now = s->time + (quern_real)s->within * s->dt;
+	*swept += quern_bodies_speed(s, SLOT_BODIES, now - s->dt, now + 2 * s->dt) * s->dt;
+	return fmax(farthest, 0.5 * (farthest + *swept));
+}
+
+static void add_booked(
+	const quern_column *to, int first, uint32_t n, uint32_t body, const quern_real *booked) {
+	for (uint32_t k = 0; k < n && to->real[0]; k++) to->real[k][body] += booked[first + (int)k];
 }
 
 /* Blocks in order, so that sums do not depend on who did what. */
@@ -162,15 +186,17 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	for (uint32_t b = 0; b < n_blocks; b++) {
 		const quern_real way = sqrt(sh->farthest[b]);
 		farthest = way > farthest ? way : farthest;
-		for (uint32_t k = 0; k < s->dim && !s->settling; k++) {
-			const quern_real *impulse = sh->impulse + (size_t)b * (sh->n_bodies + 1) * 3;
-			for (uint32_t body = 0; body < sh->n_bodies && u[FORCE_IMPULSE].real[0]; body++)
-				u[FORCE_IMPULSE].real[k][body] += impulse[body * 3 + k];
-			if (u[FORCE_SUPPORT].real[0]) u[FORCE_SUPPORT].real[k][0] += impulse[sh->n_bodies * 3 + k];
+		for (uint32_t body = 0; body < sh->n_bodies && !s->settling; body++) {
+			const quern_real *booked = quern_dem_booked(sh, b, body);
+			add_booked(&u[FORCE_IMPULSE], B_IMPULSE, s->dim, body, booked);
+			add_booked(&u[FORCE_TWIST], B_TWIST, s->dim == 3 ? 3 : 1, body, booked);
+			add_booked(&u[FORCE_WORK], B_WORK, 1, body, booked);
 		}
+		if (!s->settling)
+			add_booked(&u[FORCE_SUPPORT], B_IMPULSE, s->dim, 0, quern_dem_booked(sh, b, sh->n_bodies));
 		for (int e = 0; e < N_ENERGIES; e++) energy[e] += sh->sums[(size_t)b * N_ENERGIES + (uint32_t)e];
 	}
-	u[FORCE_DISPLACEMENT].real[0][0] = farthest;
+	u[FORCE_DISPLACEMENT].real[0][0] = farthest_with_bodies(sh, farthest);
 	if (u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
 	if (u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
 }

@@ -24,6 +24,9 @@ enum {
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
+/* Impulse, its moment about the pivot, and work. */
+enum { B_IMPULSE, B_TWIST = 3, B_WORK = 6, N_BOOKED };
+
 /* A row at once: the same bits for any instruction set. */
 typedef quern_real lanes8 __attribute__((vector_size(64)));
 
@@ -41,13 +44,15 @@ typedef struct forces_shared {
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
 	bool spin, couple;
-	quern_real dt; /* s, by which springs move */
-	bool books;    /* losses of this step are booked */
-	bool looks;    /* nothing moves: forces and energies of the state as it is */
-	bool starts;   /* losses will be booked from now on: what springs hold is noted */
+	bool works, twists;    /* what bodies do, and their torques, are booked */
+	const body_pose *pose; /* by body */
+	quern_real dt;         /* s, by which springs move */
+	bool books;            /* losses of this step are booked */
+	bool looks;            /* nothing moves: forces and energies of the state as it is */
+	bool starts;           /* losses will be booked from now on: what springs hold is noted */
 	quern_images images;
 	const uint32_t *grain, *contact, *touch; /* partitions */
-	quern_real *impulse;  /* [block][body + 1][dim]: on the material, by bodies and by fixed grains */
+	quern_real *booked;   /* [block][body + 1][N_BOOKED]: on the material, by bodies and by fixed grains */
 	quern_real *sums;     /* [block][N_ENERGIES] */
 	quern_real *farthest; /* [block] square of the way since the last list */
 	quern_real *turned;   /* [block][2] sums of m v.v', of old and new velocity, and of m */
@@ -65,6 +70,7 @@ typedef struct law_row {
 /* A worker's columns: `cap` pairs, then a block's sums. */
 typedef struct forces_work {
 	quern_real *overlap, *normal[3], *velocity[3], *spin[3], *turn[3], *radius, *mass, *weight, *arm[2];
+	quern_real *wall[3]; /* velocity of a body that moves, where it is touched */
 	quern_real *force[3], *couple[3], *dashpot[3], *drag_couple[3], *stored, *sheared, *rubbed, *torque[3],
 		*drag_torque[3];
 	law_row *rows; /* of all laws, one after the other */
@@ -82,6 +88,11 @@ typedef struct contact_chunk {
 	uint32_t begin, n_slots, n; /* entries begin .. begin + n_slots of the list, of which n are looked at */
 	quern_real *held;           /* by slot: what springs held in the last step; NULL: nobody asks */
 } contact_chunk;
+
+/* What a body (n_bodies: fixed grains) has given to the grains of a block in this step. */
+QUERN_INLINE quern_real *quern_dem_booked(const forces_shared *sh, uint32_t block, uint32_t body) {
+	return sh->booked + ((size_t)block * (sh->n_bodies + 1) + body) * N_BOOKED;
+}
 
 /* Adds what the contacts of block b do to its rows, and to its energies. */
 void quern_dem_pairs(const forces_shared *, forces_work *, uint32_t b, quern_real *sums);

@@ -25,6 +25,7 @@ typedef struct {
 	const int32_t *entry;
 	const int32_t *old_first, *old_second;
 	const int32_t *old_feature; /* of touches; NULL: entries of one pair are one */
+	const body_pose *pose;      /* by body */
 } listing;
 
 /* ---- sorting ---- */
@@ -203,33 +204,43 @@ static quern_status list_contacts(listing *l) {
 enum { CHUNK = 256, MOST_FEATURES = 64 };
 
 typedef struct {
-	_Alignas(64) quern_real gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
+	_Alignas(64) quern_real position[3][CHUNK], gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
 	int32_t feature[MOST_FEATURES];
 } near_body;
 
-static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
-
-/* Gaps of m grains from `first` on to the body's nearest place. */
-static void find_gaps(const listing *l, const quern_bound *body, uint32_t first, uint32_t m, near_body *w) {
-	quern_body_batch batch = {
-		.n = m, .cap = CHUNK, .dim = l->s->dim, .pose = &still, .radius = l->job.radius + first, .gap = w->gap
-	};
+/* Gaps of m grains from `first` on to the nearest place of body b. */
+static void find_gaps(const listing *l, uint32_t b, uint32_t first, uint32_t m, near_body *w) {
+	const quern_bound *body = &l->s->slot[SLOT_BODIES][b];
+	quern_body_batch batch = { .n = m,
+		.cap = CHUNK,
+		.dim = l->s->dim,
+		.pose = &l->pose[b].pose,
+		.radius = l->job.radius + first,
+		.gap = w->gap };
 	for (uint32_t k = 0; k < l->s->dim; k++) {
 		batch.position[k] = l->job.position[k] + first;
 		batch.normal[k] = w->normal[k];
 		batch.velocity[k] = w->velocity[k];
+		if (l->pose[b].repeats) batch.position[k] = w->position[k];
 	}
+	if (l->pose[b].repeats)
+		quern_motion_bring_all(&l->pose[b], l->s->dim, m,
+			(const quern_real *const[3]) { l->job.position[0] + first, l->job.position[1] + first,
+				l->s->dim == 3 ? l->job.position[2] + first : NULL },
+			(quern_real *const[3]) { w->position[0], w->position[1], w->position[2] });
 	((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 }
 
 /* The features of a body that a grain is near; a body without any is feature 0. */
-static uint32_t find_features(const listing *l, const quern_bound *body, uint32_t i, near_body *w) {
+static uint32_t find_features(const listing *l, uint32_t b, uint32_t i, near_body *w) {
+	const quern_bound *body = &l->s->slot[SLOT_BODIES][b];
 	const quern_body_ops *ops = body->ops;
 	quern_real x[3] = { 0 };
 	w->feature[0] = 0;
 	if (!ops->features) return 1;
-	for (uint32_t k = 0; k < l->s->dim; k++) x[k] = l->job.position[k][i];
-	return ops->features(body->self, &still, x, l->job.radius[i] + l->job.reach, MOST_FEATURES, w->feature);
+	for (uint32_t k = 0; k < l->s->dim; k++) x[k] = quern_motion_bring(&l->pose[b], k, l->job.position[k][i]);
+	return ops->features(
+		body->self, &l->pose[b].pose, x, l->job.radius[i] + l->job.reach, MOST_FEATURES, w->feature);
 }
 
 /* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too
@@ -238,14 +249,13 @@ static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, con
 	const quern_step *s = l->s;
 	uint32_t n = 0;
 	for (uint32_t body = 0; body < s->n_slot[SLOT_BODIES]; body++) {
-		const quern_bound *bound = &s->slot[SLOT_BODIES][body];
-		if (!quern_body_is_there(bound, s->settling)) continue;
+		if (!quern_body_is_there(&s->slot[SLOT_BODIES][body], s->settling)) continue;
 		for (uint32_t i = l->job.block[b]; i < l->job.block[b + 1]; i += CHUNK) {
 			const uint32_t m = l->job.block[b + 1] - i < CHUNK ? l->job.block[b + 1] - i : CHUNK;
-			find_gaps(l, bound, i, m, w);
+			find_gaps(l, body, i, m, w);
 			for (uint32_t k = 0; k < m; k++) {
 				if (!(w->gap[k] < l->job.reach) || (l->fixed && l->fixed[i + k])) continue;
-				const uint32_t features = find_features(l, bound, i + k, w);
+				const uint32_t features = find_features(l, body, i + k, w);
 				if (features > MOST_FEATURES) return UINT32_MAX;
 				for (uint32_t f = 0; f < features; f++, n++) {
 					if (!to) continue;
@@ -276,6 +286,8 @@ static void gather_touches(void *arg, uint32_t b, uint32_t worker) {
 
 static quern_status list_touches(listing *l) {
 	const quern_step *s = l->s;
+	l->pose = quern_body_poses_now(s, SLOT_BODIES);
+	if (!l->pose) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, l->job.n_blocks, count_touches, l);
 	l->start[0] = 0;
 	for (uint32_t b = 0; b < l->job.n_blocks; b++) {
@@ -345,8 +357,10 @@ static quern_status keep_inside(const listing *l) {
 	return QUERN_OK;
 }
 
-/* At the release other bodies are there than while settling, whatever has moved. */
-static bool is_release(const quern_step *s) { return !s->settling && s->step == 0 && s->substep == 0; }
+/* At the release other bodies are there than while settling, whatever has moved; and when a stage of the scene begins. */
+static bool is_release(const quern_step *s) {
+	return !s->settling && s->within == 0 && (s->step == 0 || s->step == s->stage_step);
+}
 
 /* Before the first step there is no list yet, or that of settling; after it there always is one. */
 quern_status quern_dem_list(const void *self, const quern_step *s) {
@@ -369,5 +383,6 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 		memcpy(
 			s->use[NEAR_ANCHOR].real[k], s->use[NEAR_POSITION].real[k], (size_t)l.job.n * sizeof(quern_real));
 	s->use[NEAR_DISPLACEMENT].real[0][0] = 0;
+	if (s->use[NEAR_SWEPT].real[0]) s->use[NEAR_SWEPT].real[0][0] = 0;
 	return QUERN_OK;
 }

@@ -118,7 +118,7 @@ static uint32_t points_near(pouring *p, obstacle *near) {
 	return m;
 }
 
-static bool gather_near(pouring *p, const quern_bound *body, uint32_t n_bodies) {
+static bool gather_near(pouring *p) {
 	const quern_step *s = p->s;
 	const size_t all = (size_t)s->host->set(s->run, "grain").n + s->host->set(s->run, "point").n;
 	obstacle *near = s->host->memory(s->run, (all + 1) * sizeof *near);
@@ -127,9 +127,9 @@ static bool gather_near(pouring *p, const quern_bound *body, uint32_t n_bodies) 
 	m += points_near(p, near + m);
 	p->most = quern_radius_most(&p->law);
 	for (uint32_t q = 0; q < m; q++) p->most = fmax(p->most, near[q].spot.radius);
-	if (quern_placer_init(&p->placer, s->dim, s->lower, s->upper, s->periodic, p->most) != QUERN_OK)
+	if (quern_placer_init(&p->placer, s->dim, s->lower, s->upper, s->periodic, p->most) != QUERN_OK ||
+		!quern_placer_bodies(&p->placer, s, SLOT_BODIES, false))
 		return false;
-	p->placer.body = body, p->placer.n_bodies = n_bodies;
 	for (uint32_t q = 0; q < m; q++) quern_placer_add(&p->placer, &near[q].spot);
 	return !p->placer.failed;
 }
@@ -198,13 +198,13 @@ static quern_status add_grains(const pouring *p) {
 	return QUERN_OK;
 }
 
-static quern_status pour_one(pouring *p, const quern_bound *body, uint32_t n_bodies) {
+static quern_status pour_one(pouring *p) {
 	const quern_step *s = p->s;
 	int32_t *draws = &s->use[POUR_DRAWS].index[p->i];
 	p->draws = (uint32_t)*draws;
 	p->rest = quern_source_due(p->item, s->time) - s->use[POURED_MASS].real[0][p->i];
 	if (is_due(p)) {
-		p->failed = !gather_near(p, body, n_bodies);
+		p->failed = !gather_near(p);
 		if (!p->failed) pack(p, &s->slot[SLOT_SOURCE_PACKER][p->i]);
 		quern_placer_finish(&p->placer);
 		if (p->failed) return QUERN_E_MEMORY;
@@ -216,17 +216,14 @@ static quern_status pour_one(pouring *p, const quern_bound *body, uint32_t n_bod
 
 quern_status quern_dem_pour(const void *self, const quern_step *s) {
 	pouring p = { .d = self, .s = s, .law = ((const dem *)self)->radii };
-	quern_bound *body = s->host->memory(s->run, ((size_t)s->n_slot[SLOT_BODIES] + 1) * sizeof(quern_bound));
-	quern_status status = body ? QUERN_OK : QUERN_E_MEMORY;
-	uint32_t n_bodies = 0;
+	/* as many as the scene itself has, whatever one of its stages says */
+	const uint32_t n = s->host->set(s->run, "grain_source").n;
+	quern_status status = QUERN_OK;
 	p.law.stream += 2; /* after those of the fill and of its packers */
-	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES] && body; b++)
-		if (quern_body_is_there(&s->slot[SLOT_BODIES][b], s->settling))
-			body[n_bodies++] = s->slot[SLOT_BODIES][b];
-	for (p.i = 0; p.i < p.d->source.n && status == QUERN_OK; p.i++) {
+	for (p.i = 0; p.i < p.d->source.n && p.i < n && status == QUERN_OK; p.i++) {
 		p.item = (const source *)p.d->source.items + p.i;
 		p.n = 0;
-		if (quern_source_acts(p.item, s)) status = pour_one(&p, body, n_bodies);
+		if (quern_source_acts(p.item, s)) status = pour_one(&p);
 	}
 	free(p.grain);
 	return status;

@@ -9,6 +9,9 @@
 #define DISPLACEMENT_USE \
 	"total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY, \
 	.doc = "Farthest way of a grain since the last list; infinite: the list is stale."
+#define SWEPT_USE(access) \
+	"total.swept", "m", access, QUERN_SCALAR, .when = "moving", \
+	.doc = "Farthest way of a body's surface since the last list, at most."
 #define FIXED_USE(access) \
 	"grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed", .doc = "1: it does not move."
 #define ENERGY_USE(name, access, text) \
@@ -76,6 +79,7 @@ QUERN_USE_ENUM(POUR_USES);
 	X(NEAR_ID, "grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS) \
 	X(NEAR_FIXED, FIXED_USE(QUERN_READ)) \
 	X(NEAR_DISPLACEMENT, DISPLACEMENT_USE) \
+	X(NEAR_SWEPT, SWEPT_USE(QUERN_WRITE)) \
 	X(NEAR_ANCHOR, "grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made.") \
 	X(NEAR_FIRST, "contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", \
 		.doc = "The grain of lower id.") \
@@ -125,7 +129,10 @@ QUERN_USE_ENUM(LOOK_USES);
 #define MOVE_USES(X) \
 	X(FORCE_ANCHOR, "grain.anchor", "m", QUERN_READ, QUERN_VECTOR) \
 	X(FORCE_DISPLACEMENT, DISPLACEMENT_USE) \
+	X(FORCE_SWEPT, SWEPT_USE(QUERN_UPDATE)) \
 	X(FORCE_IMPULSE, "body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED) \
+	X(FORCE_TWIST, "body.twist", "N m s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL | QUERN_RELEASED) \
+	X(FORCE_WORK, "body.work", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED) \
 	X(FORCE_SUPPORT, "total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, \
 		.doc = "Impulse that fixed grains have given to moving ones.") \
 	X(FORCE_DAMPED, ENERGY_USE("damped", QUERN_UPDATE, "Lost in dashpots so far.")) \

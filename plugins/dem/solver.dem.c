@@ -26,7 +26,7 @@ static const quern_param place_rows[] = { QUERN_PARAM(
 static const quern_param source_rows[] = SOURCE_ROWS(100);
 static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.density", "kg/m^3",
 										  "Density of the grains' material.",
-										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e6),
 	QUERN_PARAM_AS(dem, radii.mean, "material.radius.mean", "m", "Mean radius.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM_AS(dem, radii.spread, "material.radius.spread", "1",
@@ -63,6 +63,8 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(dem, features, NULL,
 		"Keep with every touch which feature of the body it is on; set by itself where bodies have several.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, moving, NULL, "Watch how far bodies have moved; set by itself where one does.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(dem, outlets, NULL,
 		"Take out what passes an open face; set by itself where the domain has one.",
@@ -234,7 +236,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	setup->host->publish(setup, "grain.sources", "1", d->source.n);
 	if (d->file) d->fixed = true; /* its header may say so */
 	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = 2 * d->radii.mean;
-	if (d->settles && !(gravity > 0))
+	if (d->settles && !(gravity > 0) && !setup->later)
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
@@ -295,6 +297,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	if (n_slot[SLOT_CONTACT] && ((const quern_contact_ops *)slot[SLOT_CONTACT][0].ops)->follows)
 		return refuse_order(setup, &slot[SLOT_CONTACT][0], err);
 	d->features = false;
+	d->moving = n_slot[SLOT_BODIES] && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
 	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
@@ -429,7 +432,12 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	if (isfinite(fast.period)) say_limit(&fast, &first, by_period, reason);
 	else snprintf(reason, 160, "grains without a contact law");
 	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
-	return by_period ? fast.period / 50 : 0.5 * first.hard;
+	const quern_real chosen = by_period ? fast.period / 50 : 0.5 * first.hard;
+	const quern_real speed =
+		d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY) : 0;
+	if (!(0.1 * l.radius < speed * chosen)) return chosen;
+	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, l.radius);
+	return 0.1 * l.radius / speed;
 }
 
 enum { SUM_DISCRETE = SUM_OWN, SUM_LEFT, SUM_POURED };
@@ -442,8 +450,9 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_real *radius = use[FILL_RADIUS].real[0], turning = quern_radius_inertia(s->dim);
 	const uint32_t n_spin = !use[FILL_SPIN].real[0] ? 0 : s->dim == 3 ? 3 : 1;
 	cloud_sums c;
+	(void)self;
 	out[SUM_LEFT] = book_total(use[FILL_LEFT].real[0], outlet_faces(s));
-	out[SUM_POURED] = book_total(use[FILL_POURED].real[0], ((const dem *)self)->source.n);
+	out[SUM_POURED] = book_total(use[FILL_POURED].real[0], s->host->set(s->run, "grain_source").n);
 	if (!grains.n || !cloud_open(&c, s->host, s->run, &grains)) return;
 	cloud_account(&c, &use[FILL_POSITION], &use[FILL_VELOCITY], s, out);
 	out[SUM_DISCRETE] += cloud_total(&c);

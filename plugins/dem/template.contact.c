@@ -19,13 +19,13 @@ static const quern_param params[] = { QUERN_PARAM(law, stiffness, "N/m", "Force 
 	QUERN_PARAM(law, friction, "1", "Most drag over normal force; 0: no drag.", .def = 0.5, .max = 10),
 	QUERN_END_PARAMS };
 
-/* Friction turns grains: a spin must exist. History of a contact would be one more row, "contact.NAME", QUERN_UPDATE. */
+/* Friction turns grains: a spin must exist, though the law does not look at it. History of a contact would be one more row, "contact.NAME", QUERN_UPDATE. */
 static const quern_use uses[] = { { .field = "grain.spin",
 									  .unit = "rad/s",
 									  .doc = "Angular velocity; a frictional contact turns its grains.",
 									  .access = QUERN_READ,
 									  .shape = QUERN_AXIAL,
-									  .flags = QUERN_OTHERS,
+									  .flags = QUERN_OTHERS | QUERN_EXISTS,
 									  .when = "friction" },
 	QUERN_END_USES };
 

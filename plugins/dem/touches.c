@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* touches - grains of one block on bodies: geometry and motion, with the body for a second grain that never moves */
 #include "forces.h"
+#include <string.h>
 
 /* The same grain stands for both, since whatever a law asks of the second it gets from the first. */
 static void load(const forces_shared *sh, forces_work *w, const contact_chunk *c) {
@@ -17,20 +18,33 @@ static void load(const forces_shared *sh, forces_work *w, const contact_chunk *c
 	}
 }
 
+/* A body that turns is faster at its surface than half an overlap away, in the middle of the contact. */
+static void to_the_middle(const forces_work *w, const quern_pose *pose, uint32_t n, uint32_t dim) {
+	const quern_vec spin = QUERN_VEC_OF(pose->spin);
+	for (uint32_t q = 0; q < n; q++) {
+		const quern_real overlap = w->overlap[q] > 0 ? w->overlap[q] : 0;
+		const quern_vec v = quern_vec_axpy(-0.5 * overlap,
+			quern_vec_cross(spin, QUERN_VEC_AT(w->normal, q, dim)), QUERN_VEC_AT(w->velocity, q, dim));
+		QUERN_VEC_PUT(w->velocity, q, v, dim);
+	}
+}
+
 /* Leaves the surface's velocity in that of the contact. */
 static void geometry(const forces_shared *sh, forces_work *w, const contact_chunk *c) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+	const body_pose *at = &sh->pose[c->body];
 	const quern_bound *bound = &sh->s->slot[SLOT_BODIES][c->body];
 	const quern_body_ops *ops = bound->ops;
 	quern_real *x[3] = { w->arm[1], w->force[0], w->force[1] }; /* free until the laws are called */
 	for (uint32_t k = 0; k < sh->s->dim; k++)
 		quern_gather(QUERN_VECTOR, x[k], sh->use[FORCE_OLD_POSITION].real[k], 0, w->first, c->n);
+	if (at->repeats)
+		quern_motion_bring_all(at, sh->s->dim, c->n, (const quern_real *const[3]) { x[0], x[1], x[2] }, x);
 	for (uint32_t q = 0; q < c->n && ops->features; q++)
 		w->feature[q] = sh->use[FORCE_FEATURE].index[c->begin + q];
 	const quern_body_batch batch = { .n = c->n,
 		.cap = sh->cap,
 		.dim = sh->s->dim,
-		.pose = &still,
+		.pose = &at->pose,
 		.radius = w->radius,
 		.feature = ops->features ? w->feature : NULL,
 		.position = { x[0], x[1], x[2] },
@@ -44,6 +58,9 @@ static void geometry(const forces_shared *sh, forces_work *w, const contact_chun
 		w->overlap[q] = gap < 1e100 ? -gap : -1e100;
 		w->arm[0][q] = w->radius[q] - 0.5 * w->overlap[q];
 	}
+	if (at->moves) to_the_middle(w, &at->pose, c->n, sh->s->dim);
+	for (uint32_t k = 0; k < sh->s->dim && at->moves && w->wall[0]; k++)
+		memcpy(w->wall[k], w->velocity[k], c->n * sizeof(quern_real));
 }
 
 /* v_c = v_i - v_body + w_i x b_i with b_i = -arm_i n */
@@ -70,6 +87,16 @@ QUERN_INLINE void motion(
 	}
 }
 
+/* A law sees how a grain turns against what it touches. */
+static void turn_with(const forces_work *w, const quern_pose *pose, uint32_t n, uint32_t dim) {
+	for (uint32_t q = 0; q < n; q++)
+		for (uint32_t k = 0; k < (dim == 3 ? 3u : 1u); k++) {
+			const quern_real of = pose->spin[dim == 3 ? k : 2];
+			w->spin[k][q] -= of;
+			if (dim == 3) w->turn[k][q] += 0.5 * of;
+		}
+}
+
 static void move(const forces_shared *sh, const forces_work *w, uint32_t n) {
 	if (sh->s->dim == 2) {
 		if (sh->spin) motion(sh, w, n, 2, true);
@@ -78,13 +105,71 @@ static void move(const forces_shared *sh, const forces_work *w, uint32_t n) {
 	else motion(sh, w, n, 3, false);
 }
 
-/* What the body gives. */
+/* ---- what the body gives ---- */
+
 static void book_impulse(const forces_shared *sh, const forces_work *w, const contact_chunk *c) {
 	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
-	quern_real *impulse = sh->impulse + ((size_t)c->block * (sh->n_bodies + 1) + (uint32_t)c->body) * 3;
+	quern_real *impulse = quern_dem_booked(sh, c->block, (uint32_t)c->body) + B_IMPULSE;
 	for (uint32_t q = 0; q < c->n; q++)
 		for (uint32_t k = 0; k < sh->s->dim; k++)
 			impulse[k] += (weighted ? w->weight[q] : 1) * w->force[k][q] * sh->s->dt;
+}
+
+QUERN_INLINE quern_vec couple_at(quern_real *const couple[3], uint32_t q, uint32_t dim) {
+	if (!couple[0]) return (quern_vec) { 0, 0, 0 };
+	return dim == 3 ? QUERN_VEC_AT(couple, q, 3) : (quern_vec) { 0, 0, couple[0][q] };
+}
+
+/* A grain's centre, as the body's nearest image sees it. */
+QUERN_INLINE quern_vec place_of(const forces_shared *sh, const contact_chunk *c, int32_t grain) {
+	quern_real x[3] = { 0 };
+	for (uint32_t k = 0; k < sh->s->dim; k++)
+		x[k] = quern_motion_bring(&sh->pose[c->body], k, sh->use[FORCE_OLD_POSITION].real[k][grain]);
+	return QUERN_VEC_OF(x);
+}
+
+/* About the pivot, of the force in the middle of the contact. */
+static void book_twist(const forces_shared *sh, const forces_work *w, const contact_chunk *c) {
+	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
+	const uint32_t dim = sh->s->dim;
+	const quern_vec pivot = QUERN_VEC_OF(sh->pose[c->body].pivot);
+	quern_real *twist = quern_dem_booked(sh, c->block, (uint32_t)c->body) + B_TWIST;
+	for (uint32_t q = 0; q < c->n; q++) {
+		const quern_vec x = place_of(sh, c, w->first[q]);
+		const quern_vec at = quern_vec_axpy(-w->arm[0][q], QUERN_VEC_AT(w->normal, q, dim), x);
+		const quern_vec moment =
+			quern_vec_add(quern_vec_cross(quern_vec_sub(at, pivot), QUERN_VEC_AT(w->force, q, dim)),
+				couple_at(w->couple, q, dim));
+		const quern_real share = (weighted ? w->weight[q] : 1) * sh->s->dt;
+		if (dim == 3) twist[0] += share * moment.x, twist[1] += share * moment.y;
+		twist[dim == 3 ? 2 : 0] += share * moment.z;
+	}
+}
+
+/* Power of a force and a couple where the body moves. */
+QUERN_INLINE quern_real power(const forces_work *w, quern_real *const force[3], quern_real *const couple[3],
+	quern_vec spin, uint32_t q, uint32_t dim) {
+	return quern_vec_dot(QUERN_VEC_AT(force, q, dim), QUERN_VEC_AT(w->wall, q, dim), 3) +
+		   quern_vec_dot(couple_at(couple, q, dim), spin, 3);
+}
+
+/* What a dashpot takes goes with the speed against the body; of that the grain's part is booked with the grain. */
+static void book_work(
+	const forces_shared *sh, const forces_work *w, const contact_chunk *c, quern_real *sums) {
+	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
+	const quern_vec spin = QUERN_VEC_OF(sh->pose[c->body].pose.spin);
+	quern_real *work = quern_dem_booked(sh, c->block, (uint32_t)c->body) + B_WORK;
+	for (uint32_t q = 0; q < c->n; q++) {
+		const quern_real share = (weighted ? w->weight[q] : 1) * sh->s->dt;
+		if (sh->works) *work += share * power(w, w->force, w->couple, spin, q, sh->s->dim);
+		if (sh->books) sums[E_DAMPED] += share * power(w, w->dashpot, w->drag_couple, spin, q, sh->s->dim);
+	}
+}
+
+static void book(const forces_shared *sh, const forces_work *w, const contact_chunk *c, quern_real *sums) {
+	book_impulse(sh, w, c);
+	if (sh->twists) book_twist(sh, w, c);
+	if (sh->pose[c->body].moves && w->wall[0]) book_work(sh, w, c, sums);
 }
 
 /* A chunk is of one body. */
@@ -97,7 +182,8 @@ void quern_dem_touches(const forces_shared *sh, forces_work *w, uint32_t b, quer
 		load(sh, w, &c);
 		geometry(sh, w, &c);
 		move(sh, w, n);
+		if (sh->spin && sh->pose[c.body].moves) turn_with(w, &sh->pose[c.body].pose, n, sh->s->dim);
 		quern_dem_act(sh, w, &c, sums);
-		book_impulse(sh, w, &c);
+		book(sh, w, &c, sums);
 	}
 }

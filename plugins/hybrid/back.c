@@ -2,6 +2,7 @@
 /* back - what the exchange has changed, from the nodes to the grains, through a transfer */
 #include "../common/trips.h"
 #include "meet.h"
+#include "solve.h"
 #include <math.h>
 
 typedef struct {
@@ -74,7 +75,7 @@ static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool l
 			quern_set_component(&own[r], shape, k, m->rows[r][k]);
 		}
 	}
-	trips_call(&w->trips, &m->trip, velocity, own, n, last);
+	trips_call(&w->trips, &m->trip, NULL, velocity, own, n, last);
 	for (uint32_t r = 0; r < transfer->n_uses; r++) {
 		const uint8_t shape = transfer->uses[r].shape;
 		if (transfer->uses[r].access == QUERN_READ) continue;
@@ -87,19 +88,25 @@ static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool l
 
 /* The impulse is spread over the substeps: the path of a grain is moved by (n + 1)/(2 n) dt dv. With the whole dt dv
  * the scheme is unstable: docs/theory/hybrid.md, section 2. */
+quern_real quern_hybrid_move(const hybrid *h, const quern_step *s, int32_t i, const quern_real velocity[3]) {
+	const quern_column *u = s->use;
+	const quern_real share = 0.5 * (h->substeps + 1) / h->substeps * s->dt;
+	quern_real way = 0;
+	for (uint32_t a = 0; a < s->dim; a++) {
+		const quern_real jump = velocity[a] - u[B_VELOCITY].real[a][i];
+		u[B_VELOCITY].real[a][i] = velocity[a];
+		u[B_POSITION].real[a][i] += share * jump;
+		const quern_real d = u[B_POSITION].real[a][i] - u[B_ANCHOR].real[a][i];
+		way += d * d;
+	}
+	return way;
+}
+
 static void move_grains(const back_work *w, const back_memory *m, uint32_t b, uint32_t n) {
-	const quern_column *u = w->s->use;
-	const quern_real share = 0.5 * (w->h->substeps + 1) / w->h->substeps * w->s->dt;
 	for (uint32_t k = 0; k < n; k++) {
-		const int32_t i = m->grain[k];
-		quern_real way = 0;
-		for (uint32_t a = 0; a < w->s->dim; a++) {
-			const quern_real jump = m->velocity[a][k] - u[B_VELOCITY].real[a][i];
-			u[B_VELOCITY].real[a][i] = m->velocity[a][k];
-			u[B_POSITION].real[a][i] += share * jump;
-			const quern_real d = u[B_POSITION].real[a][i] - u[B_ANCHOR].real[a][i];
-			way += d * d;
-		}
+		quern_real velocity[3] = { 0 };
+		for (uint32_t a = 0; a < w->s->dim; a++) velocity[a] = m->velocity[a][k];
+		const quern_real way = quern_hybrid_move(w->h, w->s, m->grain[k], velocity);
 		w->farthest[b] = way > w->farthest[b] ? way : w->farthest[b];
 	}
 }
@@ -144,6 +151,7 @@ quern_status quern_hybrid_back(const void *self, const quern_step *s) {
 		.node = (const quern_row *)(void *)u[B_NODE].real[0],
 		.mixture = (const quern_row *)(void *)u[B_MIXTURE].real[0] };
 	w.trips = (trips) { .s = s, .g = w.g, .transfer = &s->slot[SLOT_TRANSFER][0], .node = w.mixture };
+	if (w.h->solves) return quern_hybrid_solve(w.h, s);
 	if (!s->host->set(s->run, "point").n) return QUERN_OK;
 	if (!quern_hybrid_residents(s, &u[B_POSITION], u[B_FIXED].index, &w.at)) return QUERN_E_MEMORY;
 	w.farthest = s->host->memory(s->run, ((size_t)w.g->n_blocks + 1) * sizeof(quern_real));

@@ -74,6 +74,7 @@ quern_status quern_hybrid_sort(update *d) {
 	d->wall = take(d, d->n_cells, sizeof(quern_real));
 	d->open = take(d, d->n_cells, sizeof(quern_real));
 	d->zone = take(d, d->n_cells, sizeof(int32_t));
+	d->share = take(d, d->n_cells, sizeof(quern_real));
 	for (uint32_t k = 0; k < s->dim; k++) d->velocity[k] = take(d, d->n_cells, sizeof(quern_real));
 	if (d->failed) return QUERN_E_MEMORY;
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
@@ -220,7 +221,7 @@ bool quern_hybrid_contact_stress(const update *d, uint32_t cell, quern_real stre
 static quern_real pressure_of(const update *d, uint32_t c) {
 	const uint32_t dim = d->s->dim;
 	quern_real stress[6], grains = 0, points = 0, mass = 0;
-	const quern_real share = grain_share(d->u[U_ZONE].index[c]);
+	const quern_real share = 1 - old_share(d, (int32_t)c);
 	quern_hybrid_contact_stress(d, c, stress);
 	for (uint32_t k = 0; k < dim; k++) grains -= stress[k] / dim;
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
@@ -272,7 +273,6 @@ void quern_hybrid_rates(update *d) {
 
 /* The unit vector along which the continuum's share grows at a cell, zero where it does not. */
 static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
-	const int32_t *zone = d->u[U_ZONE].index;
 	int32_t cell[3], other[3];
 	quern_real length = 0;
 	n[0] = n[1] = n[2] = 0;
@@ -280,7 +280,7 @@ static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		const int32_t up = quern_hybrid_beside(d, cell, k, 1, other),
 					  down = quern_hybrid_beside(d, cell, k, -1, other);
-		n[k] = point_share(zone[up < 0 ? (int32_t)c : up]) - point_share(zone[down < 0 ? (int32_t)c : down]);
+		n[k] = old_share(d, up < 0 ? (int32_t)c : up) - old_share(d, down < 0 ? (int32_t)c : down);
 		length += n[k] * n[k];
 	}
 	for (uint32_t k = 0; k < d->s->dim && length > 0; k++) n[k] /= sqrt(length);

@@ -6,6 +6,7 @@
 enum { N = QUERN_BLOCK_CELLS };
 
 typedef struct {
+	const hybrid *h;
 	const quern_step *s;
 	const quern_row *node;
 	quern_row *motion, *mixture;
@@ -80,21 +81,21 @@ static void couple_block(void *arg, uint32_t b, uint32_t worker) {
 	common_nodes *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
 	if (!m) return;
 	load(w, m, b);
-	if (m->n) call(w, m);
+	if (m->n && !w->h->solves) call(w, m);
 	for (uint32_t q = 0; q < m->n; q++) {
 		store(w, m, b, q);
 		w->defect[b] = defect_of(m, q, w->s->dim, w->defect[b]);
-		w->energy[b] += energy_of(m, q, w->s->dim);
+		w->energy[b] += w->h->solves ? 0 : energy_of(m, q, w->s->dim);
 	}
 }
 
 quern_status quern_hybrid_couple(const void *self, const quern_step *s) {
 	const quern_grid_view *g = s->host->grid(s->run);
-	couple_work w = { .s = s,
+	couple_work w = { .h = self,
+		.s = s,
 		.node = (const quern_row *)(void *)s->use[C_NODE].real[0],
 		.motion = (quern_row *)(void *)s->use[C_MOTION].real[0],
 		.mixture = (quern_row *)(void *)s->use[C_MIXTURE].real[0] };
-	(void)self;
 	w.energy = s->host->memory(s->run, ((size_t)g->n_blocks + 1) * sizeof(quern_real));
 	w.defect = s->host->memory(s->run, ((size_t)g->n_blocks + 1) * sizeof(quern_real));
 	if (!w.energy || !w.defect) return QUERN_E_MEMORY;

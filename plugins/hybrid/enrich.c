@@ -28,7 +28,7 @@ static quern_real waiting(const enriching *e) {
 
 /* Half a grain over would never be paid back: a grain is placed while more than all of it is owed. */
 static bool is_owed(const enriching *e) {
-	return e->rest > grain_share(e->d->zone[e->c]) * mass_of(e->d->h, waiting(e));
+	return e->rest > grain_share(e->d, e->c) * mass_of(e->d->h, waiting(e));
 }
 
 /* ---- what a packer may ask ---- */
@@ -57,7 +57,7 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 		d->cap_grains = cap;
 	}
 	new_grain *g = &d->grains[d->n_new_grains++];
-	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d->zone[e->c]), .cell = (int32_t)e->c };
+	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d, e->c), .cell = (int32_t)e->c };
 	memcpy(g->position, spot->x, sizeof g->position);
 	quern_placer_add(&e->placer, spot);
 	e->rest -= g->weight * mass_of(d->h, g->radius);
@@ -217,18 +217,14 @@ static void enrich_cell(enriching *e, uint32_t c) {
 static bool place_obstacles(enriching *e) {
 	const update *d = e->d;
 	const quern_step *s = d->s;
-	quern_bound *body = s->host->memory(s->run, (s->n_slot[SLOT_BODIES] + 1) * sizeof(quern_bound));
 	quern_real most = quern_radius_most(&d->h->radii);
 	for (uint32_t i = 0; i < d->n_grains; i++)
 		most = d->u[U_GRAIN_RADIUS].real[0][i] > most ? d->u[U_GRAIN_RADIUS].real[0][i] : most;
 	e->seed = s->host->memory(s->run, MOST_SEEDS * sizeof(quern_spot));
-	if (!body || !e->seed ||
-		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK)
+	if (!e->seed ||
+		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
+		!quern_placer_bodies(&e->placer, s, SLOT_BODIES, false))
 		return false;
-	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++)
-		if (quern_body_is_there(&s->slot[SLOT_BODIES][b], s->settling))
-			body[e->placer.n_bodies++] = s->slot[SLOT_BODIES][b];
-	e->placer.body = body;
 	for (uint32_t i = 0; i < d->n_grains; i++) {
 		quern_spot spot = { .radius = d->u[U_GRAIN_RADIUS].real[0][i] };
 		if (d->drop_grain[i]) continue;

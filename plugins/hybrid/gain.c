@@ -52,6 +52,14 @@ static quern_real in_points(const quern_step *s) {
 
 quern_real quern_hybrid_held(const quern_step *s) { return in_contacts(s) + in_spins(s) + in_points(s); }
 
+/* What bodies have done, if any moves. */
+static quern_real by_bodies(const quern_step *s) {
+	const quern_real *work = s->use[A_BODY_WORK].real[0];
+	quern_real sum = 0;
+	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES] && work; b++) sum += work[b];
+	return sum;
+}
+
 /* Bodies that stand still do no work, contacts and the coupling take energy. Twice what there can be, since a
  * conversion may make some; what lifts all by a diameter, since steps within their limits keep energy about as well
  * as that; and, where nothing pulls, what round-off moves: a millionth of a diameter in a step. */
@@ -59,13 +67,15 @@ quern_status quern_hybrid_judge_gain(
 	const hybrid *h, const quern_step *s, quern_real kinetic, quern_real carried) {
 	const quern_real brought =
 		book_total(s->use[A_POURED_ENERGY].real[0], s->host->set(s->run, "grain_source").n);
-	const quern_real had = s->use[A_ENERGY].real[0][0] + brought, work = s->use[A_WORK].real[0][0];
+	const quern_real had = s->use[A_ENERGY].real[0][0] + brought,
+					 work = s->use[A_WORK].real[0][0] + by_bodies(s);
 	const quern_real still = 1e-6 * h->diameter / s->dt;
 	const quern_real lift = h->gain * quern_gravity_size(s->dim, s->gravity) * h->diameter;
 	const quern_real slack = carried * (lift + 0.5 * still * still);
 	if (!(h->gain > 0) || kinetic <= 2 * (had + fmax(work, 0)) + slack) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 		"grains and points move with %.3g J, though they had %.3g J at first or when they were poured, and "
-		"gravity has given %.3g J since: steps of %.3g s make energy, they are too long (hybrid.gain)",
+		"gravity and bodies have given %.3g J since: steps of %.3g s make energy, they are too long "
+		"(hybrid.gain)",
 		kinetic, had, work, s->dt);
 }

@@ -20,10 +20,15 @@ typedef struct hybrid {
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
-	bool affine;
+	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
+	bool moving;         /* some bodies do */
+	int32_t weights;
+	bool ramped;         /* shares of hybrid cells are a field: cell.weight */
 	bool passes;         /* books are kept of what leaves and comes */
 	quern_real pourings; /* sources of grains */
 } hybrid;
+
+enum { WEIGHTS_HALF, WEIGHTS_RAMP };
 
 /* slots, in the order of the solver's table */
 enum { SLOT_ORACLE, SLOT_PACKER, SLOT_COUPLING, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
@@ -54,8 +59,7 @@ QUERN_INLINE cloud all_points(const quern_step *s) {
 		s->host->set(s->run, "point").n };
 }
 
-/* Weight of a grain or a point in a cell of that zone. */
-QUERN_INLINE quern_real grain_share(int32_t zone) {
-	return zone == QUERN_DISCRETE ? 1 : zone == QUERN_HYBRID ? 0.5 : 0;
+/* The continuum's share in a cell of that zone, where there are no ramps. */
+QUERN_INLINE quern_real zone_share(int32_t zone) {
+	return zone == QUERN_DISCRETE ? 0 : zone == QUERN_HYBRID ? 0.5 : 1;
 }
-QUERN_INLINE quern_real point_share(int32_t zone) { return 1 - grain_share(zone); }

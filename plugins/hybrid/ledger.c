@@ -144,11 +144,12 @@ static void take_over_stress(const update *d, uint32_t c) {
 	quern_real contact[6];
 	const uint32_t n = quern_shape_size(QUERN_SYMMETRIC, d->s->dim), begin = d->point_begin[c],
 				   end = d->point_begin[c + 1];
+	const quern_real share = old_share(d, (int32_t)c);
 	if (begin == end || !quern_hybrid_contact_stress(d, c, contact)) return;
 	for (uint32_t q = begin; q < end; q++)
 		for (uint32_t k = 0; k < n; k++) {
 			quern_real *stress = &d->u[U_POINT_STRESS].real[k][d->point[q]];
-			*stress = 0.5 * contact[k] + 0.5 * *stress;
+			*stress = (1 - share) * contact[k] + share * *stress;
 		}
 	quern_hybrid_assign(d, (uint32_t)d->point[begin], end - begin); /* points of a cell lie together */
 }
@@ -161,7 +162,7 @@ void quern_hybrid_weigh(update *d) {
 	for (uint32_t i = 0; i < d->n_grains; i++) {
 		const int32_t c = d->grain_cell[i];
 		if (c < 0) continue;
-		const quern_real weight = grain_share(d->zone[c]), change = weight - u[U_GRAIN_WEIGHT].real[0][i];
+		const quern_real weight = grain_share(d, (uint32_t)c), change = weight - u[U_GRAIN_WEIGHT].real[0][i];
 		if (change != 0)
 			book(point_entry(d), (uint32_t)c, change, u[U_GRAIN_MASS].real[0][i], u[U_GRAIN_VELOCITY].real, i,
 				dim);
@@ -170,7 +171,7 @@ void quern_hybrid_weigh(update *d) {
 	}
 	for (uint32_t i = 0; i < d->n_points; i++) {
 		const int32_t c = d->point_cell[i];
-		const quern_real weight = c < 0 ? u[U_POINT_WEIGHT].real[0][i] : point_share(d->zone[c]);
+		const quern_real weight = c < 0 ? u[U_POINT_WEIGHT].real[0][i] : point_share(d, (uint32_t)c);
 		const quern_real change = weight - u[U_POINT_WEIGHT].real[0][i];
 		if (change != 0)
 			book(grain_entry(d), (uint32_t)c, change, u[U_POINT_MASS].real[0][i], u[U_POINT_VELOCITY].real, i,
@@ -182,11 +183,21 @@ void quern_hybrid_weigh(update *d) {
 
 /* ---- settling ---- */
 
+/* On a ramp both clouds go on together and change their shares: what one of them gains the other has lost. */
+static void cancel(entry one, entry other, uint32_t c, uint32_t dim) {
+	const bool against = (one.mass[c] > 0 && other.mass[c] < 0) || (one.mass[c] < 0 && other.mass[c] > 0);
+	if (!against) return;
+	if (fabs(one.mass[c]) > fabs(other.mass[c])) shift(one, c, other, c, dim);
+	else shift(other, c, one, c, dim);
+}
+
 /* In a pure cell only one cloud is left to give to, and what the other owes it is set against what it is owed. */
 void quern_hybrid_net(update *d) {
+	const entry points = point_entry(d), grains = grain_entry(d);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
-		if (d->zone[c] == QUERN_CONTINUUM) shift(point_entry(d), c, grain_entry(d), c, d->s->dim);
-		else if (d->zone[c] == QUERN_DISCRETE) shift(grain_entry(d), c, point_entry(d), c, d->s->dim);
+		if (d->zone[c] == QUERN_CONTINUUM) shift(points, c, grains, c, d->s->dim);
+		else if (d->zone[c] == QUERN_DISCRETE) shift(grains, c, points, c, d->s->dim);
+		else if (d->h->ramped) cancel(points, grains, c, d->s->dim);
 	}
 }
 

@@ -63,7 +63,7 @@ static uint32_t close_parts(
 		for (uint32_t k = 0; k < d->s->dim; k++) {
 			from[k] = quern_image_at(x[k][i], to[k], images.half[k], images.length[k]);
 		}
-		closed[p] = quern_hybrid_walled(d, c, from, to);
+		closed[p] = quern_hybrid_walled(d, NULL, c, from, to);
 		n += !closed[p];
 	}
 	if (!n) memset(closed, 0, parts * sizeof *closed);
@@ -93,7 +93,7 @@ static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]
 			if (!taken[p] && (best == parts || held[p] > held[best])) best = p;
 		taken[best] = true;
 		new_point point = {
-			.mass = mass / count, .weight = point_share(d->zone[c]), .cell = (int32_t)c, .parent = -1
+			.mass = mass / count, .weight = point_share(d, c), .cell = (int32_t)c, .parent = -1
 		};
 		part_centre(d, cell, best, point.position);
 		memcpy(point.velocity, v, sizeof point.velocity);
@@ -127,7 +127,7 @@ static void grow(update *d, uint32_t c, quern_real mass, quern_real held, const 
 static void shrink(update *d, uint32_t c, quern_real mass, quern_real held) {
 	const quern_column *u = d->u;
 	const quern_real wanted = 1 + mass / held, factor = wanted > 0.7 ? wanted : 0.7,
-					 weight = point_share(d->zone[c]);
+					 weight = point_share(d, c);
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
 		const quern_real old = u[U_POINT_MASS].real[0][i], new = factor *old;
@@ -146,12 +146,22 @@ static quern_real mass_held(const update *d, uint32_t c) {
 	return sum;
 }
 
+/* What giving to a cell's points or taking from them would change, of the mass that they stand for. On a ramp little is
+ * carried of much, and a debt may be many times what there is room for, or all that there is: points go no farther than
+ * from half of what the cell holds to that or what fills it, and the rest waits until the material has moved on. */
+static quern_real within(const update *d, uint32_t c, quern_real mass, quern_real held) {
+	const quern_real all = d->mass[c], fills = 1.1 * d->full * (d->open[c] > 0.125 ? d->open[c] : 0.125);
+	const quern_real more = (fills > all ? fills : all) - held, less = 0.5 * all - held;
+	if (!d->h->ramped) return mass;
+	if (mass > 0) return more < 0 ? 0 : mass < more ? mass : more;
+	return less > 0 ? 0 : mass > less ? mass : less;
+}
+
 static void settle(update *d, uint32_t c) {
-	const quern_real weight = point_share(d->zone[c]), owed = d->u[U_POINT_OWED].real[0][c],
-					 mass = owed / weight;
-	const quern_real held = mass_held(d, c);
+	const quern_real held = mass_held(d, c), weight = point_share(d, c), all = d->u[U_POINT_OWED].real[0][c],
+					 mass = within(d, c, all / weight, held), owed = weight * mass;
 	quern_real v[3] = { 0 };
-	quern_hybrid_owed_velocity(d, c, owed, d->u[U_POINT_OWED_MOMENTUM], v);
+	quern_hybrid_owed_velocity(d, c, all, d->u[U_POINT_OWED_MOMENTUM], v);
 	if (owed > 0 && held > 0) {
 		grow(d, c, mass, held, v);
 		draw(d, c, owed, v);
@@ -195,7 +205,7 @@ static void split(update *d, uint32_t c) {
 	for (uint32_t p = parts; p-- > 0;)
 		if (!taken[p]) free_part = p;
 	if (free_part == parts) return;
-	new_point point = { .weight = point_share(d->zone[c]), .cell = (int32_t)c, .parent = -1 };
+	new_point point = { .weight = point_share(d, c), .cell = (int32_t)c, .parent = -1 };
 	part_centre(d, cell, free_part, point.position);
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];

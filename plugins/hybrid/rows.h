@@ -52,6 +52,8 @@
 	X(U_UNSORTED, "total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX) \
 	X(U_MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR) \
 	X(U_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR) \
+	X(U_WEIGHT, "cell.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "ramped", \
+		.doc = "Share of the continuum: 0 where there are grains alone, 1 where there are none.") \
 	X(U_HOME_MASS, "cell.home_mass", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
 		.doc = "Carried at the last update by those whose home it is.") \
 	X(U_OWED_LEFT, "total.owed_left", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
@@ -120,7 +122,11 @@ QUERN_USE_ENUM(COUPLE_USES);
 	X(B_MIXTURE, "mixture.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(B_DISPLACEMENT, "total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY) \
 	X(B_MIXTURE_MOMENTUM, "mixture.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
-	X(B_MIXTURE_CHANGE, "mixture.change", "m/s", QUERN_READ, QUERN_VECTOR)
+	X(B_MIXTURE_CHANGE, "mixture.change", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(B_MOTION, "motion.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR, .when = "solves") \
+	X(B_MOTION_CHANGE, "motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR, .when = "solves") \
+	X(B_EXCHANGE, "total.exchange_defect", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "solves") \
+	X(B_ENERGY, "total.exchanged", "J", QUERN_UPDATE, QUERN_SCALAR, .when = "solves", .flags = QUERN_OPTIONAL)
 QUERN_USE_ENUM(BACK_USES);
 
 #define AUDIT_USES(X) \
@@ -136,6 +142,7 @@ QUERN_USE_ENUM(BACK_USES);
 	X(A_GRAIN_OWED_MOMENTUM, "cell.grain_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
 	X(A_POINT_OWED_MOMENTUM, "cell.point_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
 	X(A_BODY, "body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED) \
+	X(A_BODY_WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .when = "moving") \
 	X(A_FACES, "total.faces", "N s", QUERN_READ, QUERN_VECTOR) \
 	X(A_SUPPORT, "total.support", "N s", QUERN_READ, QUERN_VECTOR) \
 	X(A_EXCHANGE, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR) \

@@ -9,6 +9,7 @@ typedef struct {
 	const quern_grid_view *g;
 	quern_real one_over_volume;
 	quern_grid_cursor last;
+	const body_pose *pose; /* by body */
 } sampling;
 
 /* -1/V (f b + b f)/2, shared out by hats centred at the cells; what would go behind a wall stays before it. */
@@ -65,7 +66,8 @@ static void sample_touch(sampling *p, uint32_t q) {
 	const quern_step *s = p->s;
 	const quern_column *u = s->use;
 	const int32_t i = u[S_TOUCH_GRAIN].index[q];
-	const quern_bound *body = &s->slot[SLOT_BODIES][u[S_TOUCH_BODY].index[q]];
+	const int32_t k = u[S_TOUCH_BODY].index[q];
+	const quern_bound *body = &s->slot[SLOT_BODIES][k];
 	const quern_vec f = QUERN_VEC_AT(u[S_TOUCH_FORCE].real, q, s->dim),
 					centre = QUERN_VEC_AT(u[S_POSITION].real, i, s->dim);
 	if (!(quern_vec_dot(f, f, 3) > 0)) return;
@@ -73,7 +75,7 @@ static void sample_touch(sampling *p, uint32_t q) {
 	const int32_t *feature = several ? u[S_TOUCH_FEATURE].index + q : NULL;
 	const quern_real x[3] = { centre.x, centre.y, centre.z }, radius = u[S_RADIUS].real[0][i];
 	quern_real normal[3];
-	const quern_real gap = quern_body_gap_of(body, feature, s->dim, x, radius, normal);
+	const quern_real gap = quern_body_gap_of(body, &p->pose[k], feature, s->dim, x, radius, normal);
 	const quern_vec branch = quern_vec_scale(radius + gap, QUERN_VEC_OF(normal));
 	add(p, quern_vec_sub(centre, branch), f, branch);
 }
@@ -85,6 +87,8 @@ quern_status quern_hybrid_sample(const void *self, const quern_step *s) {
 	if (s->settling || ((s->substep + 1) % h->sample_every && !first)) return QUERN_OK;
 	sampling p = { .s = s, .g = s->host->grid(s->run), .last = { .block = -1 } };
 	p.one_over_volume = 1 / quern_grid_cell_volume(p.g);
+	p.pose = quern_body_poses_now(s, SLOT_BODIES);
+	if (!p.pose) return QUERN_E_MEMORY;
 	sample_contacts(&p);
 	for (uint32_t q = 0; s->use[S_TOUCH_FORCE].real[0] && q < s->host->set(s->run, "touch").n; q++)
 		sample_touch(&p, q);

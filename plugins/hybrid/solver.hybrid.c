@@ -3,6 +3,7 @@
 #include "../common/outlets.h"
 #include "hybrid.h"
 
+static const char *const weightings[] = { "half", "ramp", NULL };
 static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 										  "Grain steps per step of the continuum.", .def = 10, .min = 1,
 										  .max = 10000),
@@ -19,6 +20,15 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		"Motion beyond twice what there was and gravity gave that ends the run, over what lifts all by a "
 		"diameter; 0: none does.",
 		.def = 1, .max = 1e6, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, weights, "1",
+		"Shares of grains and continuum in the hybrid zone: half each, or a ramp across it, from all grains "
+		"to all "
+		"continuum; a ramp needs three or four cells.",
+		.choices = weightings),
+	QUERN_PARAM(hybrid, ramped, NULL, "Keep shares by cell; set by itself where they are not all a half.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(
+		hybrid, solves, NULL, "The coupling sees all nodes at once; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(hybrid, diameter, "grain.diameter", "m", "Mean diameter of grains that are placed.",
 		.from = "grain.diameter", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, radii.spread, "grain.spread", "1", "Spread of their radii.",
@@ -29,6 +39,8 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.from = "grain.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, packed, "packed_density", "kg/m^3", "Density of the continuum without stress.",
 		.from = "continuum.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
+	QUERN_PARAM(hybrid, moving, NULL, "Ask for the work of bodies; set by itself where one moves.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, passes, NULL,
 		"Keep books of what leaves and comes; set by itself where a face is open or a source pours.",
 		.flags = QUERN_ADVANCED),
@@ -134,13 +146,30 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
+static bool wants_shares(const quern_bound *oracle, uint32_t n) {
+	bool any = false;
+	for (uint32_t o = 0; o < n; o++) {
+		const quern_oracle_ops *ops = oracle[o].ops;
+		any = any || (ops->wants && ops->wants(oracle[o].self) & QUERN_ORACLE_WEIGHT);
+	}
+	return any;
+}
+
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	hybrid *h = self;
 	if (!n_slot[SLOT_ORACLE])
 		return setup->host->fail(
 			err, QUERN_E_PARAM, NULL, "give an oracle: without one nobody says where grains are needed");
+	if (((const quern_transfer_ops *)slot[SLOT_TRANSFER][0].ops)->affine)
+		return setup->host->fail(err, QUERN_E_PARAM, "transfer",
+			"%s makes a matrix that grains have no way to send: take picflip, mixed or xpic here",
+			slot[SLOT_TRANSFER][0].id);
+	h->moving = quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	h->affine = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->affine != 0;
+	h->solves = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->solve != NULL;
+	h->ramped =
+		h->ramped || h->weights == WEIGHTS_RAMP || wants_shares(slot[SLOT_ORACLE], n_slot[SLOT_ORACLE]);
 	return QUERN_OK;
 }
 

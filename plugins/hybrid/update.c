@@ -9,6 +9,8 @@
 static quern_status reckon(update *d) {
 	quern_hybrid_move_entries(d);
 	quern_hybrid_averages(d);
+	d->pose = quern_body_poses_now(d->s, SLOT_BODIES);
+	if (!d->pose) return QUERN_E_MEMORY;
 	quern_status status = quern_hybrid_walls(d);
 	if (status != QUERN_OK) return status;
 	quern_hybrid_fixed(d);
@@ -16,6 +18,7 @@ static quern_status reckon(update *d) {
 	quern_hybrid_rates(d);
 	if (d->failed) return QUERN_E_MEMORY;
 	status = quern_hybrid_zones(d);
+	if (status == QUERN_OK) status = quern_hybrid_shares(d);
 	if (status != QUERN_OK) return status;
 	quern_hybrid_weigh(d);
 	quern_hybrid_net(d);
@@ -28,6 +31,7 @@ static quern_status reckon(update *d) {
 
 static quern_status apply(update *d) {
 	memcpy(d->u[U_ZONE].index, d->zone, d->n_cells * sizeof(int32_t));
+	if (d->u[U_WEIGHT].real[0]) memcpy(d->u[U_WEIGHT].real[0], d->share, d->n_cells * sizeof(quern_real));
 	quern_status status = quern_hybrid_apply_grains(d);
 	if (status == QUERN_OK) status = quern_hybrid_apply_points(d);
 	if (status == QUERN_OK) status = quern_hybrid_normals(d);

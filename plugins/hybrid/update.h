@@ -28,8 +28,11 @@ typedef struct update {
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
 	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that is open */
+	const body_pose *pose;    /* by body */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
 	int32_t *zone;            /* by cell: the new one; the old one stands in the field until the end */
+	quern_real *share;        /* by cell: the continuum's, in the new zone */
+	quern_real *asked;        /* by cell: what oracles ask for in its place, -1: nothing; NULL: nobody asks */
 	bool *drop_grain, *drop_point;
 	new_point *points;
 	uint32_t n_new_points, cap_points;
@@ -38,6 +41,15 @@ typedef struct update {
 	uint32_t changed; /* cells that changed zone */
 	bool failed;      /* memory ran out */
 } update;
+
+/* Weights of points and of grains in a cell from now on. */
+QUERN_INLINE quern_real point_share(const update *d, uint32_t c) { return d->share[c]; }
+QUERN_INLINE quern_real grain_share(const update *d, uint32_t c) { return 1 - d->share[c]; }
+/* The continuum's share as the fields have it: from before, until the update's end. */
+QUERN_INLINE quern_real old_share(const update *d, int32_t c) {
+	const quern_real *weight = d->u[U_WEIGHT].real[0];
+	return weight ? weight[c] : zone_share(d->u[U_ZONE].index[c]);
+}
 
 void quern_hybrid_centre(const update *, const int32_t cell[3], quern_real x[3]);
 /* The entry of the neighbour one step along an axis, -1 where there is none. */
@@ -59,14 +71,23 @@ void quern_hybrid_homes(update *);
 
 /* ---- walls.c ---- */
 quern_status quern_hybrid_walls(update *);
-/* Whether a body stands between two places, one of them in that cell and the other in it or in one beside it, be it
- * ever so thin. */
-bool quern_hybrid_walled(const update *, uint32_t entry, const quern_real from[3], const quern_real to[3]);
+/* By cell: m from its centre to the nearest of the bodies that are `meant`, by their number; NULL: of all. */
+quern_status quern_hybrid_gaps(const update *, const bool *meant, quern_real *gap);
+/* Whether one of these bodies stands between two places, one of them in that cell and the other in it or in one beside
+ * it, be it ever so thin. */
+bool quern_hybrid_walled(
+	const update *, const bool *meant, uint32_t entry, const quern_real from[3], const quern_real to[3]);
 
 /* ---- zones.c ---- */
 quern_status quern_hybrid_zones(update *);
 /* By cell: the nearest cell with `source` set, by centres, -1 if there is none. */
 quern_status quern_hybrid_nearest(update *, const bool *source, int32_t *nearest);
+/* By cell with `through` set: m from its centre to the nearest cell with `source` set, from cell to cell with
+ * `through`. */
+quern_status quern_hybrid_distance(update *, const bool *source, const bool *through, quern_real *distance);
+
+/* ---- shares.c ---- */
+quern_status quern_hybrid_shares(update *);
 
 /* ---- ledger.c ---- */
 /* Whether a cloud is owed anything by a cell, mass or momentum, be it less than nothing. */

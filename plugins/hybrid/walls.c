@@ -7,24 +7,26 @@
 enum { N = QUERN_BLOCK_CELLS }; /* cells of a block, and places in a cell */
 
 typedef struct {
-	_Alignas(64) quern_real position[3][N], radius[N], gap[N], normal[3][N], velocity[3][N], least[N];
+	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N],
+		least[N];
 } places;
 
-/* Gap of every place to the nearest body that is there now; infinite where there is none. */
-static void nearest_bodies(const update *d, places *p) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
-	quern_body_batch batch = {
-		.n = N, .cap = N, .dim = d->s->dim, .pose = &still, .radius = p->radius, .gap = p->gap
-	};
+/* Gap of every place to the nearest body that is meant and there now; infinite where there is none. */
+static void nearest_bodies(const update *d, const bool *meant, places *p) {
+	quern_body_batch batch = { .n = N, .cap = N, .dim = d->s->dim, .radius = p->radius, .gap = p->gap };
 	for (uint32_t k = 0; k < d->s->dim; k++) {
-		batch.position[k] = p->position[k];
 		batch.normal[k] = p->normal[k];
 		batch.velocity[k] = p->velocity[k];
 	}
 	for (uint32_t i = 0; i < N; i++) p->least[i] = INFINITY, p->radius[i] = 0;
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
-		if (!quern_body_is_there(body, d->s->settling)) continue;
+		if (!quern_body_is_there(body, d->s->settling) || (meant && !meant[b])) continue;
+		batch.pose = &d->pose[b].pose;
+		quern_motion_bring_all(&d->pose[b], d->s->dim, N,
+			(const quern_real *const[3]) { p->position[0], p->position[1], p->position[2] },
+			(quern_real *const[3]) { p->own[0], p->own[1], p->own[2] });
+		for (uint32_t k = 0; k < d->s->dim; k++) batch.position[k] = p->own[k];
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 		for (uint32_t i = 0; i < N; i++) p->least[i] = p->gap[i] < p->least[i] ? p->gap[i] : p->least[i];
 	}
@@ -39,9 +41,29 @@ static quern_real open_share(const update *d, const int32_t cell[3], places *p) 
 		for (uint32_t k = 0; k < dim; k++)
 			p->position[k][i] = d->g->lower[k] + (cell[k] + (at[k] + 0.5) / side) * d->g->cell;
 	}
-	nearest_bodies(d, p);
+	nearest_bodies(d, NULL, p);
 	for (uint32_t i = 0; i < N; i++) open += p->least[i] >= 0;
 	return (quern_real)open / N;
+}
+
+/* Of the centres of block b's cells. */
+static void gaps_of_block(const update *d, const bool *meant, uint32_t b, places *p, quern_real *gap) {
+	int32_t cell[3];
+	for (uint32_t i = 0; i < N; i++) {
+		quern_real x[3];
+		quern_grid_cell_of(d->g, b * N + i, cell);
+		quern_hybrid_centre(d, cell, x);
+		for (uint32_t k = 0; k < d->s->dim; k++) p->position[k][i] = x[k];
+	}
+	nearest_bodies(d, meant, p);
+	for (uint32_t i = 0; i < N; i++) gap[i] = p->least[i];
+}
+
+quern_status quern_hybrid_gaps(const update *d, const bool *meant, quern_real *gap) {
+	places *p = d->s->host->scratch(d->s->run, 0, sizeof *p);
+	if (!p) return QUERN_E_MEMORY;
+	for (uint32_t b = 0; b < d->g->n_blocks; b++) gaps_of_block(d, meant, b, p, gap + (size_t)b * N);
+	return QUERN_OK;
 }
 
 quern_status quern_hybrid_walls(update *d) {
@@ -51,14 +73,7 @@ quern_status quern_hybrid_walls(update *d) {
 	for (uint32_t b = 0; b < d->g->n_blocks; b++) {
 		quern_real *gap = d->wall + (size_t)b * N, *open = d->open + (size_t)b * N;
 		int32_t cell[3];
-		for (uint32_t i = 0; i < N; i++) {
-			quern_real x[3];
-			quern_grid_cell_of(d->g, b * N + i, cell);
-			quern_hybrid_centre(d, cell, x);
-			for (uint32_t k = 0; k < d->s->dim; k++) p->position[k][i] = x[k];
-		}
-		nearest_bodies(d, p);
-		for (uint32_t i = 0; i < N; i++) gap[i] = p->least[i];
+		gaps_of_block(d, NULL, b, p, gap);
 		for (uint32_t i = 0; i < N; i++) {
 			open[i] = gap[i] > 0 ? 1 : 0;
 			if (fabs(gap[i]) < reach && quern_grid_cell_of(d->g, b * N + i, cell))
@@ -68,20 +83,21 @@ quern_status quern_hybrid_walls(update *d) {
 	return QUERN_OK;
 }
 
-/* Gap of a place to the nearest body that is there now. */
-static quern_real gap_at(const update *d, const quern_real x[3]) {
+/* Gap of a place to the nearest body that is meant and there now. */
+static quern_real gap_at(const update *d, const bool *meant, const quern_real x[3]) {
 	quern_real least = INFINITY;
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
-		if (!quern_body_is_there(body, d->s->settling)) continue;
-		const quern_real gap = quern_body_gap(body, d->s->dim, x, 0, NULL);
+		if (!quern_body_is_there(body, d->s->settling) || (meant && !meant[b])) continue;
+		const quern_real gap = quern_body_gap(body, &d->pose[b], d->s->dim, x, 0, NULL);
 		least = gap < least ? gap : least;
 	}
 	return least;
 }
 
 /* Goes along the line by steps as long as nothing can be in the way, so that no wall is too thin. */
-bool quern_hybrid_walled(const update *d, uint32_t entry, const quern_real from[3], const quern_real to[3]) {
+bool quern_hybrid_walled(
+	const update *d, const bool *meant, uint32_t entry, const quern_real from[3], const quern_real to[3]) {
 	const quern_real near = 1e-6 * d->g->cell;
 	quern_real length = 0, way = 0;
 	if (d->wall[entry] >= 2 * d->g->cell) return false; /* within a cell, or from centre to centre */
@@ -90,7 +106,7 @@ bool quern_hybrid_walled(const update *d, uint32_t entry, const quern_real from[
 	for (int i = 0; i < 64 && way < length; i++) {
 		quern_real x[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) x[k] = from[k] + way / length * (to[k] - from[k]);
-		const quern_real gap = gap_at(d, x);
+		const quern_real gap = gap_at(d, meant, x);
 		if (gap <= near) return true;
 		way += gap;
 	}

@@ -124,26 +124,43 @@ quern_status quern_hybrid_nearest(update *d, const bool *source, int32_t *neares
 	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
 }
 
+quern_status quern_hybrid_distance(update *d, const bool *source, const bool *through, quern_real *distance) {
+	spreading p;
+	if (!spreading_init(&p, d, true, distance)) return QUERN_E_MEMORY;
+	for (uint32_t c = 0; c < d->n_cells; c++)
+		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
+	spread(&p, through);
+	free(p.heap);
+	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
+}
+
 /* ---- the surface of one oracle ---- */
 
 typedef struct {
+	uint32_t flags, faces;          /* what counts, and beyond which faces of the domain it is open */
+	const bool *meant;              /* by body: those that it means; NULL: all */
+	const quern_real *gap;          /* by cell: to these, NULL if nobody wants to know */
 	bool *outside, *solid, *inside; /* by cell */
 	uint32_t *queue;
 } surface;
 
-/* What lies one step from a cell: another one, open space, or a wall, which may stand between two cells. */
-enum { BESIDE_CELL, BESIDE_OPEN, BESIDE_WALL };
+/* What lies one step from a cell: another one, open space, a closed face of the domain, or a wall, which may stand
+ * between two cells: one that counts as surface where walls do, or another. */
+enum { BESIDE_CELL, BESIDE_OPEN, BESIDE_WALL, BESIDE_NOTHING };
 
-static int beside(
-	const update *d, uint32_t c, const int32_t cell[3], uint32_t axis, int step, int32_t *entry) {
+static int beside(const update *d, const surface *f, uint32_t c, const int32_t cell[3], uint32_t axis,
+	int step, int32_t *entry) {
 	int32_t other[3];
 	quern_real from[3], to[3];
 	*entry = quern_hybrid_beside(d, cell, axis, step, other);
 	quern_hybrid_centre(d, cell, from);
 	quern_hybrid_centre(d, cell, to);
 	to[axis] += step * d->g->cell;
-	if (quern_hybrid_walled(d, c, from, to)) return BESIDE_WALL;
-	return *entry < 0 ? BESIDE_OPEN : BESIDE_CELL; /* not allocated: nothing is there */
+	if (quern_hybrid_walled(d, NULL, c, from, to))
+		return !f->meant || quern_hybrid_walled(d, f->meant, c, from, to) ? BESIDE_WALL : BESIDE_NOTHING;
+	if (*entry >= 0) return BESIDE_CELL;
+	const bool beyond = other[axis] < 0 || other[axis] >= d->g->cells[axis];
+	return !beyond || f->faces >> (2 * axis + (step > 0)) & 1 ? BESIDE_OPEN : BESIDE_NOTHING;
 }
 
 /* Outside is what the open boundary reaches through cells that are marked so; a void within does not count. */
@@ -155,7 +172,7 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 		if (!quern_grid_cell_of(d->g, c, cell) || f->solid[c] || level[c] > 0) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2)
-				open = open || beside(d, c, cell, k, step, &other) == BESIDE_OPEN;
+				open = open || beside(d, f, c, cell, k, step, &other) == BESIDE_OPEN;
 		if (open) f->outside[c] = true, f->queue[n++] = c;
 	}
 	for (uint32_t q = 0; q < n; q++) {
@@ -163,7 +180,7 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 		quern_grid_cell_of(d->g, f->queue[q], cell);
 		for (uint32_t k = 0; k < d->g->dim; k++)
 			for (int step = -1; step <= 1; step += 2) {
-				if (beside(d, f->queue[q], cell, k, step, &c) != BESIDE_CELL) continue;
+				if (beside(d, f, f->queue[q], cell, k, step, &c) != BESIDE_CELL) continue;
 				if (f->outside[c] || f->solid[c] || level[c] > 0) continue;
 				f->outside[c] = true;
 				f->queue[n++] = (uint32_t)c;
@@ -171,29 +188,35 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 	}
 }
 
-static void find_sides(const update *d, surface *f, const quern_real *level, uint32_t flags) {
+static void find_sides(const update *d, surface *f, const quern_real *level) {
 	int32_t cell[3];
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
 		f->solid[c] = d->open[c] == 0;
-		if (!(flags & QUERN_SURFACE_FLOOD)) f->outside[c] = !f->solid[c] && level[c] <= 0;
+		if (!(f->flags & QUERN_SURFACE_FLOOD)) f->outside[c] = !f->solid[c] && level[c] <= 0;
 	}
-	if (flags & QUERN_SURFACE_FLOOD) flood(d, f, level);
+	if (f->flags & QUERN_SURFACE_FLOOD) flood(d, f, level);
 	for (uint32_t c = 0; c < d->n_cells; c++) f->inside[c] = !f->outside[c] && !f->solid[c];
 }
 
+/* Whether a cell lies in a body that is meant. */
+static bool is_meant(const update *d, const surface *f, int32_t c) {
+	return f->solid[c] && (!f->meant || f->gap[c] <= d->wall[c]);
+}
+
 /* Whether there is surface between a cell inside and what lies one step from it. */
-static bool is_surface(const update *d, const surface *f, uint32_t c, const int32_t cell[3], uint32_t axis,
-	int step, uint32_t flags) {
+static bool is_surface(
+	const update *d, const surface *f, uint32_t c, const int32_t cell[3], uint32_t axis, int step) {
 	int32_t other;
-	switch (beside(d, c, cell, axis, step, &other)) {
-	case BESIDE_OPEN: return flags & QUERN_SURFACE_FLOOD;
-	case BESIDE_WALL: return flags & QUERN_SURFACE_WALLS;
-	default: return f->outside[other] || (f->solid[other] && flags & QUERN_SURFACE_WALLS);
+	switch (beside(d, f, c, cell, axis, step, &other)) {
+	case BESIDE_OPEN: return f->flags & QUERN_SURFACE_FLOOD;
+	case BESIDE_WALL: return f->flags & QUERN_SURFACE_WALLS;
+	case BESIDE_NOTHING: return false;
+	default: return f->outside[other] || (f->flags & QUERN_SURFACE_WALLS && is_meant(d, f, other));
 	}
 }
 
-static void begin_at_surface(spreading *p, const surface *f, uint32_t flags) {
+static void begin_at_surface(spreading *p, const surface *f) {
 	const update *d = p->d;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
@@ -202,26 +225,40 @@ static void begin_at_surface(spreading *p, const surface *f, uint32_t flags) {
 			for (int step = -1; step <= 1; step += 2) {
 				int32_t way[3] = { 0 };
 				way[k] = step;
-				if (is_surface(d, f, c, cell, k, step, flags)) offer(p, c, way);
+				if (is_surface(d, f, c, cell, k, step)) offer(p, c, way);
 			}
 	}
 }
 
-/* Distance of a cell's centre to the nearest cell outside. */
-static quern_status surface_distance(
-	update *d, const quern_real *level, uint32_t flags, quern_real *distance) {
+/* What an oracle means by surface; `gap` is room for one number per cell. */
+static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern_real *gap) {
 	const quern_step *s = d->s;
-	surface f = { s->host->memory(s->run, d->n_cells + 1u), s->host->memory(s->run, d->n_cells + 1u),
-		s->host->memory(s->run, d->n_cells + 1u),
-		s->host->memory(s->run, ((size_t)d->n_cells + 1) * sizeof(uint32_t)) };
+	const quern_oracle_ops *ops = oracle->ops;
+	const uint32_t bodies = s->n_slot[SLOT_BODIES], wants = ops->wants ? ops->wants(oracle->self) : 0;
+	bool *meant = ops->means ? s->host->memory(s->run, bodies + 1u) : NULL;
+	*f = (surface) { .flags = ops->surface ? ops->surface(oracle->self) : 0,
+		.faces = ops->faces ? ops->faces(oracle->self) : ~0u,
+		.meant = meant,
+		.outside = s->host->memory(s->run, d->n_cells + 1u),
+		.solid = s->host->memory(s->run, d->n_cells + 1u),
+		.inside = s->host->memory(s->run, d->n_cells + 1u),
+		.queue = s->host->memory(s->run, ((size_t)d->n_cells + 1) * sizeof(uint32_t)) };
+	if (!f->outside || !f->solid || !f->inside || !f->queue || !meant != !ops->means) return false;
+	for (uint32_t b = 0; meant && b < bodies; b++) meant[b] = ops->means(oracle->self, b);
+	if (meant) f->gap = gap;
+	else if (wants & QUERN_ORACLE_GAP) f->gap = d->wall;
+	return !meant || quern_hybrid_gaps(d, meant, gap) == QUERN_OK;
+}
+
+/* Distance of a cell's centre to the nearest cell outside. */
+static quern_status surface_distance(update *d, surface *f, const quern_real *level, quern_real *distance) {
 	spreading p;
-	if (!f.outside || !f.solid || !f.inside || !f.queue || !spreading_init(&p, d, true, distance))
-		return QUERN_E_MEMORY;
-	find_sides(d, &f, level, flags);
-	begin_at_surface(&p, &f, flags);
-	spread(&p, f.inside);
+	if (!spreading_init(&p, d, true, distance)) return QUERN_E_MEMORY;
+	find_sides(d, f, level);
+	begin_at_surface(&p, f);
+	spread(&p, f->inside);
 	for (uint32_t c = 0; c < d->n_cells; c++)
-		if (!f.inside[c]) distance[c] = 0;
+		if (!f->inside[c]) distance[c] = 0;
 	free(p.heap);
 	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
 }
@@ -229,12 +266,14 @@ static quern_status surface_distance(
 /* ---- asking the oracles ---- */
 
 typedef struct {
-	_Alignas(64) quern_real centre[3][N], shifted[N];
+	_Alignas(64) quern_real centre[3][N], shifted[N], gap[N], weight[N];
 } oracle_memory;
 
+/* Once an oracle has been asked for levels, `distance` is known. */
 static void ask(const update *d, const quern_bound *oracle, uint32_t b, const quern_real *distance,
-	quern_real shift, oracle_memory *m, quern_real *level, int32_t *wish) {
+	const quern_real *gap, quern_real shift, oracle_memory *m, quern_real *level, int32_t *wish) {
 	const quern_oracle_ops *ops = oracle->ops;
+	const uint32_t wants = ops->wants ? ops->wants(oracle->self) : 0;
 	quern_column own[QUERN_MOST_USES];
 	quern_cell_batch batch = { .n = N,
 		.cap = N,
@@ -243,7 +282,12 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 		.zone = d->u[U_ZONE].index + (size_t)b * N,
 		.use = own,
 		.level = level,
-		.wish = wish };
+		.wish = wish,
+		.time = d->s->time,
+		.dt = d->s->dt,
+		.gap = wants & QUERN_ORACLE_GAP ? m->gap : NULL,
+		.weight = distance && wants & QUERN_ORACLE_WEIGHT ? m->weight : NULL };
+	for (uint32_t k = 0; k < 3; k++) batch.gravity[k] = d->s->gravity[k];
 	for (uint32_t i = 0; i < N; i++) {
 		int32_t cell[3];
 		quern_real x[3];
@@ -251,6 +295,8 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 		quern_hybrid_centre(d, cell, x);
 		for (uint32_t k = 0; k < 3; k++) m->centre[k][i] = x[k];
 		if (distance) m->shifted[i] = distance[b * N + i] + shift;
+		if (gap) m->gap[i] = gap[b * N + i] + shift;
+		m->weight[i] = -1;
 	}
 	for (uint32_t k = 0; k < d->s->dim; k++) batch.centre[k] = m->centre[k];
 	if (distance) batch.distance = m->shifted;
@@ -260,56 +306,84 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 	else ops->mark(oracle->self, &batch);
 }
 
-/* low: the zone wished for half the hysteresis nearer to the surface, high: half of it deeper. A zone within stays. */
-static quern_status wishes(update *d, const quern_bound *oracle, quern_real *level, quern_real *distance,
-	int32_t *low, int32_t *high) {
-	const quern_oracle_ops *ops = oracle->ops;
-	const quern_real half = 0.5 * d->h->hysteresis * d->h->diameter;
-	oracle_memory *m = d->s->host->scratch(d->s->run, 0, sizeof *m);
+/* By cell, of the oracle that is asked and of all together. */
+typedef struct {
+	quern_real *level, *distance, *gap;
+	int32_t *low,
+		*high; /* the zone wished for half the hysteresis nearer to the surface, and half of it deeper */
+} wish_cells;
+
+/* Shares are asked for where the surface is; the least of all oracles wins, as their wishes do. */
+static void ask_shares(
+	const update *d, const quern_bound *oracle, const wish_cells *w, const surface *f, oracle_memory *m) {
 	int32_t wish[N];
+	for (uint32_t b = 0; b < d->g->n_blocks; b++) {
+		quern_real *asked = d->asked + (size_t)b * N;
+		ask(d, oracle, b, w->distance, f->gap, 0, m, NULL, wish);
+		for (uint32_t i = 0; i < N; i++)
+			if (m->weight[i] >= 0 && !(asked[i] >= 0 && asked[i] <= m->weight[i])) asked[i] = m->weight[i];
+	}
+}
+
+/* A zone between the two that are wished for stays. */
+static quern_status wishes(update *d, const quern_bound *oracle, const wish_cells *w) {
+	const quern_oracle_ops *ops = oracle->ops;
+	const quern_real half = 0.5 * d->h->hysteresis * d->h->diameter, *distance = w->distance;
+	int32_t wish[N];
+	surface f;
+	if (!surface_init(&f, d, oracle, w->gap)) return QUERN_E_MEMORY;
+	oracle_memory *m = d->s->host->scratch(d->s->run, 0, sizeof *m);
 	if (!m) return QUERN_E_MEMORY;
-	for (uint32_t b = 0; b < d->g->n_blocks; b++) ask(d, oracle, b, NULL, 0, m, level + (size_t)b * N, NULL);
-	const quern_status status =
-		surface_distance(d, level, ops->surface ? ops->surface(oracle->self) : 0, distance);
+	for (uint32_t b = 0; b < d->g->n_blocks; b++)
+		ask(d, oracle, b, NULL, f.gap, 0, m, w->level + (size_t)b * N, NULL);
+	const quern_status status = surface_distance(d, &f, w->level, w->distance);
 	if (status != QUERN_OK) return status;
 	for (uint32_t b = 0; b < d->g->n_blocks; b++)
 		for (int side = 0; side < 2; side++) {
-			int32_t *out = (side ? high : low) + (size_t)b * N;
-			ask(d, oracle, b, distance, side ? half : -half, m, NULL, wish);
+			int32_t *out = (side ? w->high : w->low) + (size_t)b * N;
+			ask(d, oracle, b, distance, f.gap, side ? half : -half, m, NULL, wish);
 			for (uint32_t i = 0; i < N; i++) {
-				const int32_t w = distance[b * N + i] > 0 ? wish[i] : QUERN_DISCRETE;
-				out[i] = w < out[i] ? w : out[i];
+				const int32_t zone = distance[b * N + i] > 0 ? wish[i] : QUERN_DISCRETE;
+				out[i] = zone < out[i] ? zone : out[i];
 			}
 		}
+	if (d->asked && ops->wants && ops->wants(oracle->self) & QUERN_ORACLE_WEIGHT)
+		ask_shares(d, oracle, w, &f, m);
 	return QUERN_OK;
 }
 
 /* Leaving the hybrid zone needs settled books: what is owed to the clouds that stay must be small. */
 static int32_t guarded(const update *d, uint32_t c, int32_t old, int32_t new) {
-	const quern_real limit = d->h->guard * 0.5 * d->mass[c];
+	const quern_real share = old_share(d, (int32_t)c), guard = d->h->guard, mass = d->mass[c];
 	if (old != QUERN_HYBRID) return new;
-	if (new == QUERN_DISCRETE && d->u[U_GRAIN_OWED].real[0][c] > limit) return old;
-	if (new == QUERN_CONTINUUM && d->u[U_POINT_OWED].real[0][c] > limit) return old;
+	if (new == QUERN_DISCRETE && d->u[U_GRAIN_OWED].real[0][c] > guard *(1 - share) * mass) return old;
+	if (new == QUERN_CONTINUUM && d->u[U_POINT_OWED].real[0][c] > guard *share *mass) return old;
 	return new;
 }
 
 quern_status quern_hybrid_zones(update *d) {
 	const quern_step *s = d->s;
 	const size_t n = (size_t)d->n_cells + 1;
-	quern_real *level = s->host->memory(s->run, n * sizeof(quern_real)),
-			   *distance = s->host->memory(s->run, n * sizeof(quern_real));
-	int32_t *low = s->host->memory(s->run, n * sizeof(int32_t)),
-			*high = s->host->memory(s->run, n * sizeof(int32_t));
-	if (!level || !distance || !low || !high) return QUERN_E_MEMORY;
-	for (uint32_t c = 0; c < d->n_cells; c++) low[c] = high[c] = QUERN_CONTINUUM;
+	const wish_cells w = { .level = s->host->memory(s->run, n * sizeof(quern_real)),
+		.distance = s->host->memory(s->run, n * sizeof(quern_real)),
+		.gap = s->host->memory(s->run, n * sizeof(quern_real)),
+		.low = s->host->memory(s->run, n * sizeof(int32_t)),
+		.high = s->host->memory(s->run, n * sizeof(int32_t)) };
+	if (!w.level || !w.distance || !w.gap || !w.low || !w.high) return QUERN_E_MEMORY;
+	if (d->h->ramped) d->asked = s->host->memory(s->run, n * sizeof(quern_real));
+	if (d->h->ramped && !d->asked) return QUERN_E_MEMORY;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		w.low[c] = w.high[c] = QUERN_CONTINUUM;
+		if (d->asked) d->asked[c] = -1;
+	}
 	for (uint32_t o = 0; o < s->n_slot[SLOT_ORACLE]; o++) {
-		const quern_status status = wishes(d, &s->slot[SLOT_ORACLE][o], level, distance, low, high);
+		const quern_status status = wishes(d, &s->slot[SLOT_ORACLE][o], &w);
 		if (status != QUERN_OK) return status;
 	}
 	d->changed = 0;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		const int32_t old = d->u[U_ZONE].index[c];
-		int32_t new = old < low[c] ? low[c] : old > high[c] ? high[c] : old;
+		int32_t new = old < w.low[c] ? w.low[c] : old > w.high[c] ? w.high[c] : old;
 		if (!(d->mass[c] > 0)) new = QUERN_DISCRETE;
 		else {
 			if (new - old == 2 || old - new == 2) new = QUERN_HYBRID;

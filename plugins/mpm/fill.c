@@ -5,38 +5,44 @@
 #include "lattice.h"
 #include <math.h>
 
-/* The axis along which gravity acts, and its sign; -1 if it is askew. */
-static int gravity_axis(const quern_step *s, quern_real *g) {
-	int axis = -1;
-	for (uint32_t k = 0; k < s->dim; k++)
-		if (s->gravity[k] != 0) {
-			if (axis >= 0) return -1;
-			axis = (int)k;
-			*g = s->gravity[k];
-		}
+/* The axis along which gravity is strongest. */
+static uint32_t steepest(const quern_step *s) {
+	uint32_t axis = 0;
+	for (uint32_t k = 1; k < s->dim; k++)
+		if (fabs(s->gravity[k]) > fabs(s->gravity[axis])) axis = k;
 	return axis;
+}
+
+/* That of a layer that goes on sideways: what lies on a place weighs on it along all axes, and pushes across the steepest one
+ * by `lateral` of that. */
+static void weigh(const mpm *p, const quern_step *s, const mpm_fill *item, const quern_real x[3],
+	const quern_column *stress, uint32_t i) {
+	static const uint32_t shear[3][3] = { { 0, 3, 5 }, { 3, 1, 4 }, { 5, 4, 2 } };
+	const uint32_t axis = steepest(s);
+	const quern_real g = s->gravity[axis],
+					 depth = g < 0 ? item->upper[axis] - x[axis] : x[axis] - item->lower[axis];
+	const quern_real pressure = p->density * fabs(g) * depth;
+	for (uint32_t k = 0; k < p->dim; k++) {
+		stress->real[k][i] = -pressure * (k == axis ? 1 : item->lateral);
+		if (k == axis || s->gravity[k] == 0) continue;
+		stress->real[p->dim == 2 ? 2 : shear[axis][k]][i] =
+			p->density * s->gravity[k] * (g < 0 ? depth : -depth);
+	}
 }
 
 static void place(const mpm *p, const quern_step *s, const mpm_fill *item, const lattice *l, uint32_t first) {
 	const quern_column *u = s->use;
 	const quern_real volume = lattice_volume(l, p->dim);
-	quern_real g = 0;
-	const int axis = gravity_axis(s, &g);
 	for (uint32_t i = 0; i < l->n; i++) {
-		quern_real at[3];
-		lattice_place(l, item->lower, i, p->dim, at);
+		quern_real x[3] = { 0 };
+		lattice_place(l, item->lower, i, p->dim, x);
 		for (uint32_t k = 0; k < p->dim; k++) {
-			u[FILL_POSITION].real[k][first + i] = at[k];
+			u[FILL_POSITION].real[k][first + i] = x[k];
 			u[FILL_VELOCITY].real[k][first + i] = item->velocity[k];
 		}
 		u[FILL_MASS].real[0][first + i] = p->density * volume;
 		u[FILL_VOLUME].real[0][first + i] = volume;
-		if (item->stress != STRESS_AT_REST || axis < 0) continue;
-		const quern_real x = u[FILL_POSITION].real[axis][first + i];
-		const quern_real depth = g < 0 ? item->upper[axis] - x : x - item->lower[axis];
-		const quern_real pressure = p->density * fabs(g) * depth;
-		for (uint32_t k = 0; k < p->dim; k++)
-			u[FILL_STRESS].real[k][first + i] = -pressure * ((int)k == axis ? 1 : item->lateral);
+		if (item->stress == STRESS_AT_REST) weigh(p, s, item, x, &u[FILL_STRESS], first + i);
 	}
 }
 
@@ -45,21 +51,24 @@ static void place(const mpm *p, const quern_step *s, const mpm_fill *item, const
 enum { CHUNK = 64 };
 
 typedef struct {
-	_Alignas(64) quern_real radius[CHUNK], gap[CHUNK], normal[3][CHUNK], velocity[3][CHUNK];
+	_Alignas(64) quern_real position[3][CHUNK], radius[CHUNK], gap[CHUNK], normal[3][CHUNK],
+		velocity[3][CHUNK];
 } near_points;
 
 /* Marks the points that lie in a body; returns how many were not marked before. */
-static uint32_t mark_inside(const quern_step *s, const quern_bound *body, uint32_t n, bool *inside) {
-	static const quern_pose still = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } };
+static uint32_t mark_inside(
+	const quern_step *s, const quern_bound *body, const body_pose *pose, uint32_t n, bool *inside) {
 	near_points w = { .radius = { 0 } };
 	uint32_t found = 0;
 	for (uint32_t i = 0; i < n; i += CHUNK) {
 		const uint32_t m = n - i < CHUNK ? n - i : CHUNK;
 		quern_body_batch batch = {
-			.n = m, .cap = CHUNK, .dim = s->dim, .pose = &still, .radius = w.radius, .gap = w.gap
+			.n = m, .cap = CHUNK, .dim = s->dim, .pose = &pose->pose, .radius = w.radius, .gap = w.gap
 		};
 		for (uint32_t k = 0; k < s->dim; k++) {
-			batch.position[k] = s->use[FILL_POSITION].real[k] + i;
+			for (uint32_t q = 0; q < m; q++)
+				w.position[k][q] = quern_motion_bring(pose, k, s->use[FILL_POSITION].real[k][i + q]);
+			batch.position[k] = w.position[k];
 			batch.normal[k] = w.normal[k];
 			batch.velocity[k] = w.velocity[k];
 		}
@@ -78,13 +87,14 @@ static quern_status clip(const quern_step *s, uint32_t *n) {
 	bool *inside = s->host->memory(s->run, (size_t)*n + 1);
 	int32_t *from = s->host->memory(s->run, ((size_t)*n + 1) * sizeof(int32_t));
 	uint32_t kept = 0;
-	if (!inside || !from) return QUERN_E_MEMORY;
+	const body_pose *pose = quern_body_poses_now(s, SLOT_BODIES);
+	if (!inside || !from || !pose) return QUERN_E_MEMORY;
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
 		const body_item *item = body->item;
 		if (!quern_body_is_there(body, false) || (item->boundary == BOUNDARY_NONE && isnan(item->friction)))
 			continue;
-		const uint32_t found = mark_inside(s, body, *n, inside);
+		const uint32_t found = mark_inside(s, body, &pose[b], *n, inside);
 		char which[BODY_WORDS];
 		quern_body_say(body, b, which);
 		if (found == *n)
@@ -107,14 +117,10 @@ static quern_status count_points(const mpm *p, const quern_step *s, uint32_t *to
 	const mpm_fill *item = p->fill.items;
 	quern_real wanted = 0;
 	for (uint32_t f = 0; f < p->fill.n; f++) {
-		quern_real g = 0;
 		const lattice l = lattice_of(p, item[f].lower, item[f].upper);
 		wanted += l.wanted;
 		if (wanted > MOST_POINTS) break;
 		*total += l.n;
-		if (item[f].stress == STRESS_AT_REST && gravity_axis(s, &g) < 0 && g != 0)
-			return s->host->stop(
-				s->run, QUERN_E_PARAM, "fill", -1, "stress at_rest needs gravity along an axis");
 	}
 	if (wanted > MOST_POINTS)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,

@@ -6,6 +6,7 @@
 #include <math.h>
 
 typedef struct {
+	const mpm *p;
 	const quern_step *s;
 	const quern_grid_view *g;
 	const uint32_t *point;
@@ -19,6 +20,7 @@ typedef struct {
 	quern_row tile[QUERN_TILE_MOST];
 	trip_memory trip;
 	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
+	fit_memory fit; /* where the transfer asks for it */
 } gather_memory;
 
 /* What the nodes say at the points of a chunk. */
@@ -35,6 +37,36 @@ QUERN_INLINE void collect_chunk(
 	trips_hear_echo(&w->trips, &m->trip, n, dim);
 }
 
+/* Where points go in this step; what moves by more than a cell, or nowhere, is lost and found out behind. */
+static void look_ahead(const gather_work *w, gather_memory *m, uint32_t n) {
+	const quern_real dt = w->s->dt, most = w->g->cell;
+	for (uint32_t a = 0; a < w->s->dim; a++)
+		for (uint32_t i = 0; i < n; i++) {
+			const quern_real way = dt * m->trip.pic[a][i], held = way < most ? way : most;
+			m->fit.there.position[a][i] = m->trip.stencil.position[a][i] + (held > -most ? held : -most);
+		}
+	stencil_weigh(w->g, &w->s->slot[SLOT_SHAPE][0], n, &m->fit.there);
+}
+
+/* The linear field that fits what the nodes say, point by point. */
+QUERN_INLINE void fit_chunk(const gather_work *w, gather_memory *m, uint32_t n, const int dim) {
+	const quern_real inverse = 1 / w->g->cell;
+	const quern_real(*slope)[3][STENCIL] = (const quern_real(*)[3][STENCIL])m->fit.slope;
+	fit_slopes(&m->trip.stencil, n, dim, inverse, &m->fit);
+	for (uint32_t i = 0; i < n; i++) {
+		quern_row v[4];
+		stencil_gather_by(&m->trip.stencil, i, m->tile, dim, true, slope, v, (int32_t)w->g->span);
+		for (int k = 0; k < dim; k++)
+			for (int a = 0; a < dim; a++) m->fit.fit[dim * k + a][i] = v[1 + a][k];
+	}
+	if (w->p->moments) {
+		look_ahead(w, m, n);
+		fit_shift(n, dim, inverse, &m->fit);
+	} else
+		for (int a = 0; a < dim; a++)
+			for (uint32_t i = 0; i < n; i++) m->fit.shift[a][i] = 1;
+}
+
 static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n, bool last) {
 	const quern_bound *transfer = w->trips.transfer;
 	quern_real *velocity[3] = { NULL };
@@ -42,7 +74,7 @@ static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin
 	for (uint32_t r = 0; r < transfer->n_uses; r++)
 		own[r] = quern_column_from(transfer->column[r], transfer->uses[r].shape, begin);
 	for (uint32_t k = 0; k < w->s->dim; k++) velocity[k] = w->s->use[GATHER_VELOCITY].real[k] + begin;
-	trips_call(&w->trips, &m->trip, velocity, own, n, last);
+	trips_call(&w->trips, &m->trip, w->p->matrix ? &m->fit : NULL, velocity, own, n, last);
 }
 
 /* x += dt sum S v; V *= det(1 + dt L); true density m/V */
@@ -113,9 +145,11 @@ static void finish_chunk(
 	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin;
 	/* whatever a material makes of a negative density, a point that was turned inside out stays so */
 	for (uint32_t i = 0; i < n; i++) volume[i] = m->moved[i] > 0 ? mass[i] / m->density[i] : m->moved[i];
-	for (int row = GATHER_GRADIENT; row <= GATHER_AFFINE; row++)
-		for (uint32_t k = 0; k < dim * dim && u[row].real[0]; k++)
-			memcpy(u[row].real[k] + begin, m->gradient[k], n * sizeof(quern_real));
+	const quern_real(*given)[STENCIL] = w->p->matrix ? m->fit.affine : m->gradient;
+	for (uint32_t k = 0; k < dim * dim && u[GATHER_GRADIENT].real[0]; k++)
+		memcpy(u[GATHER_GRADIENT].real[k] + begin, m->gradient[k], n * sizeof(quern_real));
+	for (uint32_t k = 0; k < dim * dim && u[GATHER_AFFINE].real[0]; k++)
+		memcpy(u[GATHER_AFFINE].real[k] + begin, given[k], n * sizeof(quern_real));
 	for (uint32_t i = 0; i < n && u[GATHER_PRESSURE].real[0]; i++) {
 		quern_real trace = 0;
 		for (uint32_t k = 0; k < dim; k++) trace += u[GATHER_STRESS].real[k][begin + i];
@@ -142,6 +176,7 @@ QUERN_INLINE void gather_block(
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
 		collect_chunk(w, m, n, dim, last);
+		if (last && w->p->matrix) fit_chunk(w, m, n, dim);
 		call_transfer(w, m, i, n, last);
 		for (uint32_t k = 0; k < n && !last; k++)
 			trips_send(&w->trips, &m->trip, k, cloud_mass(&w->points, i + k), dim);
@@ -198,7 +233,8 @@ static quern_status lost(const gather_work *w, int32_t i) {
 
 quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	const quern_set_view points = s->host->set(s->run, "point");
-	gather_work w = { .s = s,
+	gather_work w = { .p = self,
+		.s = s,
 		.g = s->host->grid(s->run),
 		.point = points.block,
 		.points = { .mass = s->use[GATHER_MASS].real[0], .weight = s->use[GATHER_WEIGHT].real[0] },
@@ -207,7 +243,6 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 		.g = w.g,
 		.transfer = &s->slot[SLOT_TRANSFER][0],
 		.node = (const quern_row *)(const void *)s->use[GATHER_NODE].real[0] };
-	(void)self;
 	if (!points.n) return QUERN_OK;
 	w.bad = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.moved = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));

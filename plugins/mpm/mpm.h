@@ -18,6 +18,7 @@ typedef struct mpm {
 	bool outlets, sources;
 	uint64_t stream;                            /* of random numbers */
 	bool affine;                                /* points send their gradient, hybrid or not */
+	bool matrix, moments;                       /* or what the transfer gives; whose moment can be kept */
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
 	quern_real share_wall, share_next;          /* of a wall's nodes */
 	uint32_t dim;

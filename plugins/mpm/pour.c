@@ -41,11 +41,11 @@ static bool is_near(const pouring *w, const quern_real x[3]) {
 	return true;
 }
 
-static bool gather_near(pouring *w, const quern_bound *body, uint32_t n_bodies) {
+static bool gather_near(pouring *w) {
 	const quern_step *s = w->s;
-	if (quern_placer_init(&w->placer, s->dim, s->lower, s->upper, s->periodic, w->radius) != QUERN_OK)
+	if (quern_placer_init(&w->placer, s->dim, s->lower, s->upper, s->periodic, w->radius) != QUERN_OK ||
+		!quern_placer_bodies(&w->placer, s, SLOT_BODIES, true))
 		return false;
-	w->placer.body = body, w->placer.n_bodies = n_bodies;
 	for (uint32_t i = 0; i < s->host->set(s->run, "point").n; i++) {
 		quern_spot spot = { .radius = w->radius };
 		for (uint32_t k = 0; k < s->dim; k++) spot.x[k] = s->use[POUR_POSITION].real[k][i];
@@ -126,11 +126,11 @@ static quern_status add_points(const pouring *w) {
 	return QUERN_OK;
 }
 
-static quern_status pour_one(pouring *w, const quern_bound *body, uint32_t n_bodies) {
+static quern_status pour_one(pouring *w) {
 	const quern_step *s = w->s;
 	quern_real rest = quern_source_due(w->item, s->time) - s->use[POURED_MASS].real[0][w->i];
 	if (rest >= w->mass) {
-		const bool good = draw_way(w) && gather_near(w, body, n_bodies);
+		const bool good = draw_way(w) && gather_near(w);
 		if (good) rest = take_places(w, rest);
 		const bool failed = !good || w->placer.failed;
 		quern_placer_finish(&w->placer);
@@ -143,18 +143,12 @@ static quern_status pour_one(pouring *w, const quern_bound *body, uint32_t n_bod
 /* In a hybrid grains are poured, and its oracle decides what becomes of them. */
 quern_status quern_mpm_pour(const void *self, const quern_step *s) {
 	pouring w = { .p = self, .s = s };
-	quern_bound *body = s->host->memory(s->run, ((size_t)s->n_slot[SLOT_BODIES] + 1) * sizeof(quern_bound));
-	quern_status status = body ? QUERN_OK : QUERN_E_MEMORY;
-	uint32_t n_bodies = 0;
-	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES] && body; b++) {
-		const body_item *item = s->slot[SLOT_BODIES][b].item;
-		const bool acts = item->boundary != BOUNDARY_NONE || !isnan(item->friction);
-		if (acts && quern_body_is_there(&s->slot[SLOT_BODIES][b], s->settling))
-			body[n_bodies++] = s->slot[SLOT_BODIES][b];
-	}
-	for (uint32_t i = 0; i < w.p->source.n && status == QUERN_OK; i++) {
+	/* as many as the scene itself has, whatever one of its stages says */
+	const uint32_t n = s->host->set(s->run, "point_source").n;
+	quern_status status = QUERN_OK;
+	for (uint32_t i = 0; i < w.p->source.n && i < n && status == QUERN_OK; i++) {
 		begin(&w, i);
-		if (quern_source_acts(w.item, s)) status = pour_one(&w, body, n_bodies);
+		if (quern_source_acts(w.item, s)) status = pour_one(&w);
 	}
 	return status;
 }

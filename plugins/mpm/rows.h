@@ -8,6 +8,8 @@
 #define UNSORTED_USE \
 	"total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: points must be sorted before the next scatter."
 #define IMPULSE_USE "body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL
+#define TWIST_USE "body.twist", "N m s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL
+#define WORK_USE "body.work", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL
 #define FACES_USE \
 	"total.faces", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 	.doc = "Impulse on the continuum by closed faces of the domain and by the limit on light nodes."
@@ -76,6 +78,8 @@ QUERN_USE_ENUM(SCATTER_USES);
 	X(NODES_MOTION, "motion.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity.") \
 	X(NODES_IMPULSE, IMPULSE_USE) \
 	X(NODES_FACES, FACES_USE) \
+	X(NODES_TWIST, TWIST_USE) \
+	X(NODES_WORK, WORK_USE) \
 	X(NODES_CHANGE, "motion.change", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity gained in this step.") \
 	X(NODES_DENSITY, "motion.density", "kg/m^3", QUERN_WRITE, QUERN_SCALAR, \
 		.doc = "Mass of a node over its volume.") \
@@ -88,6 +92,8 @@ QUERN_USE_ENUM(NODES_USES);
 	X(WALLS_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(WALLS_IMPULSE, IMPULSE_USE) \
 	X(WALLS_FACES, FACES_USE) \
+	X(WALLS_TWIST, TWIST_USE) \
+	X(WALLS_WORK, WORK_USE) \
 	X(WALLS_CHANGE, "motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR)
 QUERN_USE_ENUM(WALLS_USES);
 
@@ -104,7 +110,8 @@ QUERN_USE_ENUM(WALLS_USES);
 	X(GATHER_GRADIENT, "point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Velocity gradient of the last step.") \
 	X(GATHER_AFFINE, "point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
-		.with = "point.affine", .doc = "The same, sent to the nodes with the velocity.") \
+		.with = "point.affine", \
+		.doc = "What points send with their velocity: the same, or what the transfer gives in its place.") \
 	X(GATHER_PRESSURE, "point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
 		.doc = "Minus the mean normal stress.") \
 	X(GATHER_ENERGY, "point.energy", "J/kg", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.mpm - the continuum: material points on a sparse grid. docs/theory/mpm.md */
+#include "../common/fit.h"
 #include "../common/height.h"
 #include "../common/outlets.h"
 #include "lattice.h"
@@ -28,7 +29,9 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(mpm, rasterise, "1",
 		"What points send to the nodes: their velocity (plain), or with it the velocity gradient of the last "
-		"step (affine); auto: affine where a hybrid's coupling asks for it.",
+		"step, or what the transfer gives in its place (affine); auto: affine where a hybrid's coupling or "
+		"the "
+		"transfer asks for it.",
 		.choices = rasters),
 	QUERN_PARAM(mpm, affine, NULL, "Keep the gradient that points send; set by itself where one is needed.",
 		.flags = QUERN_ADVANCED),
@@ -203,7 +206,14 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 			"grains and continuum do not feel each other without a section hybrid; add it, or keep one of "
 			"them "
 			"with 'model: grains' or 'model: continuum'");
-	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE];
+	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE],
+					  *transfer = slot[SLOT_TRANSFER];
+	p->matrix = ((const quern_transfer_ops *)transfer->ops)->affine != 0;
+	p->moments = p->matrix && fit_has_moments(shape, setup->dim);
+	if (p->matrix && p->rasterise == RASTERISE_PLAIN)
+		return setup->host->fail(err, QUERN_E_PARAM, "rasterise",
+			"is plain, and %s makes a matrix that points send with their velocity: take auto", transfer->id);
+	p->affine = p->affine || p->matrix;
 	((const quern_material_ops *)material->ops)
 		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
@@ -222,17 +232,19 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		const quern_real v2 = cloud_square(&s->use[FILL_VELOCITY], i, s->dim);
 		fastest = v2 > fastest ? v2 : fastest;
 	}
+	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY);
 	for (uint32_t i = 0; i < p->source.n && p->sources; i++) {
 		const quern_real *v = ((const source *)p->source.items)[i].velocity;
 		const quern_real v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 		fastest = v2 > fastest ? v2 : fastest;
 	}
 	fastest = sqrt(fastest);
+	fastest = bodies > fastest ? bodies : fastest;
 	const quern_real modulus = s->dim * p->bulk > 2 * p->shear ? s->dim * p->bulk : 2 * p->shear;
 	const quern_real omega = sqrt(p->stiffness * modulus / p->density) / p->cell;
 	const quern_real rate = 0.5 * omega + fastest / p->cell;
 	snprintf(reason, 160, "stress waves of %s in cells of %.3g m%s", s->slot[SLOT_MATERIAL][0].id, p->cell,
-		fastest > 0.5 * omega * p->cell ? " and the speed of points" : "");
+		fastest > 0.5 * omega * p->cell ? " and the speed of points or bodies" : "");
 	*hard = 1 / rate;
 	return 0.9 / rate;
 }
@@ -247,8 +259,9 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 	const cloud points = { u[FILL_MASS].real[0], u[FILL_WEIGHT].real[0], NULL,
 		s->host->set(s->run, "point").n };
 	cloud_sums c;
+	(void)self;
 	out[SUM_LEFT] = book_total(u[FILL_LEFT].real[0], outlet_faces(s));
-	out[SUM_POURED] = book_total(u[FILL_POURED].real[0], ((const mpm *)self)->source.n);
+	out[SUM_POURED] = book_total(u[FILL_POURED].real[0], s->host->set(s->run, "point_source").n);
 	if (!points.n || !cloud_open(&c, s->host, s->run, &points)) return;
 	cloud_account(&c, &u[FILL_POSITION], &u[FILL_VELOCITY], s, out);
 	CLOUD_ADD(&c, i, 0.5 * cloud_square(&u[FILL_VELOCITY], i, s->dim), out[SUM_KINETIC]);

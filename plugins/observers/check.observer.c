@@ -20,6 +20,16 @@ static uint32_t outputs(const quern_check *c) {
 	return n;
 }
 
+/* How many numbers an instance gives: `outputs`, as often as they come. */
+static uint32_t numbers(const quern_check_kernel *k) {
+	const quern_observer_ops *ops = k->ops;
+	return outputs(k->check) * (ops->repeat ? ops->repeat(k->self) : 1);
+}
+
+static const quern_output *output_of(const quern_check_kernel *k, uint32_t i) {
+	return output(k->check, i % outputs(k->check));
+}
+
 static void nothing(const quern_check_kernel *k, const quern_check_batch *b) { (void)k, (void)b; }
 
 static quern_check_kernel *create(const quern_check *c, const quern_check_instance *it, bool optional) {
@@ -35,7 +45,7 @@ static bool map(const quern_check_kernel *k, uint32_t begin, uint32_t n, quern_r
 	quern_column use[QUERN_MOST_USES];
 	k->host->given_columns(k, begin, k->use, use);
 	quern_observer_batch batch = { .n = n, .dim = k->dim, .time = 0.25, .upper = { 1, 1, 1 }, .use = use };
-	const uint32_t count = outputs(k->check);
+	const uint32_t count = numbers(k);
 	batch.gravity[k->dim - 1] = -9.81;
 	memset(partial, 0xff, count * sizeof *partial);
 	partial[count] = 12345;
@@ -54,7 +64,7 @@ typedef struct {
 } tallies;
 
 static void total(const quern_check_kernel *k, uint32_t cut, quern_real *sum, quern_real *size, tallies *t) {
-	const uint32_t count = outputs(k->check);
+	const uint32_t count = numbers(k);
 	quern_real *partial = k->host->memory(count + 1, sizeof *partial);
 	for (uint32_t begin = 0; begin < ENTRIES; begin += cut) {
 		const uint32_t n = ENTRIES - begin < cut ? ENTRIES - begin : cut;
@@ -62,8 +72,8 @@ static void total(const quern_check_kernel *k, uint32_t cut, quern_real *sum, qu
 			"%u-D: more partials are written than there are outputs", k->dim);
 		for (uint32_t o = 0; o < count; o++) {
 			k->host->expect(&t->finite, isfinite(partial[o]), "%u-D: %s of %u entries is not finite", k->dim,
-				output(k->check, o)->name, n);
-			sum[o] = begin ? combined(output(k->check, o)->combine, sum[o], partial[o]) : partial[o];
+				output_of(k, o)->name, n);
+			sum[o] = begin ? combined(output_of(k, o)->combine, sum[o], partial[o]) : partial[o];
 			size[o] = (begin ? size[o] : 0) + fabs(partial[o]);
 		}
 	}
@@ -79,11 +89,11 @@ static void one_leaf(void *arg, uint32_t i, uint32_t worker) {
 	const leaves *l = arg;
 	(void)worker;
 	const uint32_t begin = i * LEAF, n = ENTRIES - begin < LEAF ? ENTRIES - begin : LEAF;
-	map(l->k, begin, n, l->partial + i * (outputs(l->k->check) + 1));
+	map(l->k, begin, n, l->partial + i * (numbers(l->k) + 1));
 }
 
 static void try_threads(const quern_check_kernel *k, tallies *t) {
-	const uint32_t n = (ENTRIES + LEAF - 1) / LEAF, count = outputs(k->check) + 1;
+	const uint32_t n = (ENTRIES + LEAF - 1) / LEAF, count = numbers(k) + 1;
 	leaves alone = { k, k->host->memory(n * count, sizeof(quern_real)) },
 		   many = { k, k->host->memory(n * count, sizeof(quern_real)) };
 	for (uint32_t i = 0; i < n; i++) one_leaf(&alone, i, 0);
@@ -97,16 +107,16 @@ static void try_threads(const quern_check_kernel *k, tallies *t) {
 
 static void try_map(const quern_check *c, const quern_check_instance *it, bool optional, tallies *t) {
 	static const uint32_t cuts[] = { 1, 7, 64 };
-	const uint32_t count = outputs(c);
-	quern_real *sums = c->host->memory(4 * count, sizeof *sums);
 	quern_check_kernel *k = create(c, it, optional);
+	const uint32_t count = numbers(k);
+	quern_real *sums = c->host->memory(4 * count, sizeof *sums);
 	total(k, LEAF, sums, sums + count, t);
 	for (size_t i = 0; i < sizeof cuts / sizeof *cuts; i++) {
 		total(k, cuts[i], sums + 2 * count, sums + 3 * count, t);
 		for (uint32_t o = 0; o < count; o++)
 			c->host->measure(&t->cuts, fabs(sums[2 * count + o] - sums[o]) / (sums[count + o] + 1e-300),
 				1e-11, "%u-D: %s is %.12g from leaves of 256 and %.12g from leaves of %u", it->dim,
-				output(k->check, o)->name, sums[o], sums[2 * count + o], cuts[i]);
+				output_of(k, o)->name, sums[o], sums[2 * count + o], cuts[i]);
 	}
 	try_threads(k, t);
 	c->host->kernel_destroy(k);
@@ -128,11 +138,25 @@ static void check_outputs(const quern_check *c) {
 		ops->whole ? "; whole() needs a running scene and is not called" : "");
 }
 
+static void check_repeat(const quern_check *c) {
+	quern_check_tally t = { .name = "repeat" };
+	const quern_observer_ops *ops = c->ops;
+	if (!ops->repeat) return;
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		quern_check_instance *it = c->host->instance_create(c, dim, 0);
+		const uint32_t n = it ? ops->repeat(it->self) : 1;
+		c->host->expect(&t, n >= 1 && n <= 1000, "%u-D: outputs come %u times, not 1 to 1000", dim, n);
+		c->host->instance_destroy(it);
+	}
+	c->host->tell(c, &t, NULL);
+}
+
 static void law(const quern_check *c) {
 	tallies t = { { .name = "partition" }, { .name = "threads" }, { .name = "guards" },
 		{ .name = "finite" } };
 	const quern_observer_ops *ops = c->ops;
 	check_outputs(c);
+	check_repeat(c);
 	for (uint32_t dim = 2; dim <= 3 && ops->map; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it)

@@ -23,6 +23,7 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 	X(SHEARED, "total.sheared", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(DAMPED, "total.damped", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(RUBBED, "total.rubbed", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(GRAINS_LEFT, "grain_face.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(GRAINS_LEFT_HEIGHT, "grain_face.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
@@ -47,6 +48,7 @@ enum {
 	DASHPOTS,
 	SLIDING,
 	COUPLING,
+	BODIES,
 	PASSED,
 	SUM
 };
@@ -60,6 +62,7 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 	{ .name = "damped", .unit = "J", .doc = "Lost in dashpots so far." },
 	{ .name = "rubbed", .unit = "J", .doc = "Lost to sliding contacts so far." },
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
+	{ .name = "driven", .unit = "J", .doc = "Done by bodies that move so far, with a minus." },
 	{ .name = "passed",
 		.unit = "J",
 		.doc = "Taken out through open faces, less what sources brought: of motion, of height and stored in "
@@ -85,6 +88,7 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const int rows[] = { STORED, SHEARED, DAMPED, RUBBED, EXCHANGED },
 			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
 	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;
+	for (uint32_t i = 0; u[WORK].real[0] && i < b->count[WORK]; i++) out[BODIES] -= u[WORK].real[0][i];
 	for (int row = GRAINS_LEFT; row <= POINTS_POURED_HEIGHT; row++)
 		out[PASSED] += (row < GRAINS_POURED ? 1 : -1) * book_total(u[row].real[0], b->count[row]);
 	for (int k = 0; k < SUM; k++) out[SUM] += out[k];

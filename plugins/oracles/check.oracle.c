@@ -5,18 +5,27 @@
 #include <quern/oracle.h>
 #include <stdlib.h>
 
-enum { CENTRE, DISTANCE, ZONE, LEVEL, WISH };
+enum { CENTRE, DISTANCE, ZONE, LEVEL, WISH, GAP, WEIGHT };
 enum { MARKS, DECIDES, VARIANTS };
 
 static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	const quern_oracle_ops *ops = k->ops;
 	quern_column use[QUERN_MOST_USES];
-	quern_cell_batch batch = { .n = b->n, .cap = b->cap, .dim = k->dim, .cell = 4e-3, .use = use };
+	quern_cell_batch batch = { .n = b->n,
+		.cap = b->cap,
+		.dim = k->dim,
+		.cell = 4e-3,
+		.use = use,
+		.time = 0.1,
+		.dt = k->dt,
+		.gravity = { 0, -9.81, 0 } };
 	QUERN_CHECK_VECTOR(batch.centre, k, b, CENTRE, k->dim);
 	batch.distance = quern_check_at(k, b, DISTANCE, 0);
 	batch.zone = quern_check_integers_at(k, b, ZONE);
 	batch.level = quern_check_at(k, b, LEVEL, 0);
 	batch.wish = quern_check_integers_at(k, b, WISH);
+	batch.gap = quern_check_at(k, b, GAP, 0);
+	batch.weight = quern_check_at(k, b, WEIGHT, 0);
 	k->host->columns(k, b, k->use, use);
 	(k->pass == MARKS ? ops->mark : ops->decide)(k->self, &batch);
 }
@@ -24,6 +33,8 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 static quern_check_kernel *make(
 	const quern_check *c, const quern_check_instance *it, uint32_t variant, uint32_t n) {
 	if (variant >= VARIANTS) return NULL;
+	const quern_oracle_ops *ops = c->ops;
+	const uint32_t wants = ops->wants ? ops->wants(it->self) : 0;
 	quern_check_kernel *k = c->host->kernel_create(c, it, variant == MARKS ? "mark" : "decide", n);
 	k->call = call;
 	k->pass = variant;
@@ -32,6 +43,11 @@ static quern_check_kernel *make(
 	c->host->add_integers(k, ZONE, "zone", QUERN_CHECK_IN);
 	int32_t *zone = c->host->column(k, k->at[ZONE])->given;
 	for (uint32_t i = 0; i < n; i++) zone[i] = (int32_t)c->host->uniform(111, i, 0, 2.999);
+	if (wants & QUERN_ORACLE_GAP) {
+		c->host->add(k, GAP, "gap", QUERN_CHECK_IN, 1);
+		c->host->fill(k, GAP, 1, 113, -20e-3, 60e-3);
+		quern_check_given(k, GAP, 0)[0] = INFINITY;
+	}
 	/* rows are the cells' fields in both calls, whatever their hook */
 	c->host->add_uses(k, 0, true);
 	c->host->add_uses(k, 1, true);
@@ -42,7 +58,17 @@ static quern_check_kernel *make(
 	c->host->add(k, DISTANCE, "distance", QUERN_CHECK_IN, 1);
 	c->host->fill(k, DISTANCE, 1, 112, -20e-3, 60e-3);
 	c->host->add_integers(k, WISH, "wish", QUERN_CHECK_OUT);
+	if (wants & QUERN_ORACLE_WEIGHT) c->host->add(k, WEIGHT, "weight", QUERN_CHECK_OUT, 1);
 	return k;
+}
+
+/* -1 leaves it to the solver. */
+static void look_at_weights(const quern_check_kernel *k, const int32_t *wish, quern_check_tally *weight) {
+	for (uint32_t i = 0; i < k->n; i++) {
+		const double w = quern_check_found(k, WEIGHT, 0)[i];
+		if (wish[i] == QUERN_HYBRID)
+			k->host->expect(weight, w == -1 || (w >= 0 && w <= 1), "%u-D: a share is %g", k->dim, w);
+	}
 }
 
 static void look(const quern_check_kernel *k, quern_check_tally *level, quern_check_tally *wish) {
@@ -56,7 +82,8 @@ static void look(const quern_check_kernel *k, quern_check_tally *level, quern_ch
 }
 
 static void law(const quern_check *c) {
-	quern_check_tally level = { .name = "levels are numbers" }, wish = { .name = "wishes are zones" };
+	quern_check_tally level = { .name = "levels are numbers" }, wish = { .name = "wishes are zones" },
+					  weight = { .name = "shares are shares" };
 	quern_check_kernel *k;
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (uint64_t setting = 0; setting < c->host->settings(c) + 20; setting++) {
@@ -64,12 +91,15 @@ static void law(const quern_check *c) {
 			for (uint32_t variant = 0; it && (k = make(c, it, variant, 500)); variant++) {
 				c->host->run(k, 64, false);
 				look(k, &level, &wish);
+				if (quern_check_has(k, WEIGHT))
+					look_at_weights(k, c->host->column(k, k->at[WISH])->found, &weight);
 				c->host->kernel_destroy(k);
 			}
 			c->host->instance_destroy(it);
 		}
 	c->host->tell(c, &level, NULL);
 	c->host->tell(c, &wish, NULL);
+	if (weight.tried) c->host->tell(c, &weight, NULL);
 }
 
 static const quern_param params[] = { QUERN_END_PARAMS };

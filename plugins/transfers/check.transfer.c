@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* check.transfer - from grid to particles and back, on a line of nodes: uniform motion stays, momentum is kept */
+/* check.transfer - from grid to particles and back, on a line of nodes: uniform motion stays, momentum is kept; where points
+ * send a matrix, linear motion stays too */
 #include <math.h>
 #include <quern/check.h>
 #include <quern/transfer.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { PIC, CHANGE, ECHO, SEND, OLD, VELOCITY };
+enum { PIC, CHANGE, ECHO, SEND, VELOCITY, FIT, SHIFT, AFFINE };
 
 static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	const quern_transfer_ops *ops = k->ops;
@@ -17,15 +18,23 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	QUERN_CHECK_VECTOR(batch.echo, k, b, ECHO, k->dim);
 	QUERN_CHECK_VECTOR(batch.send, k, b, SEND, k->dim);
 	QUERN_CHECK_VECTOR(batch.velocity, k, b, VELOCITY, k->dim);
+	if (quern_check_has(k, FIT)) {
+		QUERN_CHECK_VECTOR(batch.fit, k, b, FIT, k->dim * k->dim);
+		QUERN_CHECK_VECTOR(batch.shift, k, b, SHIFT, k->dim);
+		QUERN_CHECK_VECTOR(batch.affine, k, b, AFFINE, k->dim * k->dim);
+	}
 	k->host->columns(k, b, k->use, use);
 	ops->gather[k->dim - 2](k->self, &batch);
+}
+
+static uint32_t trips_of(const quern_check *c, const quern_check_instance *it) {
+	return quern_transfer_trips(c->ops, it->self);
 }
 
 /* Before the last pass a transfer sends and leaves velocities alone. */
 static quern_check_kernel *create(
 	const quern_check *c, const quern_check_instance *it, uint32_t pass, uint32_t n) {
-	const quern_transfer_ops *ops = c->ops;
-	const bool last = pass == ops->passes;
+	const bool last = pass == trips_of(c, it), matrix = last && ((const quern_transfer_ops *)c->ops)->affine;
 	quern_check_kernel *k = c->host->kernel_create(c, it, last ? "gather, last pass" : "gather", n);
 	k->call = call;
 	k->pass = pass;
@@ -35,18 +44,27 @@ static quern_check_kernel *create(
 	if (pass) c->host->add(k, ECHO, "echo", QUERN_CHECK_IN, k->dim);
 	if (!last) c->host->add(k, SEND, "send", QUERN_CHECK_OUT, k->dim);
 	c->host->add(k, VELOCITY, "velocity", last ? QUERN_CHECK_CHANGED : QUERN_CHECK_IN, k->dim);
+	if (matrix) {
+		c->host->add(k, FIT, "fit", QUERN_CHECK_IN, k->dim * k->dim);
+		c->host->add(k, SHIFT, "shift", QUERN_CHECK_IN, k->dim);
+		c->host->add(k, AFFINE, "affine", QUERN_CHECK_OUT, k->dim * k->dim);
+		c->host->fill(k, SHIFT, k->dim, 89, 1, 1);
+	}
 	c->host->add_uses(k, 0, true);
 	return k;
 }
 
 static quern_check_kernel *make(
 	const quern_check *c, const quern_check_instance *it, uint32_t variant, uint32_t n) {
-	const quern_transfer_ops *ops = c->ops;
 	static const int names[] = { PIC, CHANGE, ECHO, VELOCITY };
-	if (variant > ops->passes) return NULL;
+	if (variant > trips_of(c, it)) return NULL;
 	quern_check_kernel *k = create(c, it, variant, n);
 	for (int i = 0; i < 4; i++)
 		if (k->at[names[i]] >= 0) c->host->fill(k, names[i], k->dim, 90 + (uint64_t)i, -1, 1);
+	if (quern_check_has(k, FIT)) {
+		c->host->fill(k, FIT, k->dim * k->dim, 94, -1, 1);
+		c->host->fill(k, SHIFT, k->dim, 99, 0.5, 2);
+	}
 	return k;
 }
 
@@ -57,6 +75,7 @@ enum { PARTICLES = 400, NODES = 41 };
 typedef struct {
 	double x[PARTICLES], m[PARTICLES], v[PARTICLES][3], send[PARTICLES][3], echo[PARTICLES][3];
 	double mass[NODES], old[NODES][3], now[NODES][3];
+	double slope[PARTICLES][3]; /* of what a particle sends, along the line */
 } line;
 
 /* Mass-weighted means of `what` at the nodes. */
@@ -97,11 +116,22 @@ static void begin_line(const quern_check_host *host, line *l, bool uniform) {
 		}
 }
 
+/* What a particle may send beside its velocity: the slope along the line of what the nodes say. */
+static void give_fit(const quern_check_kernel *k, const line *l) {
+	for (int p = 0; p < PARTICLES && quern_check_has(k, FIT); p++)
+		for (uint32_t a = 0; a < k->dim; a++)
+			quern_check_given(k, FIT, k->dim * a)[p] = l->now[(int)l->x[p] + 1][a] - l->now[(int)l->x[p]][a];
+}
+static void take_affine(const quern_check_kernel *k, line *l) {
+	for (int p = 0; p < PARTICLES && quern_check_has(k, AFFINE); p++)
+		for (uint32_t a = 0; a < k->dim; a++) l->slope[p][a] = quern_check_found(k, AFFINE, k->dim * a)[p];
+}
+
 /* All passes; new velocities in l->v. */
 static void gather(const quern_check *c, const quern_check_instance *it, line *l) {
-	const quern_transfer_ops *ops = c->ops;
+	const uint32_t trips = trips_of(c, it);
 	double(*nodes)[3] = c->host->memory(NODES, sizeof *nodes);
-	for (uint32_t pass = 0; pass <= ops->passes; pass++) {
+	for (uint32_t pass = 0; pass <= trips; pass++) {
 		quern_check_kernel *k = create(c, it, pass, PARTICLES);
 		for (uint32_t a = 0; a < k->dim; a++)
 			for (int p = 0; p < PARTICLES; p++) {
@@ -111,10 +141,12 @@ static void gather(const quern_check *c, const quern_check_instance *it, line *l
 				quern_check_given(k, VELOCITY, a)[p] = l->v[p][a];
 				if (k->at[ECHO] >= 0) quern_check_given(k, ECHO, a)[p] = l->echo[p][a];
 			}
+		give_fit(k, l);
 		c->host->run(k, 64, false);
+		take_affine(k, l);
 		for (uint32_t a = 0; a < k->dim; a++)
 			for (int p = 0; p < PARTICLES; p++) {
-				if (pass == ops->passes) l->v[p][a] = quern_check_found(k, VELOCITY, a)[p];
+				if (pass == trips) l->v[p][a] = quern_check_found(k, VELOCITY, a)[p];
 				else l->send[p][a] = quern_check_found(k, SEND, a)[p];
 			}
 		to_nodes(l, l->send, nodes);
@@ -149,9 +181,34 @@ static void check_momentum(
 	}
 }
 
+/* Nodes in linear motion: after the transfer, particles send what makes them move on alike. */
+static void check_linear(
+	const quern_check *c, const quern_check_instance *it, line *l, quern_check_tally *t) {
+	begin_line(c->host, l, true);
+	for (int i = 0; i < NODES; i++)
+		for (int a = 0; a < 3; a++) l->old[i][a] = l->now[i][a] = 1 + a + 0.1 * (a - 0.5) * i;
+	for (int p = 0; p < PARTICLES; p++)
+		for (int a = 0; a < 3; a++) l->v[p][a] = 1 + a + 0.1 * (a - 0.5) * l->x[p];
+	gather(c, it, l);
+	for (int i = 1; i < NODES - 1; i++)
+		for (uint32_t a = 0; a < it->dim; a++) {
+			double sum = 0;
+			for (int p = 0; p < PARTICLES; p++) {
+				const double way = i - l->x[p], weight = 1 - fabs(way);
+				if (weight > 0) sum += weight * l->m[p] * (l->v[p][a] + l->slope[p][a] * way);
+			}
+			if (!(l->mass[i] > 0)) continue;
+			c->host->measure(t, fabs(sum / l->mass[i] - l->now[i][a]), 1e-12,
+				"%u-D: a node of %.9g m/s in a linear field comes back as %.9g", it->dim, l->now[i][a],
+				sum / l->mass[i]);
+		}
+}
+
 static void law(const quern_check *c) {
-	quern_check_tally uniform = { .name = "uniform motion" }, momentum = { .name = "momentum" };
-	const quern_transfer_ops *ops = c->ops;
+	quern_check_tally uniform = { .name = "uniform motion" }, momentum = { .name = "momentum" },
+					  linear = { .name = "linear motion" };
+	const bool matrix = ((const quern_transfer_ops *)c->ops)->affine;
+	uint32_t most = 0;
 	line *l = c->host->memory(1, sizeof *l);
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (uint64_t setting = 0; setting < c->host->settings(c); setting++) {
@@ -159,11 +216,14 @@ static void law(const quern_check *c) {
 			if (!it) continue;
 			check_uniform(c, it, l, &uniform);
 			check_momentum(c, it, l, &momentum);
+			if (matrix) check_linear(c, it, l, &linear);
+			most = trips_of(c, it) > most ? trips_of(c, it) : most;
 			c->host->instance_destroy(it);
 		}
 	free(l);
 	c->host->tell(c, &uniform, NULL);
-	c->host->tell(c, &momentum, "after %u extra round trips", ops->passes);
+	c->host->tell(c, &momentum, "after %u extra round trips", most);
+	if (matrix) c->host->tell(c, &linear, NULL);
 }
 
 static const quern_param params[] = { QUERN_END_PARAMS };
@@ -176,7 +236,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.instance_size = 1,
 	.id = "check.transfer",
-	.brief = "From grid to particles and back: uniform motion stays, momentum is kept.",
+	.brief = "From grid to particles and back: uniform and linear motion stay, momentum is kept.",
 	.params = params,
 	.uses = uses,
 	.ops = &ops };

@@ -340,6 +340,64 @@ static void flux_of_points(void **state) {
 	assert_true(good);
 }
 
+/* ---- profile ---- */
+
+/* Two slabs along x cut a grain off its middle by 0.3 of its radius; a second grain reaches through a periodic face. Shares are
+ * those of segments and caps; what all slabs hold is the mass. */
+static void slabs(void **state) {
+	(void)state;
+	for (int dim = 2; dim <= 3; dim++) {
+		seen s = grains(dim,
+			dim == 2 ? ", periodic: [true, false]}, time: {end: 10}, output: {every: 10}, observe: [mass, "
+					   "{profile: {bins: 4}}]"
+					 : ", periodic: [true, false, false]}, time: {end: 10}, output: {every: 10}, observe: "
+					   "[mass, {profile: {bins: 4}}]",
+			dim == 2 ? "{position: [0.253, 0.5], velocity: [1, 2]}, {position: [0.998, 0.2], velocity: [3, "
+					   "0]}, {position: [0.2, 0.2], velocity: [-1, 0]}"
+					 : "{position: [0.253, 0.5, 0.5], velocity: [1, 2, 3]}, {position: [0.998, 0.2, 0.2], "
+					   "velocity: [3, 0, 0]}, {position: [0.2, 0.2, 0.2], velocity: [-1, 0, 1]}");
+		const double mass = 2500 * pi * 1e-4 * (dim == 2 ? 1 : 4.0 / 3 * 0.01), volume = 0.25;
+		const double t = 0.3, low = dim == 2 ? (acos(t) - t * sqrt(1 - t * t)) / pi
+											 : 0.25 * (2 + t) * (1 - t) * (1 - t);
+		const double u = 0.2, over = dim == 2 ? (acos(u) - u * sqrt(1 - u * u)) / pi
+											  : 0.25 * (2 + u) * (1 - u) * (1 - u);
+		const double m0 = low + over + 1, x0 = (low * 1 + over * 3 - 1) / m0;
+		assert_true(table_row("density of the first slab", value(&s, "profile.density_0"), m0 * mass / volume,
+			1e-12 * mass / volume));
+		assert_true(table_row("density of the second", value(&s, "profile.density_1"),
+			(1 - low) * mass / volume, 1e-12 * mass / volume));
+		assert_true(table_row("density of the third", value(&s, "profile.density_2"), 0, 0));
+		assert_true(table_row("density of the last", value(&s, "profile.density_3"),
+			(1 - over) * mass / volume, 1e-12 * mass / volume));
+		assert_true(table_row("mean velocity of the first", value(&s, "profile.x_0"), x0, 1e-12));
+		assert_true(table_row("mean velocity of the last", value(&s, "profile.x_3"), 3, 1e-12));
+		const double z0 = dim == 2 ? 0 : (low * 3 + 1) / m0, y0 = low * 2 / m0;
+		const double square = (low * (1 + 4 + (dim == 3) * 9) + over * 9 + 1 + (dim == 3)) / m0;
+		assert_true(table_row("temperature of the first", value(&s, "profile.temperature_0"),
+			(square - x0 * x0 - y0 * y0 - z0 * z0) / dim, 1e-12));
+		assert_true(table_row("temperature of the last", value(&s, "profile.temperature_3"), 0, 1e-24));
+		leave(&s);
+	}
+}
+
+/* A block of points that moves by shear: every slab has the block's density and the velocity in its middle. */
+static void slabs_of_points(void **state) {
+	(void)state;
+	seen s = watch(harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [1, 1]}, time: {end: 1}, "
+		"output: {every: 1},\n"
+		"observe: [{profile: {axis: 1, bins: 3, region: {box: {lower: [0.2, 0.2], upper: [0.6, 0.5]}}}}],\n"
+		"continuum: {cell: 0.1, material: {elastic: {bulk_modulus: 1000, poisson: 0.2, density: 1200}}, "
+		"fill: {region: {box: "
+		"{lower: [0.2, 0.2], upper: [0.6, 0.4]}}, velocity: [0.5, -1]}}}\n"));
+	assert_true(table_row("density of the first slab", value(&s, "profile.density_0"), 1200, 1e-9));
+	assert_true(table_row("density of the second", value(&s, "profile.density_1"), 1200, 1e-9));
+	assert_true(table_row("density of the empty one", value(&s, "profile.density_2"), 0, 0));
+	assert_true(table_row("velocity along x", value(&s, "profile.x_1"), 0.5, 1e-14));
+	assert_true(table_row("velocity along y", value(&s, "profile.y_0"), -1, 1e-14));
+	leave(&s);
+}
+
 /* ---- slope ---- */
 
 static void slopes(void **state) {
@@ -414,6 +472,7 @@ int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(flower), cmocka_unit_test(pyramid),
 		cmocka_unit_test(cut_discs), cmocka_unit_test(cut_spheres), cmocka_unit_test(temperature),
 		cmocka_unit_test(flux_of_grains), cmocka_unit_test(flux_of_a_round), cmocka_unit_test(flux_of_points),
-		cmocka_unit_test(slopes), cmocka_unit_test(slope_of_points) };
+		cmocka_unit_test(slabs), cmocka_unit_test(slabs_of_points), cmocka_unit_test(slopes),
+		cmocka_unit_test(slope_of_points) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

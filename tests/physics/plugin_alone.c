@@ -69,8 +69,12 @@ alone alone_make(const char *id, uint32_t dim, const alone_value *values) {
 		for (const alone_value *v = values; v->name; v++)
 			if (!strcmp(v->name, row->name)) x = v->x, found = true;
 		if (!found) fail_msg("%s needs %s", id, row->name);
-		assert_int_equal(row->type, QUERN_T_REAL);
-		out.self[row->offset / sizeof *out.self] = x;
+		char *at = (char *)out.self + row->offset;
+		switch (row->type) {
+		case QUERN_T_INT: *(int32_t *)(void *)at = (int32_t)x; break;
+		case QUERN_T_BOOL: *(bool *)(void *)at = x != 0; break;
+		default: assert_int_equal(row->type, QUERN_T_REAL); *(quern_real *)(void *)at = x;
+		}
 	}
 	const quern_setup setup = { .dim = dim, .lanes = QUERN_LANES, .host = &host };
 	if (out.plugin->init) out.status = out.plugin->init(out.self, &setup, NULL);

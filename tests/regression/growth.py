@@ -15,6 +15,7 @@ import lab
 from workshop import FLAGS, PLUGINS, QUERN, SOURCE, source
 
 BUILD = pathlib.Path(QUERN).parent
+MAJOR, MINOR = lab.interface()
 # What plugins fill has a size or a stride; what the host fills and hands over by pointer may be longer than they know.
 LONGER = (r"\} (quern_(?:param|use|plugin|library|setup|step|host|kind|function|output|set|slot|stage|bound|\w+_ops|\w+_batch|"
           r"neighbour_job|coupling_job|check|check_host|check_instance|check_kernel|check_column));")
@@ -26,8 +27,8 @@ def newer_headers(folder):
     place.mkdir(parents=True)
     longer = 0
     for header in (SOURCE / "include/quern").iterdir():
-        text = header.read_text().replace("#define QUERN_ABI_MINOR 0u", "#define QUERN_ABI_MINOR 1u")
-        text, n = re.subn(LONGER, r"\tuint64_t later[3];\n} \1;", text)
+        text = header.read_text().replace(f"#define QUERN_ABI_MINOR {MINOR}u", f"#define QUERN_ABI_MINOR {MINOR + 1}u")
+        text, n = re.subn(LONGER, r"\tuint64_t grown[3];\n} \1;", text)
         longer += n
         (place / header.name).write_text(text)
     assert longer > 25, f"only {longer} structs are longer"
@@ -94,7 +95,7 @@ def check_newer_plugin(folder, include):
     (folder / "linear.c").write_text(source("dem/contact.linear.c"))
     run(["cc", *FLAGS, "-I", include, "-shared", folder / "linear.c", "-o", path, "-lm"])
     done = subprocess.run([QUERN, "describe", path], capture_output=True, text=True)
-    assert done.returncode == 2 and f"plugin {path} is built for interface 2.1, this program speaks 2.0: rebuild" in done.stderr
+    assert done.returncode == 2 and f"plugin {path} is built for interface {MAJOR}.{MINOR + 1}, this program speaks {MAJOR}.{MINOR}: rebuild" in done.stderr
     print("this program refuses a plugin of a newer minor version")
 
 

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import re
 import random
 import shutil
 import signal
@@ -49,8 +50,15 @@ SMALL = {
         hybrid__oracle="[{packing_fraction: {depth: 8 mm, half_width: 4 mm}}]")}
 
 
+def interface():
+    """Major and minor version of the plugin interface, from its header."""
+    text = (SOURCE / "include/quern/abi.h").read_text()
+    return tuple(int(re.search(rf"#define QUERN_ABI_{part} (\d+)u", text)[1]) for part in ("MAJOR", "MINOR"))
+
+
 def scene(name):
-    return str(SOURCE / "configs" / (name + ".yaml"))
+    """A scene of configs/ by its name, or any by its path."""
+    return str(name if isinstance(name, pathlib.Path) else SOURCE / "configs" / (name + ".yaml"))
 
 
 def command(name, folder, *options, threads=1, program=None):

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+/* fit - a linear field fitted to what the nodes around a point say, and what becomes of its moment when the point moves.
+ * docs/theory/transfers.md, section 4 */
+#pragma once
+#include "stencil.h"
+
+/* For a chunk of points. */
+typedef struct fit_memory {
+	_Alignas(64) quern_real slope[3][3][STENCIL]; /* 1/m, in place of the functions' slopes: S (x_i - x)/D */
+	quern_real moment[3][STENCIL];                /* D = sum S (x_i - x)^2, over the squared cell */
+	quern_real fit[9][STENCIL], affine[9][STENCIL], shift[3][STENCIL];
+	stencil there; /* where the points go */
+} fit_memory;
+
+/* Below this share of a squared cell D says nothing: a point that nearly sits on a node sees no other. There the shape
+ * function is a hat, whose own slope is the same fit without the quotient. */
+static const quern_real fit_least = 1.0 / 64;
+
+/* D along an axis, over the squared cell, from the way to the first node, in cells, and the weights. */
+QUERN_INLINE quern_real fit_moment(quern_real way, quern_real w0, quern_real w1, quern_real w2) {
+	return w0 * way * way + w1 * (way + 1) * (way + 1) + w2 * (way + 2) * (way + 2);
+}
+
+/* The slopes of n points. Weights are complete, so that the sum of S (x_i - x) is zero: the middle one follows from the
+ * others, and a uniform field has no slope to the last bit but one. */
+QUERN_INLINE void fit_slopes(
+	const stencil *s, uint32_t n, const int dim, quern_real inverse_cell, fit_memory *f) {
+	for (int a = 0; a < dim; a++) {
+		const int32_t *restrict first = s->first[a];
+		const quern_real *restrict x = s->position[a], *restrict w0 = s->value[a][0],
+								   *restrict w1 = s->value[a][1], *restrict w2 = s->value[a][2],
+								   *restrict g0 = s->slope[a][0], *restrict g1 = s->slope[a][1],
+								   *restrict g2 = s->slope[a][2];
+		quern_real *restrict f0 = f->slope[a][0], *restrict f1 = f->slope[a][1],
+							 *restrict f2 = f->slope[a][2], *restrict moment = f->moment[a];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			const quern_real way = first[i] - x[i] * inverse_cell, d = fit_moment(way, w0[i], w1[i], w2[i]);
+			const bool flat = !(d >= fit_least);
+			const quern_real over = inverse_cell / (flat ? 1 : d);
+			const quern_real low = w0[i] * way * over, high = w2[i] * (way + 2) * over;
+			moment[i] = d;
+			f0[i] = flat ? g0[i] : low;
+			f1[i] = flat ? g1[i] : -(low + high);
+			f2[i] = flat ? g2[i] : high;
+		}
+	}
+}
+
+/* Whether D is something all over: at a node too, where that of hats vanishes. */
+static inline bool fit_has_moments(const quern_bound *shape, uint32_t dim) {
+	const quern_grid_view plain = { .cell = 1, .dim = dim, .periodic = { true, true, true } };
+	stencil s = { .position = { { 2 }, { 2 }, { 2 } } };
+	stencil_weigh(&plain, shape, 1, &s);
+	return fit_moment(s.first[0][0] - 2, s.value[0][0][0], s.value[0][1][0], s.value[0][2][0]) >= fit_least;
+}
+
+/* D here over D there. */
+QUERN_INLINE void fit_shift(uint32_t n, const int dim, quern_real inverse_cell, fit_memory *f) {
+	for (int a = 0; a < dim; a++) {
+		const stencil *s = &f->there;
+		const int32_t *restrict first = s->first[a];
+		const quern_real *restrict x = s->position[a], *restrict w0 = s->value[a][0],
+								   *restrict w1 = s->value[a][1], *restrict w2 = s->value[a][2],
+								   *restrict here = f->moment[a];
+		quern_real *restrict shift = f->shift[a];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			const quern_real way = first[i] - x[i] * inverse_cell,
+							 there = fit_moment(way, w0[i], w1[i], w2[i]);
+			const bool flat = !(here[i] >= fit_least) | !(there >= fit_least);
+			shift[i] = flat ? 1 : here[i] / (flat ? 1 : there);
+		}
+	}
+}

@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: MIT */
+/* Oracles that look at places: zones stand where the scene draws them or where bodies are, and an oracle hears of time, gravity
+ * and bodies, and says which faces and bodies are surface to it. */
+#include <quern/oracle.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <math.h>
+#include <quern/grid.h>
+#include <unistd.h>
+
+static const double cell = 4e-3, pi = 3.14159265358979312;
+
+typedef double (*way_of)(double x, double y);
+
+/* A domain full of grains on a lattice, four in a cell, but where it is solid; without forces. Four steps, so that updates are
+ * over. */
+static quern_run *box(const char *bodies, way_of solid, const char *oracle, const char *weights) {
+	char path[HARNESS_PATH];
+	FILE *out = harness_file(path);
+	fprintf(out, "x y\n");
+	for (int j = 0; j < 60; j++)
+		for (int i = 0; i < 60; i++) {
+			const double x = 0.002 * i + 0.001, y = 0.002 * j + 0.001;
+			if (!solid || solid(x, y) > 0.0011) fprintf(out, "%.17g %.17g\n", x, y);
+		}
+	fclose(out);
+	quern_run *run = harness_open(1,
+		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.12, 0.12]}\n"
+		"time: {end: 1e-6, step: 1e-9}\nbodies: [%s]\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.999 mm}}, file: %s,\n"
+		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}}\n"
+		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+		"hybrid: {oracle: [%s], substeps: 1, update: 1, guard: 10, weights: %s}\n",
+		bodies, path, cell, oracle, weights);
+	unlink(path);
+	harness_steps(run, 4);
+	return run;
+}
+
+/* Cells whose zone is not what the distance says, and the worst share of those that are hybrid. A cell whose centre is within
+ * `slack` of a border may have either zone; what lies in a body has none. */
+static int misplaced(
+	quern_run *run, way_of way, way_of solid, double discrete, double width, double slack, double *off) {
+	const int32_t *zone = harness_field(run, "cell.zone").index;
+	const quern_grid_view *g = quern_host_table.grid(run);
+	const double *share = harness_has(run, "cell.weight") ? harness_field(run, "cell.weight").real[0] : NULL;
+	int wrong = 0, seen[3] = { 0 };
+	*off = 0;
+	for (int j = 0; j < 30; j++)
+		for (int i = 0; i < 30; i++) {
+			const double x = (i + 0.5) * cell, y = (j + 0.5) * cell, d = way(x, y) - discrete;
+			const int32_t c = quern_grid_entry(g, (const int32_t[3]) { i, j, 0 });
+			if ((solid && solid(x, y) < cell) || fabs(d) < slack || fabs(d - width) < slack) continue;
+			const int32_t asked = d <= 0 ? QUERN_DISCRETE : d < width ? QUERN_HYBRID : QUERN_CONTINUUM;
+			wrong += zone[c] != asked;
+			seen[asked]++;
+			if (share && asked == QUERN_HYBRID)
+				*off = fmax(*off, fabs(share[c] - fmax(0.02, fmin(0.98, 0.5 - 0.5 * cos(pi * d / width)))));
+		}
+	for (int k = 0; k < 3; k++) assert_true(seen[k] > 10);
+	return wrong;
+}
+
+static double left_of_box(double x, double y) {
+	const double a = fmax(x - 0.04, 0), b = fmax(y - 0.06, 0);
+	return a > 0 || b > 0 ? hypot(a, b) : fmax(x - 0.04, y - 0.06);
+}
+static double from_disc(double x, double y) { return hypot(x - 0.06, y - 0.06) - 0.02; }
+static double behind_plane(double x, double y) { return 0.6 * (x - 0.05) + 0.8 * (y - 0.05); }
+static double into_box(double x, double y) { return fmin(fmin(x - 0.03, 0.1 - x), fmin(y - 0.02, 0.1 - y)); }
+
+/* What the scene draws is where it draws it, with a cosine of the way to the grains as the continuum's share. */
+static void drawn_zones(void **state) {
+	static const struct {
+		const char *oracle;
+		way_of way;
+		double width;
+	} scenes[] = {
+		{ "{fixed: {boxes: [{lower: [-1, -1], upper: [0.04, 0.06]}], ramp: 0.016}}", left_of_box, 0.016 },
+		{ "{fixed: {spheres: [{centre: [0.06, 0.06], radius: 0.02}], ramp: 0.02}}", from_disc, 0.02 },
+		{ "{fixed: {half_spaces: [{point: [0.05, 0.05], normal: [3, 4]}], ramp: 0.018}}", behind_plane,
+			0.018 },
+		{ "{fixed: {boxes: [{lower: [0.03, 0.02], upper: [0.1, 0.1], zone: continuum}], otherwise: discrete, "
+		  "ramp: 0.012}}",
+			into_box, 0.012 },
+	};
+	(void)state;
+	bool good = true;
+	table_head("cells in another zone than was drawn; worst share");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		double off;
+		quern_run *run = box("", NULL, scenes[k].oracle, "half");
+		/* depths within the box are negative outside */
+		const int wrong = misplaced(run, scenes[k].way, NULL, 0, scenes[k].width, 1e-9, &off);
+		good &= table_row(scenes[k].oracle, wrong, 0, 0);
+		good &= table_row("  share", off, 0, 1e-12);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+/* With `weights: ramp` the cells of a drawn zone get shares by their place between its sides; half shares else. */
+static void ramps_across_a_zone(void **state) {
+	(void)state;
+	bool good = true;
+	table_head("share of the continuum in the cells across a zone");
+	for (int ramp = 0; ramp <= 1; ramp++) {
+		quern_run *run = box("", NULL,
+			"{fixed: {boxes: [{lower: [-1, -1], upper: [0.04, 1]}, {lower: [0, -1], upper: [0.056, 1], zone: "
+			"hybrid}]}}",
+			ramp ? "ramp" : "half");
+		const quern_grid_view *g = quern_host_table.grid(run);
+		for (int k = -1; k <= 4; k++) {
+			char name[40];
+			const int32_t c = quern_grid_entry(g, (const int32_t[3]) { 10 + k, 15, 0 });
+			const double asked = k < 0 ? 0 : k > 3 ? 1 : 0.5 - 0.5 * cos(pi * (k + 0.5) / 4);
+			snprintf(name, sizeof name, "cell %d behind the grains", k + 1);
+			if (ramp) good &= table_row(name, harness_field(run, "cell.weight").real[0][c], asked, 1e-12);
+		}
+		assert_true(ramp || !harness_has(run, "cell.weight"));
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+static double from_floor(double x, double y) { return (void)x, y - 0.008; }
+static double from_rod(double x, double y) { return hypot(x - 0.06, y - 0.06) - 0.01; }
+static double from_either(double x, double y) { return fmin(from_floor(x, y), from_rod(x, y)); }
+
+/* Grains within 10 mm of a body, a hybrid zone of 8 mm behind: of all bodies, or of the one that has been named. */
+static void zones_near_bodies(void **state) {
+	static const char bodies[] = "{plane: {point: [0, 0.008], normal: [0, 1], name: floor}}, "
+								 "{cylinder: {centre: [0.06, 0.06], radius: 0.01, name: rod}}";
+	static const struct {
+		const char *which;
+		way_of way;
+	} scenes[] = { { "", from_either }, { ", bodies: [{body: rod}]", from_rod },
+		{ ", bodies: [{body: 0}]", from_floor } };
+	(void)state;
+	bool good = true;
+	table_head("cells in another zone than their distance from bodies says");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		char oracle[120];
+		double off;
+		snprintf(oracle, sizeof oracle, "{near_bodies: {distance: 10 mm, width: 8 mm%s}}", scenes[k].which);
+		quern_run *run = box(bodies, from_either, oracle, "half");
+		/* within the hysteresis a zone stays what it was: discrete at first */
+		good &= table_row(
+			oracle, misplaced(run, scenes[k].way, from_either, 0.01, 0.008, 0.75e-3 + 1e-9, &off), 0, 0);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+static double from_top(double x, double y) { return (void)x, 0.12 - y; }
+static double from_sides(double x, double y) { return fmin(fmin(x, 0.12 - x), fmin(y, 0.12 - y)); }
+static double from_rods(double x, double y) {
+	return fmin(from_rod(x, y), fmax(fabs(x - 0.016) - 0.004, fabs(y - 0.035) - 0.015));
+}
+static double from_top_or_rod(double x, double y) { return fmin(from_top(x, y), from_rod(x, y)); }
+
+/* An oracle says which faces of the domain are open, and which bodies are surface; it hears of time, gravity and the gap to
+ * these. The domain is full to its faces. */
+static void faces_and_bodies_that_are_meant(void **state) {
+	static const char rods[] = "{cylinder: {centre: [0.06, 0.06], radius: 0.01}}, "
+							   "{box: {lower: [0.012, 0.02], upper: [0.02, 0.05]}}";
+	static const struct {
+		const char *name, *oracle;
+		way_of way;
+	} scenes[] = { { "the upper face", "{open_top: {}}", from_top },
+		{ "all faces", "{open_top: {all_faces: true}}", from_sides },
+		{ "the upper face and a rod", "{open_top: {body: 0}}", from_top_or_rod } };
+	(void)state;
+	bool good = true;
+	table_head("cells in another zone than their distance from what is meant says");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		const way_of solid = k == 2 ? from_rods : NULL;
+		double off;
+		quern_run *run = box(k == 2 ? rods : "", solid, scenes[k].oracle, "half");
+		const double slack = k == 2 ? 1.1 * cell : 0.75e-3 + 1e-9; /* steps count from cell to cell */
+		good &= table_row(
+			scenes[k].name, misplaced(run, scenes[k].way, solid, 0.008, 3 * cell, slack, &off), 0, 0);
+		const quern_column told = harness_field(run, "cell.told");
+		const quern_grid_view *g = quern_host_table.grid(run);
+		const int32_t c = quern_grid_entry(g, (const int32_t[3]) { 25, 20, 0 });
+		const double gap = hypot(0.102 - 0.06, 0.082 - 0.06) - 0.01;
+		good &=
+			table_row("  time over that of the last step", told.real[0][c] / (3 * run->clock.dt), 1, 1e-12);
+		good &= table_row("  step", told.real[1][c] / run->clock.dt, 1, 1e-12);
+		good &= table_row("  gap, inverse", 1 / told.real[3][c], k == 2 ? 1 / gap : 0, 1e-9);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(drawn_zones), cmocka_unit_test(ramps_across_a_zone),
+		cmocka_unit_test(zones_near_bodies), cmocka_unit_test(faces_and_bodies_that_are_meant) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
