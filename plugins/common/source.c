@@ -55,12 +55,15 @@ bool quern_source_acts(const source *p, const quern_step *s) {
 	return s->step % (steps > 1 ? steps : 1) == 0 && s->time >= p->from;
 }
 
-quern_real quern_source_due(const source *p, quern_real time) {
-	const quern_real end = time > p->until ? p->until : time;
-	quern_real due = 0;
-	if (p->keep == SOURCE_BY_RATE) due = end > p->from ? p->rate * (end - p->from) : 0;
-	else due = time >= p->from && !(time >= p->until) ? INFINITY : 0;
-	return due > p->most ? p->most : due;
+/* Added up from look to look, since one of the scene's stages may change the rate. */
+quern_real quern_source_due(const source *p, quern_real time, uint32_t i, const quern_column *row) {
+	quern_real *due = &row[0].real[0][i], *looked = &row[1].real[0][i];
+	const quern_real begin = *looked > p->from ? *looked : p->from, end = time > p->until ? p->until : time;
+	const bool full = p->keep == SOURCE_FULL;
+	if (!full && end > begin) *due += p->rate * (end - begin);
+	*looked = time;
+	const quern_real all = !full ? *due : time >= p->until ? 0 : INFINITY;
+	return all > p->most ? p->most : all;
 }
 
 void quern_source_note(const quern_step *s, uint32_t i, const char *section, const source *p,

@@ -202,7 +202,7 @@ static quern_status pour_one(pouring *p) {
 	const quern_step *s = p->s;
 	int32_t *draws = &s->use[POUR_DRAWS].index[p->i];
 	p->draws = (uint32_t)*draws;
-	p->rest = quern_source_due(p->item, s->time) - s->use[POURED_MASS].real[0][p->i];
+	p->rest = quern_source_due(p->item, s->time, p->i, &s->use[POUR_DUE]) - s->use[POURED_MASS].real[0][p->i];
 	if (is_due(p)) {
 		p->failed = !gather_near(p);
 		if (!p->failed) pack(p, &s->slot[SLOT_SOURCE_PACKER][p->i]);

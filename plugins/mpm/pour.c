@@ -128,7 +128,8 @@ static quern_status add_points(const pouring *w) {
 
 static quern_status pour_one(pouring *w) {
 	const quern_step *s = w->s;
-	quern_real rest = quern_source_due(w->item, s->time) - s->use[POURED_MASS].real[0][w->i];
+	quern_real rest =
+		quern_source_due(w->item, s->time, w->i, &s->use[POUR_DUE]) - s->use[POURED_MASS].real[0][w->i];
 	if (rest >= w->mass) {
 		const bool good = draw_way(w) && gather_near(w);
 		if (good) rest = take_places(w, rest);

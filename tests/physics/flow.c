@@ -302,6 +302,26 @@ static void sources_pour(void **state) {
 	assert_true(pour(points, "point", 1000 * 25e-6, 1) && good);
 }
 
+/* A stage of the scene that doubles the rate does so from then on. */
+static void rates_change(void **state) {
+	char section[600];
+	bool good = true;
+	(void)state;
+	table_head("sources at 5 kg/s from 0.1 s on, at 10 kg/s from 0.3 s on");
+	for (int c = 0; c < 2; c++) {
+		snprintf(section, sizeof section, "%s, stages: [{for: 0.3}, {set: {%s.rate: 10}}]",
+			c ? points : grains, c ? "continuum.source" : "grains.source.0");
+		quern_run *run = open_source(1, 256, section);
+		harness_until(run, 0.5);
+		const double due = 5 * 0.2 + 10 * (quern_run_time(run) - 0.3),
+					 poured = quern_run_carries(run, "poured");
+		const double slack = c ? 0.025 + 10 * run->clock.dt : 0.012 + 10 * 100 * run->clock.dt;
+		good &= table_row(c ? "points, kg" : "grains, kg", poured, due, slack);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 /* New entries are the same ones for any number of threads and any batch. */
 static void sources_are_the_same(void **state) {
 	(void)state;
@@ -385,7 +405,8 @@ static void full_and_late(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(grains_leave), cmocka_unit_test(spills_close),
 		cmocka_unit_test(spills_are_the_same), cmocka_unit_test(points_leave), cmocka_unit_test(points_fall),
-		cmocka_unit_test(sources_pour), cmocka_unit_test(sources_are_the_same),
-		cmocka_unit_test(budget_closes), cmocka_unit_test(full_and_late) };
+		cmocka_unit_test(sources_pour), cmocka_unit_test(rates_change),
+		cmocka_unit_test(sources_are_the_same), cmocka_unit_test(budget_closes),
+		cmocka_unit_test(full_and_late) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
