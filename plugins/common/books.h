@@ -25,6 +25,10 @@
 	.doc = "Of what has left in this step: mass times how long gravity has acted on it."
 #define WAITING_USE(SET) \
 	SET ".waiting", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "sources", .doc = "Due, and without room."
+#define DUE_USE(SET) \
+	SET ".due", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "sources", .doc = "Shall have been poured by the last look."
+#define LOOKED_USE(SET) \
+	SET ".looked", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "sources", .doc = "Time of the last look."
 #define LATE_USE(SET) \
 	SET ".late", "1", QUERN_UPDATE, QUERN_INDEX, .when = "sources", .doc = "1: some has waited, which was said."
 /* clang-format on */

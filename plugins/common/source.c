@@ -4,26 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
-static const char *const keeps[] = { "rate", "full", NULL };
-
-const quern_param quern_source_rows[] = { QUERN_PARAM_AS(source, lower, "region.box.lower", "m",
-											  "Lower corner of the region in which new centres lie.",
-											  .flags = QUERN_REQUIRED),
-	QUERN_PARAM_AS(source, upper, "region.box.upper", "m", "Upper corner.", .flags = QUERN_REQUIRED),
-	QUERN_PARAM(source, velocity, "m/s", "Velocity of what is poured."),
-	QUERN_PARAM(source, rate, "kg/s", "Mass poured per second; in 2-D of a slab one metre thick.",
-		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
-	QUERN_PARAM(source, keep, "1",
-		"What is kept: the rate, so that mass without room waits; or the region full, whatever that takes.",
-		.choices = keeps),
-	QUERN_PARAM(source, from, "s", "When it begins.", .max = 1e12),
-	QUERN_PARAM(source, until, "s", "When it ends; default: never.", .flags = QUERN_MAYBE | QUERN_MIN_OPEN,
-		.max = 1e12),
-	QUERN_PARAM_AS(source, most, "mass", "kg", "Mass after which it ends; default: none.",
-		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
-	QUERN_PARAM(source, every, "1", "Short steps between two looks for room.", .def = 100, .min = 1,
-		.max = 1e6, .flags = QUERN_ADVANCED),
-	QUERN_END_PARAMS };
+const char *const quern_source_keeps[] = { "rate", "full", NULL };
 
 static quern_status check_region(
 	const source *p, uint32_t i, bool flat, const quern_setup *setup, quern_err *err) {
@@ -74,12 +55,15 @@ bool quern_source_acts(const source *p, const quern_step *s) {
 	return s->step % (steps > 1 ? steps : 1) == 0 && s->time >= p->from;
 }
 
-quern_real quern_source_due(const source *p, quern_real time) {
-	const quern_real end = time > p->until ? p->until : time;
-	quern_real due = 0;
-	if (p->keep == SOURCE_BY_RATE) due = end > p->from ? p->rate * (end - p->from) : 0;
-	else due = time >= p->from && !(time >= p->until) ? INFINITY : 0;
-	return due > p->most ? p->most : due;
+/* Added up from look to look, since one of the scene's stages may change the rate. */
+quern_real quern_source_due(const source *p, quern_real time, uint32_t i, const quern_column *row) {
+	quern_real *due = &row[0].real[0][i], *looked = &row[1].real[0][i];
+	const quern_real begin = *looked > p->from ? *looked : p->from, end = time > p->until ? p->until : time;
+	const bool full = p->keep == SOURCE_FULL;
+	if (!full && end > begin) *due += p->rate * (end - begin);
+	*looked = time;
+	const quern_real all = !full ? *due : time >= p->until ? 0 : INFINITY;
+	return all > p->most ? p->most : all;
 }
 
 void quern_source_note(const quern_step *s, uint32_t i, const char *section, const source *p,

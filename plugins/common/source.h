@@ -11,15 +11,36 @@ typedef struct source {
 	int32_t keep, every;
 } source;
 
-/* The keys of an item of a solver's list `source`. */
-extern const quern_param quern_source_rows[];
+extern const char *const quern_source_keeps[];
+/* The keys of an item of a solver's list `source`; without being told it looks for room every EVERY short steps. */
+/* clang-format off */
+#define SOURCE_ROWS(EVERY) \
+	{ QUERN_PARAM_AS(source, lower, "region.box.lower", "m", \
+		"Lower corner of the region in which new centres lie.", \
+		.flags = QUERN_REQUIRED), \
+	QUERN_PARAM_AS(source, upper, "region.box.upper", "m", "Upper corner.", .flags = QUERN_REQUIRED), \
+	QUERN_PARAM(source, velocity, "m/s", "Velocity of what is poured."), \
+	QUERN_PARAM(source, rate, "kg/s", "Mass poured per second; in 2-D of a slab one metre thick.", \
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12), \
+	QUERN_PARAM(source, keep, "1", \
+		"What is kept: the rate, so that mass without room waits; or the region full, whatever that takes.", \
+		.choices = quern_source_keeps), \
+	QUERN_PARAM(source, from, "s", "When it begins.", .max = 1e12), \
+	QUERN_PARAM(source, until, "s", "When it ends; default: never.", .flags = QUERN_MAYBE | QUERN_MIN_OPEN, \
+		.max = 1e12), \
+	QUERN_PARAM_AS(source, most, "mass", "kg", "Mass after which it ends; default: none.", \
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12), \
+	QUERN_PARAM(source, every, "1", "Short steps between two looks for room.", .def = EVERY, .min = 1, \
+		.max = 1e6, .flags = QUERN_ADVANCED), \
+	QUERN_END_PARAMS }
+/* clang-format on */
 
 /* [setup] Regions in the domain, times in order, a rate where one is needed; `flat`: a region may be as thin as it likes. */
 quern_status quern_sources_check(const quern_list *, bool flat, const quern_setup *, quern_err *);
 /* Whether the source looks for room in this step. */
 bool quern_source_acts(const source *, const quern_step *);
-/* kg that shall have been poured by now; infinite where the region is kept full. */
-quern_real quern_source_due(const source *, quern_real time);
+/* kg that shall have been poured by now; infinite where the region is kept full. Entry i of rows of DUE_USE and LOOKED_USE. */
+quern_real quern_source_due(const source *, quern_real time, uint32_t i, const quern_column *row);
 /* Notes what of source i of a section is due and has no room, and says so once: rows of WAITING_USE and LATE_USE. */
 void quern_source_note(const quern_step *, uint32_t i, const char *section, const source *,
 	quern_real waiting, const quern_column *row);

@@ -202,7 +202,7 @@ static quern_status pour_one(pouring *p) {
 	const quern_step *s = p->s;
 	int32_t *draws = &s->use[POUR_DRAWS].index[p->i];
 	p->draws = (uint32_t)*draws;
-	p->rest = quern_source_due(p->item, s->time) - s->use[POURED_MASS].real[0][p->i];
+	p->rest = quern_source_due(p->item, s->time, p->i, &s->use[POUR_DUE]) - s->use[POURED_MASS].real[0][p->i];
 	if (is_due(p)) {
 		p->failed = !gather_near(p);
 		if (!p->failed) pack(p, &s->slot[SLOT_SOURCE_PACKER][p->i]);
@@ -216,9 +216,11 @@ static quern_status pour_one(pouring *p) {
 
 quern_status quern_dem_pour(const void *self, const quern_step *s) {
 	pouring p = { .d = self, .s = s, .law = ((const dem *)self)->material[0].radii };
+	/* as many as the scene itself has, whatever one of its stages says */
+	const uint32_t n = s->host->set(s->run, "grain_source").n;
 	quern_status status = QUERN_OK;
 	p.law.stream += 2; /* after those of the fill and of its packers */
-	for (p.i = 0; p.i < p.d->source.n && status == QUERN_OK; p.i++) {
+	for (p.i = 0; p.i < p.d->source.n && p.i < n && status == QUERN_OK; p.i++) {
 		p.item = (const source *)p.d->source.items + p.i;
 		p.n = 0;
 		if (quern_source_acts(p.item, s)) status = pour_one(&p);

@@ -72,7 +72,9 @@ QUERN_USE_ENUM(OUTLET_USES);
 	X(POUR_DRAWS, "grain_source.draws", "1", QUERN_UPDATE, QUERN_INDEX, .when = "sources", \
 		.doc = "Radii drawn so far.") \
 	X(POUR_WAITING, WAITING_USE("grain_source")) \
-	X(POUR_LATE, LATE_USE("grain_source"))
+	X(POUR_LATE, LATE_USE("grain_source")) \
+	X(POUR_DUE, DUE_USE("grain_source")) \
+	X(POUR_LOOKED, LOOKED_USE("grain_source"))
 QUERN_USE_ENUM(POUR_USES);
 
 /* positions are brought back through periodic faces in place, all of them before anybody looks at others */

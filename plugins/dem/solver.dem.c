@@ -57,6 +57,7 @@ static const quern_param pair_rows[] = {
 		.rows = word_rows, .item_size = sizeof(dem_word), .flags = QUERN_REQUIRED),
 	QUERN_END_PARAMS
 };
+static const quern_param source_rows[] = SOURCE_ROWS(100);
 static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .unless = "materials"),
 	QUERN_PARAM(dem, materials, NULL,
 		"Several materials, by name: {sand: {density: ..., radius: ...}, ...}. The first stands for all "
@@ -75,7 +76,7 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		"Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed] [material].",
 		.flags = QUERN_FILE),
 	QUERN_PARAM(dem, source, NULL, "Regions that pour grains, of the first material where there are several.",
-		.rows = quern_source_rows, .item_size = sizeof(source)),
+		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
@@ -417,8 +418,9 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_real *radius = use[FILL_RADIUS].real[0], turning = quern_radius_inertia(s->dim);
 	const uint32_t n_spin = !use[FILL_SPIN].real[0] ? 0 : s->dim == 3 ? 3 : 1;
 	cloud_sums c;
+	(void)self;
 	out[SUM_LEFT] = book_total(use[FILL_LEFT].real[0], outlet_faces(s));
-	out[SUM_POURED] = book_total(use[FILL_POURED].real[0], ((const dem *)self)->source.n);
+	out[SUM_POURED] = book_total(use[FILL_POURED].real[0], s->host->set(s->run, "grain_source").n);
 	if (!grains.n || !cloud_open(&c, s->host, s->run, &grains)) return;
 	cloud_account(&c, &use[FILL_POSITION], &use[FILL_VELOCITY], s, out);
 	out[SUM_DISCRETE] += cloud_total(&c);

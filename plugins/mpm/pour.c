@@ -128,7 +128,8 @@ static quern_status add_points(const pouring *w) {
 
 static quern_status pour_one(pouring *w) {
 	const quern_step *s = w->s;
-	quern_real rest = quern_source_due(w->item, s->time) - s->use[POURED_MASS].real[0][w->i];
+	quern_real rest =
+		quern_source_due(w->item, s->time, w->i, &s->use[POUR_DUE]) - s->use[POURED_MASS].real[0][w->i];
 	if (rest >= w->mass) {
 		const bool good = draw_way(w) && gather_near(w);
 		if (good) rest = take_places(w, rest);
@@ -143,8 +144,10 @@ static quern_status pour_one(pouring *w) {
 /* In a hybrid grains are poured, and its oracle decides what becomes of them. */
 quern_status quern_mpm_pour(const void *self, const quern_step *s) {
 	pouring w = { .p = self, .s = s };
+	/* as many as the scene itself has, whatever one of its stages says */
+	const uint32_t n = s->host->set(s->run, "point_source").n;
 	quern_status status = QUERN_OK;
-	for (uint32_t i = 0; i < w.p->source.n && status == QUERN_OK; i++) {
+	for (uint32_t i = 0; i < w.p->source.n && i < n && status == QUERN_OK; i++) {
 		begin(&w, i);
 		if (quern_source_acts(w.item, s)) status = pour_one(&w);
 	}

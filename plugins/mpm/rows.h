@@ -41,7 +41,9 @@ QUERN_USE_ENUM(FILL_USES);
 	X(POUR_UNSORTED, UNSORTED_USE) \
 	BOOK_ROWS(X, POURED, "point_source", "sources") \
 	X(POUR_WAITING, WAITING_USE("point_source")) \
-	X(POUR_LATE, LATE_USE("point_source"))
+	X(POUR_LATE, LATE_USE("point_source")) \
+	X(POUR_DUE, DUE_USE("point_source")) \
+	X(POUR_LOOKED, LOOKED_USE("point_source"))
 QUERN_USE_ENUM(POUR_USES);
 
 #define OUTLET_USES(X) \

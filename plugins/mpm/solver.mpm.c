@@ -18,6 +18,7 @@ static const quern_param fill_rows[] = { QUERN_PARAM_AS(mpm_fill, lower, "region
 		.choices = stresses),
 	QUERN_PARAM(mpm_fill, lateral, "1", "Horizontal over vertical stress at rest.", .def = 0.6, .max = 10),
 	QUERN_END_PARAMS };
+static const quern_param source_rows[] = SOURCE_ROWS(5);
 static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 										  "Cell of the grid; the domain is a whole number of them.",
 										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
@@ -25,7 +26,7 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill)),
 	QUERN_PARAM(mpm, source, NULL, "Regions that pour material; in a hybrid its grains are poured alone.",
-		.rows = quern_source_rows, .item_size = sizeof(source)),
+		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(mpm, rasterise, "1",
 		"What points send to the nodes: their velocity (plain), or with it the velocity gradient of the last "
 		"step, or what the transfer gives in its place (affine); auto: affine where a hybrid's coupling or "
@@ -258,8 +259,9 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 	const cloud points = { u[FILL_MASS].real[0], u[FILL_WEIGHT].real[0], NULL,
 		s->host->set(s->run, "point").n };
 	cloud_sums c;
+	(void)self;
 	out[SUM_LEFT] = book_total(u[FILL_LEFT].real[0], outlet_faces(s));
-	out[SUM_POURED] = book_total(u[FILL_POURED].real[0], ((const mpm *)self)->source.n);
+	out[SUM_POURED] = book_total(u[FILL_POURED].real[0], s->host->set(s->run, "point_source").n);
 	if (!points.n || !cloud_open(&c, s->host, s->run, &points)) return;
 	cloud_account(&c, &u[FILL_POSITION], &u[FILL_VELOCITY], s, out);
 	CLOUD_ADD(&c, i, 0.5 * cloud_square(&u[FILL_VELOCITY], i, s->dim), out[SUM_KINETIC]);

@@ -216,6 +216,38 @@ static void points_leave(void **state) {
 	assert_true(good);
 }
 
+/* A block that falls through the floor: what is still there falls as freely as before, and the books hold gravity. */
+static void points_fall(void **state) {
+	quern_run *run =
+		harness_open(1, "{quern: 1, dimension: 2, gravity: [0, -10], time: {end: 1}, output: {every: 1, "
+						"fields: [total.faces]},\n"
+						"domain: {lower: [0, 0], upper: [1, 1], open: [lower_y]},\n"
+						"continuum: {cell: 0.1, material: {elastic: {bulk_modulus: 1e5, density: 1000}},\n"
+						"  fill: {region: {box: {lower: [0.3, 0.1], upper: [0.7, 0.6]}}}}}\n");
+	const double whole = quern_run_carries(run, "mass");
+	double pull = 0;
+	(void)state;
+	while (quern_run_time(run) < 0.3) {
+		const double before = quern_run_carries(run, "mass");
+		harness_steps(run, 1);
+		pull += before * 10 * run->clock.dt;
+	}
+	const double left = total(run, "point_face.mass", 0, 4), there = quern_run_carries(run, "mass");
+	const double momentum = quern_run_carries(run, "momentum_y");
+	table_head("a block of points that falls through an open floor");
+	table_note("share that has left", left / whole);
+	bool good = table_row("mass, there and left", (there + left) / whole, 1, 1e-12);
+	good &= table_row(
+		"velocity of what is there over g t", -momentum / there / (10 * quern_run_time(run)), 1, 1e-9);
+	good &= table_row("momentum, there and left, over that of gravity",
+		(momentum + total(run, "point_face.momentum", 1, 4) - harness_field(run, "total.faces").real[1][0]) /
+			pull,
+		-1, 1e-12);
+	assert_true(left > 0.3 * whole && there > 0.1 * whole);
+	harness_close(run);
+	assert_true(good);
+}
+
 /* ---- sources ---- */
 
 static quern_run *open_source(uint32_t workers, uint32_t batch, const char *section) {
@@ -268,6 +300,26 @@ static void sources_pour(void **state) {
 	(void)state;
 	const bool good = pour(grains, "grain", 2500 * 3.141592653589793 * 1.44e-6, 100);
 	assert_true(pour(points, "point", 1000 * 25e-6, 1) && good);
+}
+
+/* A stage of the scene that doubles the rate does so from then on. */
+static void rates_change(void **state) {
+	char section[600];
+	bool good = true;
+	(void)state;
+	table_head("sources at 5 kg/s from 0.1 s on, at 10 kg/s from 0.3 s on");
+	for (int c = 0; c < 2; c++) {
+		snprintf(section, sizeof section, "%s, stages: [{for: 0.3}, {set: {%s.rate: 10}}]",
+			c ? points : grains, c ? "continuum.source" : "grains.source.0");
+		quern_run *run = open_source(1, 256, section);
+		harness_until(run, 0.5);
+		const double due = 5 * 0.2 + 10 * (quern_run_time(run) - 0.3),
+					 poured = quern_run_carries(run, "poured");
+		const double slack = c ? 0.025 + 10 * run->clock.dt : 0.012 + 10 * 100 * run->clock.dt;
+		good &= table_row(c ? "points, kg" : "grains, kg", poured, due, slack);
+		harness_close(run);
+	}
+	assert_true(good);
 }
 
 /* New entries are the same ones for any number of threads and any batch. */
@@ -352,7 +404,8 @@ static void full_and_late(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(grains_leave), cmocka_unit_test(spills_close),
-		cmocka_unit_test(spills_are_the_same), cmocka_unit_test(points_leave), cmocka_unit_test(sources_pour),
+		cmocka_unit_test(spills_are_the_same), cmocka_unit_test(points_leave), cmocka_unit_test(points_fall),
+		cmocka_unit_test(sources_pour), cmocka_unit_test(rates_change),
 		cmocka_unit_test(sources_are_the_same), cmocka_unit_test(budget_closes),
 		cmocka_unit_test(full_and_late) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
