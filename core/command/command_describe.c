@@ -95,6 +95,8 @@ static json_t *param_json(const quern_param *row) {
 	quern_param_range(row, range);
 	if (*range) json_object_set_new(one, "range", json_string(range));
 	if (row->from) json_object_set_new(one, "from", json_string(row->from));
+	if (row->unless) json_object_set_new(one, "unless", json_string(row->unless));
+	if (row->type == QUERN_T_LIST && row->text) json_object_set_new(one, "named_by", json_string(row->text));
 	json_object_set_new(one, "default", default_json(row)); /* NULL sets nothing */
 	if (row->type == QUERN_T_REAL || row->type == QUERN_T_INT) {
 		if (row->flags & QUERN_PLANAR) json_object_set_new(one, "default_2d", json_real(row->planar));
@@ -127,10 +129,11 @@ static void print_param(const quern_param *row, int indent) {
 		printf(" {");
 		for (const char *const *c = row->choices; *c; c++) printf("%s%s", c == row->choices ? "" : ", ", *c);
 		printf("}");
-	} else printf(" %s", type_names[row->type]);
+	} else printf(" %s", row->type == QUERN_T_LIST && row->text ? "map or list" : type_names[row->type]);
 	if (*range) printf(", %s", range);
 	if (row->from) printf("; default: %s", row->from);
-	else if (row->flags & QUERN_REQUIRED) printf("; required");
+	else if (row->flags & QUERN_REQUIRED)
+		printf("; required%s%s", row->unless ? " without " : "", row->unless ? row->unless : "");
 	else if (row->choices) printf("; default: %s", row->choices[(int)row->def]);
 	else if (row->type == QUERN_T_BOOL) printf("; default: %s", row->def != 0 ? "true" : "false");
 	else if (row->type == QUERN_T_TEXT && row->text) printf("; default: %s", row->text);
@@ -182,8 +185,9 @@ static void print_solver(const quern_solver_ops *ops) {
 	puts("\nslots");
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
 		if (s->same_as) continue;
-		printf("  %-16s %s: %s%s%s\n", *s->name ? s->name : "(the section)", s->kind->name,
-			s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "");
+		printf("  %-16s %s: %s%s%s%s%s\n", *s->name ? s->name : "(the section)", s->kind->name,
+			s->doc ? s->doc : "", s->def ? "; default: " : "", s->def ? s->def : "",
+			s->refine ? "; its keys may stand in the items of " : "", s->refine ? s->refine : "");
 		for (const quern_param *row = s->rows; row && row->name; row++) print_param(row, 6);
 	}
 	puts("\nstages");
@@ -240,10 +244,11 @@ static json_t *slots_json(const quern_solver_ops *ops) {
 	json_t *slots = json_array();
 	for (const quern_slot *s = ops->slots; s && s->name; s++)
 		if (!s->same_as)
-			json_array_append_new(slots,
-				json_pack("{s:s, s:s, s:s, s:b, s:b, s:s*, s:o}", "name", s->name, "kind", s->kind->name,
-					"doc", s->doc ? s->doc : "", "list", (int)s->list, "required",
-					!s->def && (!s->list || s->required), "default", s->def, "rows", params_json(s->rows)));
+			json_array_append_new(
+				slots, json_pack("{s:s, s:s, s:s, s:b, s:b, s:s*, s:s*, s:o}", "name", s->name, "kind",
+						   s->kind->name, "doc", s->doc ? s->doc : "", "list", (int)s->list, "required",
+						   !s->def && (!s->list || s->required), "default", s->def, "refine", s->refine,
+						   "rows", params_json(s->rows)));
 	return slots;
 }
 

@@ -90,12 +90,24 @@ static json_t *text_schema(const quern_param *row) {
 
 static json_t *map_schema(const quern_param *rows);
 static json_t *value_schema(const quern_param *row);
+static json_t *row_schema(const quern_param *row);
+
+/* A list whose items have names may be a map of them, too. */
+static json_t *named_schema(const quern_param *row) {
+	const quern_param *bare = quern_param_bare(row);
+	json_t *item = object_schema();
+	for (const quern_param *r = row->rows; r->name; r++)
+		if (strcmp(r->name, row->text) != 0) put(item, r->name, row_schema(r), r->flags & QUERN_REQUIRED);
+	if (bare) item = json_pack("{s:[o, o]}", "anyOf", item, value_schema(bare));
+	return json_pack("{s:[{s:s, s:o}, {s:s, s:o}]}", "anyOf", "type", "object", "additionalProperties", item,
+		"type", "array", "items", map_schema(row->rows));
+}
 
 static json_t *list_schema(const quern_param *row) {
+	const quern_param *bare = quern_param_bare(row);
+	if (row->text) return named_schema(row);
 	json_t *item = map_schema(row->rows);
-	const bool vectors = row->rows->name && !row->rows[1].name && row->rows->type == QUERN_T_VECTOR;
-	if (vectors)
-		item = json_pack("{s:[o, o]}", "anyOf", item, value_schema(row->rows)); /* or the vector alone */
+	if (bare) item = json_pack("{s:[o, o]}", "anyOf", item, value_schema(bare)); /* or the value alone */
 	json_t *list = json_pack("{s:s, s:O}", "type", "array", "items", item);
 	if (row->min != row->max && isfinite(row->max)) {
 		json_object_set_new(list, "minItems", json_integer((json_int_t)row->min));
@@ -155,7 +167,26 @@ static json_t *row_schema(const quern_param *row) {
 
 static void put_rows(json_t *object, const quern_param *rows) {
 	for (; rows && rows->name; rows++)
-		put(object, rows->name, row_schema(rows), rows->flags & QUERN_REQUIRED && !rows->from);
+		put(object, rows->name, row_schema(rows),
+			rows->flags & QUERN_REQUIRED && !rows->from && !rows->unless);
+}
+
+static void require_all(json_t *object, const char *name) {
+	const size_t n = strcspn(name, ".");
+	char part[64];
+	snprintf(part, sizeof part, "%.*s", (int)n, name);
+	require(object, part);
+	if (name[n]) require_all(map_in(object, part), name + n + 1);
+}
+
+/* Of a key that is required unless there is another, and that other one, one must be given. */
+static void require_either(json_t *object, const quern_param *row) {
+	const size_t n = strcspn(row->name, ".");
+	char part[64];
+	snprintf(part, sizeof part, "%.*s", (int)n, row->name);
+	json_object_set_new(
+		object, "anyOf", json_pack("[{s:[s]}, {s:[s]}]", "required", part, "required", row->unless));
+	if (row->name[n]) require_all(map_in(object, part), row->name + n + 1);
 }
 
 static json_t *map_schema(const quern_param *rows) {
@@ -202,6 +233,11 @@ static json_t *slot_schema(const context *c, const char *kind, bool list, const 
 		"items", kind_schema(c, kind, false, slot));
 }
 
+static json_t *item_of(json_t *section, const char *list) {
+	return json_array_get(
+		json_object_get(json_object_get(json_object_get(section, "properties"), list), "anyOf"), 0);
+}
+
 /* "fill.packer" stands in the items of the list "fill". */
 static json_t *home_of(json_t *section, const char *name, const char **key) {
 	const char *dot = strchr(name, '.');
@@ -209,9 +245,9 @@ static json_t *home_of(json_t *section, const char *name, const char **key) {
 	if (!dot) return section;
 	char *list = quern_copy(name);
 	list[dot - name] = 0;
-	json_t *either = json_object_get(json_object_get(json_object_get(section, "properties"), list), "anyOf");
+	json_t *item = item_of(section, list);
 	free(list);
-	return json_array_get(either, 0);
+	return item;
 }
 
 static json_t *section_schema(const context *c, const char *solver) {
@@ -220,6 +256,8 @@ static json_t *section_schema(const context *c, const char *solver) {
 	if (!f) return json_object();
 	const quern_solver_ops *ops = f->plugin.ops;
 	json_t *section = map_schema(f->params);
+	for (const quern_param *row = f->params; row->name; row++)
+		if (row->unless && row->flags & QUERN_REQUIRED) require_either(section, row);
 	put(section, "solver", json_pack("{s:s}", "const", solver), false);
 	json_object_set_new(section, "description", json_string(f->plugin.brief ? f->plugin.brief : ""));
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
@@ -229,6 +267,8 @@ static json_t *section_schema(const context *c, const char *solver) {
 			json_decref(section);
 			return slot_schema(c, s->kind->name, true, s);
 		}
+		if (s->refine) /* keys of whatever plugins there are */
+			json_object_set_new(item_of(section, s->refine), "additionalProperties", json_true());
 		json_t *home = home_of(section, s->name, &key);
 		if (home)
 			put(home, key, slot_schema(c, s->kind->name, s->list != 0, s),

@@ -33,6 +33,10 @@ static const quern_entry *walk(const quern_node *node, const char *name, quern_m
 		const size_t n = strcspn(name, ".");
 		snprintf(part, sizeof part, "%.*s", (int)n, name);
 		const quern_entry *entry = step_into(node, part);
+		if (!entry && !strncmp(name, "0.", 2)) { /* the one item of a list, given without brackets */
+			name += 2;
+			continue;
+		}
 		if (!entry || quern_node_is_null(entry->value)) return NULL;
 		if (mark) *mark = entry->value->mark;
 		if (!name[n]) return entry;
@@ -330,21 +334,58 @@ static const char *read_text(
 	return kept;
 }
 
-/* A list whose items have but one key, a vector, takes the vector alone for an item: [[0, 0], [1, 0]]. */
-static const quern_param *bare_vector(const quern_param *rows) {
-	return rows && rows->name && !rows[1].name && rows->type == QUERN_T_VECTOR ? rows : NULL;
+const quern_param *quern_param_bare(const quern_param *list) {
+	const quern_param *only = NULL;
+	for (const quern_param *row = list->rows; row && row->name; row++) {
+		if (list->text && !strcmp(row->name, list->text)) continue;
+		if (only) return NULL;
+		only = row;
+	}
+	return only && only->type != QUERN_T_LIST ? only : NULL;
 }
 
-static void read_item(const quern_reading *r, const char *owner, const quern_param *rows,
+static quern_entry entry_of(const char *key, const quern_node *value, quern_mark mark) {
+	return (
+		quern_entry) { .key = (char *)(uintptr_t)key, .value = (quern_node *)(uintptr_t)value, .mark = mark };
+}
+
+static void read_item(const quern_reading *r, const char *owner, const quern_param *list,
 	const quern_node *item, const char *const *also, void *instance) {
-	const quern_param *bare = bare_vector(rows);
+	const quern_param *bare = quern_param_bare(list);
 	if (bare && item->kind != QUERN_NODE_MAP) {
-		quern_entry one = {
-			.key = (char *)(uintptr_t)bare->name, .value = (quern_node *)(uintptr_t)item, .mark = item->mark
-		};
+		quern_entry one = entry_of(bare->name, item, item->mark);
 		const quern_node map = { .kind = QUERN_NODE_MAP, .mark = item->mark, .entries = &one, .n = 1 };
-		quern_params_read(r, owner, rows, &map, item->mark, also, instance);
-	} else quern_params_read(r, owner, rows, item, item->mark, also, instance);
+		quern_params_read(r, owner, list->rows, &map, item->mark, also, instance);
+	} else quern_params_read(r, owner, list->rows, item, item->mark, also, instance);
+}
+
+/* An item whose name is its key in a map: as if the name stood in it. */
+static void read_named(const quern_reading *r, const char *owner, const quern_param *list,
+	const quern_entry *named, const char *const *also, void *instance) {
+	const quern_node *value = named->value;
+	const quern_param *bare = quern_param_bare(list);
+	const bool map = value->kind == QUERN_NODE_MAP, alone = !map && bare && !quern_node_is_null(value);
+	char say[64];
+	if (!map && !alone && !quern_node_is_null(value)) {
+		quern_report_add(r->report, value->mark, "%s: '%s' must be a map, not %s", owner, named->key,
+			quern_node_say(value, say));
+		return;
+	}
+	const quern_node name = {
+		.kind = QUERN_NODE_SCALAR, .quoted = true, .mark = named->mark, .text = named->key
+	};
+	quern_entry *entries = quern_take(value->n + 2, sizeof *entries);
+	quern_node item = { .kind = QUERN_NODE_MAP, .mark = named->mark, .entries = entries };
+	entries[item.n++] = entry_of(list->text, &name, named->mark);
+	if (alone) entries[item.n++] = entry_of(bare->name, value, value->mark);
+	for (size_t i = 0; map && i < value->n; i++) {
+		if (!strcmp(value->entries[i].key, list->text))
+			quern_report_add(r->report, value->entries[i].mark, "%s: '%s' has its %s already: its key", owner,
+				named->key, list->text);
+		else entries[item.n++] = value->entries[i];
+	}
+	quern_params_read(r, owner, list->rows, &item, named->mark, also, instance);
+	free(entries);
 }
 
 static void check_length(
@@ -358,20 +399,28 @@ static void check_length(
 
 static void read_list(const quern_reading *r, const char *owner, const quern_param *row,
 	const quern_node *node, const char *const *also, quern_list *list) {
-	const bool many = node && node->kind == QUERN_NODE_LIST;
-	const char *inner[17] = { NULL };
-	size_t k = 0;
-	for (const char *const *a = also; a && *a && k < 16; a++)
-		if (is_prefix(row->name, *a)) inner[k++] = *a + strlen(row->name) + 1;
+	const bool named = node && row->text && node->kind == QUERN_NODE_MAP;
+	const bool many = node && (named || node->kind == QUERN_NODE_LIST);
+	const char **inner = NULL;
+	size_t k = 0, capacity = 0;
+	for (const char *const *a = also; a && *a; a++)
+		if (is_prefix(row->name, *a)) {
+			inner = quern_grow(inner, k + 1, &capacity, sizeof *inner);
+			inner[k++] = *a + strlen(row->name) + 1;
+		}
+	inner = quern_grow(inner, k, &capacity, sizeof *inner);
+	inner[k] = NULL;
 	char *name = quern_format("%s.%s", owner, row->name);
 	list->n = !node ? 0 : many ? (uint32_t)node->n : 1;
 	list->item_size = row->item_size;
 	list->items = quern_take(list->n, row->item_size);
 	check_length(r, owner, row, node, list->n);
 	for (uint32_t i = 0; i < list->n; i++) {
-		const quern_node *item = many ? node->entries[i].value : node;
-		read_item(r, name, row->rows, item, inner, (char *)list->items + (size_t)i * row->item_size);
+		void *item = (char *)list->items + (size_t)i * row->item_size;
+		if (named) read_named(r, name, row, &node->entries[i], inner, item);
+		else read_item(r, name, row, many ? node->entries[i].value : node, inner, item);
 	}
+	free(inner);
 	free(name);
 }
 
@@ -451,6 +500,18 @@ static bool left_out(const quern_reading *r, const quern_param *row, void *membe
 	return !(row->flags & QUERN_REQUIRED) && !nowhere;
 }
 
+/* Whether the key that a row must not stand beside is given; an empty list is none. */
+static bool is_excluded(const quern_node *map, const quern_param *row) {
+	const quern_entry *other = row->unless ? walk(map, row->unless, NULL) : NULL;
+	return other && (other->value->kind == QUERN_NODE_SCALAR || other->value->n);
+}
+
+static void refuse_both(
+	const quern_reading *r, const char *owner, const quern_param *row, const quern_node *node) {
+	quern_report_add(
+		r->report, node->mark, "%s: %s does not go with %s: give one of them", owner, row->name, row->unless);
+}
+
 void quern_params_read(const quern_reading *r, const char *owner, const quern_param *rows,
 	const quern_node *map, quern_mark mark, const char *const *also, void *instance) {
 	char say[64];
@@ -471,7 +532,9 @@ void quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 		for (const quern_param *other = rows; other->name; other++)
 			opens = opens || is_prefix(row->name, other->name);
 		if (node && opens && node->kind == QUERN_NODE_MAP) node = NULL;
-		if (!node && !left_out(r, row, member) && !is_known_fault(rows, given, row->name, also))
+		const bool excluded = is_excluded(map, row);
+		if (node && excluded) refuse_both(r, owner, row, node);
+		if (!node && !left_out(r, row, member) && !excluded && !is_known_fault(rows, given, row->name, also))
 			missing(r, owner, row, mark);
 		if (row->type == QUERN_T_LIST) {
 			read_list(r, owner, row, node, also, member);
@@ -504,59 +567,4 @@ void quern_params_finish(const quern_param *rows, void *instance) {
 			free(list->items);
 			*list = (quern_list) { 0 };
 		}
-}
-
-/* ---- writing ---- */
-
-static void write_text(
-	const quern_param *row, const char *text, const quern_naming *naming, quern_node *map) {
-	if (!text) return;
-	char *named = naming && row->flags & QUERN_FILE ? naming->name(naming->context, text) : NULL;
-	quern_node_put_quoted(map, row->name, named ? named : text);
-	free(named);
-}
-
-static void write_vector(const quern_param *row, const quern_real *v, uint32_t dim, quern_node *map) {
-	char number[32];
-	for (uint32_t k = 0; k < dim; k++)
-		if (!isfinite(v[k])) return;
-	quern_node *list = quern_node_put_list(map, row->name);
-	for (uint32_t k = 0; k < dim; k++) {
-		quern_number(v[k], number);
-		quern_node_append(list, number);
-	}
-}
-
-void quern_params_write(const quern_param *rows, const void *instance, uint32_t dim,
-	const quern_naming *naming, quern_node *map) {
-	for (; rows && rows->name; rows++) {
-		const void *member = (const char *)instance + rows->offset;
-		char number[32];
-		switch (rows->type) {
-		case QUERN_T_REAL:
-			if (!isfinite(*(const quern_real *)member)) break;
-			quern_number(*(const quern_real *)member, number);
-			quern_node_put(map, rows->name, number);
-			break;
-		case QUERN_T_INT: {
-			const int32_t value = *(const int32_t *)member;
-			if (value == INT32_MIN) break;
-			snprintf(number, sizeof number, "%d", value);
-			quern_node_put(map, rows->name, rows->choices ? rows->choices[value] : number);
-			break;
-		}
-		case QUERN_T_BOOL: quern_node_put(map, rows->name, *(const bool *)member ? "true" : "false"); break;
-		case QUERN_T_TEXT: write_text(rows, *(const char *const *)member, naming, map); break;
-		case QUERN_T_VECTOR: write_vector(rows, member, dim, map); break;
-		case QUERN_T_LIST: {
-			const quern_list *values = member;
-			quern_node *list = quern_node_put_list(map, rows->name);
-			for (uint32_t i = 0; i < values->n; i++)
-				quern_params_write(rows->rows, (const char *)values->items + (size_t)i * values->item_size,
-					dim, naming, quern_node_append_map(list));
-			break;
-		}
-		default: break;
-		}
-	}
 }

@@ -41,6 +41,8 @@ typedef struct quern_naming {
 void quern_params_write(
 	const quern_param *rows, const void *instance, uint32_t dim, const quern_naming *, quern_node *map);
 
+/* The row that may stand for a whole item of a list, which has no other but the one that takes a map's keys; or NULL. */
+const quern_param *quern_param_bare(const quern_param *list);
 /* The path of the file that a scene's value names; malloc'ed. */
 char *quern_param_path(const quern_node *);
 const quern_param *quern_param_find(const quern_param *rows, const char *name);

@@ -130,6 +130,8 @@ static bool param(quern_table_reader *r, const char *of, const quern_param *row,
 	if (!is_unit(row->unit) || !is_doc(row->doc) || !is_doc(row->text) ||
 		(row->from && !is_dotted(row->from, 0)))
 		return quern_table_refuse(r, "%s: unit, doc, text or from of '%s' is no plain text", of, row->name);
+	if (row->unless && !is_dotted(row->unless, 0))
+		return quern_table_refuse(r, "%s: unless of '%s' is no name of a parameter", of, row->name);
 	return choices(r, of, row) && numbers(r, of, row);
 }
 
@@ -144,6 +146,11 @@ static bool list(quern_table_reader *r, const char *of, quern_param *row, uint32
 	free(path);
 	if (!good) return false;
 	row->rows = rows;
+	const quern_param *key = row->text ? quern_param_find(rows, row->text) : NULL;
+	if (row->text && (!key || key->type != QUERN_T_TEXT))
+		return quern_table_refuse(r,
+			"%s: '%.60s', which shall take the keys of the list '%s', is no text of its items", of, row->text,
+			row->name);
 	for (; rows->name; rows++) /* items follow each other */
 		if (row->item_size % alignment(rows->type))
 			return quern_table_refuse(r, "%s: items of %u bytes of the list '%s' do not keep '%s' in line",

@@ -203,7 +203,7 @@ static bool slot(quern_table_reader *r, const quern_solver_ops *ops, quern_slot 
 	quern_param *rows;
 	if (!quern_table_text(s->name, QUERN_LONGEST_NAME) || !quern_table_text(s->doc, 1 << 16) ||
 		!quern_table_text(s->def, 1 << 16) || !is_label(s->same_as) || !is_label(s->repeat) ||
-		!is_label(s->again) || !is_label(s->particle) || !is_label(s->override))
+		!is_label(s->again) || !is_label(s->particle) || !is_label(s->override) || !is_label(s->refine))
 		return quern_table_refuse(r, "slot '%.60s': one of its texts is no plain text", s->name);
 	char what[QUERN_LONGEST_NAME + 8];
 	snprintf(what, sizeof what, "slot %s", s->name);
@@ -218,6 +218,10 @@ static bool slot(quern_table_reader *r, const quern_solver_ops *ops, quern_slot 
 	if (s->override && !strchr(s->override, '.'))
 		return quern_table_refuse(
 			r, "slot %s: it overrides '%s', which is no SECTION.SLOT", s->name, s->override);
+	const quern_param *cases = s->refine ? quern_param_find(r->table->params, s->refine) : NULL;
+	if (s->refine && (!cases || cases->type != QUERN_T_LIST || s->same_as))
+		return quern_table_refuse(
+			r, "slot %s: '%s' shall refine it, and is no list among the parameters", s->name, s->refine);
 	if (!s->repeat != !s->again)
 		return quern_table_refuse(r, "slot %s: repeat and again are a pair of sets", s->name);
 	if (!s->rows != !s->item_size || s->item_size > QUERN_LARGEST_INSTANCE)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* resolved - the scene with every default written out, so that it reruns the same */
 #include "episodes.h"
+#include "section.h"
 #include "text.h"
 #include <stdlib.h>
 #include <string.h>
@@ -26,23 +27,45 @@ static bool takes_file(const quern_scene *s, const char *path, const char *key) 
 	return false;
 }
 
-/* What a body's `contact` overrides is written as the scene gives it, but for files, which are called otherwise. */
+/* Files are called otherwise, also in the map of one plugin of several. */
+static void name_files(const writing *w, const char *slot, quern_node *map) {
+	for (size_t i = 0; i < map->n && w->naming; i++) {
+		quern_node *value = map->entries[i].value;
+		if (value->kind == QUERN_NODE_MAP) name_files(w, slot, value);
+		if (value->kind != QUERN_NODE_SCALAR || !takes_file(w->scene, slot, map->entries[i].key)) continue;
+		char *path = quern_param_path(value);
+		free(value->text);
+		value->text = w->naming->name(w->naming->context, path);
+		value->quoted = true;
+		free(path);
+	}
+}
+
+/* What a body's `contact` overrides is written as the scene gives it, but for files. */
 static void put_override(const writing *w, const quern_slot *slot, const quern_filling *f, quern_node *map) {
 	const char *key = strchr(slot->override, '.') + 1;
 	const quern_node *over = quern_node_find(f->instance->map, key);
 	if (!over) return;
 	quern_node *copy = quern_node_put_map(map, key);
 	quern_node_merge(copy, over);
-	for (size_t i = 0; i < copy->n; i++) {
-		quern_node *value = copy->entries[i].value;
-		if (!w->naming || value->kind != QUERN_NODE_SCALAR ||
-			!takes_file(w->scene, slot->override, copy->entries[i].key))
-			continue;
-		char *path = quern_param_path(value);
-		free(value->text);
-		value->text = w->naming->name(w->naming->context, path);
-		value->quoted = true;
-		free(path);
+	name_files(w, slot->override, copy);
+}
+
+/* So is what the items of a list, which has been written before, say to the plugins of a slot. */
+static void put_refined(
+	const writing *w, const quern_slot_use *use, const quern_section *section, quern_node *node) {
+	const quern_param *row = quern_param_find(section->solver->file->params, use->slot->refine);
+	const quern_node *given = quern_node_find(section->node, use->slot->refine);
+	const quern_node *written = quern_node_find(node, use->slot->refine);
+	for (size_t i = 0; given && written && i < written->n; i++) {
+		const quern_node *item = given->kind == QUERN_NODE_LIST ? given->entries[i].value : given;
+		quern_node *keys = quern_node_create(QUERN_NODE_MAP);
+		for (size_t e = 0; e < item->n; e++)
+			if (!quern_rows_open(row->rows, item->entries[e].key))
+				quern_node_merge_entry(keys, &item->entries[e]);
+		name_files(w, use->path, keys);
+		quern_node_merge(written->entries[i].value, keys);
+		quern_node_destroy(keys);
 	}
 }
 
@@ -83,7 +106,10 @@ static void put_section(const writing *w, const quern_section *section, quern_no
 		quern_node_put(node, "solver", bare(solver->file->plugin.id));
 		put_params(w, solver->file->params, solver->self, node);
 	}
-	for (size_t k = 0; k < section->n_slots; k++) put_slot(w, &section->slots[k], node);
+	for (size_t k = 0; k < section->n_slots; k++) {
+		put_slot(w, &section->slots[k], node);
+		if (section->slots[k].slot->refine) put_refined(w, &section->slots[k], section, node);
+	}
 }
 
 quern_node *quern_scene_tree(const quern_scene *s, const quern_naming *naming) {

@@ -23,6 +23,9 @@ typedef struct quern_filling {
 	void *item;
 	quern_instance **variant; /* by entry of the overriding slot; NULL where nothing is overridden */
 	size_t n_variant;
+	quern_instance *
+		*refined; /* by item of the list that refines the slot: 1 + n_variant each, none of them NULL */
+	size_t n_refined;
 } quern_filling;
 
 typedef struct quern_slot_use {
@@ -118,6 +121,8 @@ typedef struct quern_general_list {
 extern const quern_general_list quern_general_lists[];
 
 const quern_section *quern_scene_section(const quern_scene *, const char *name);
+/* What `refined` points to as a solver sees it: free() it. NULL if there is nothing. */
+const void **quern_filling_refined(const quern_filling *);
 /* Whether `model` keeps everything that stands there. */
 bool quern_scene_is_whole(const quern_scene *);
 /* What rows of this scene are read with. */

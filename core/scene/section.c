@@ -122,7 +122,7 @@ static const char **first_parts(const quern_param *rows, size_t *n, const char *
 	return list;
 }
 
-static bool opened_by(const quern_param *rows, const char *key) {
+bool quern_rows_open(const quern_param *rows, const char *key) {
 	const size_t n = strlen(key);
 	for (; rows && rows->name; rows++)
 		if (!strncmp(rows->name, key, n) && (!rows->name[n] || rows->name[n] == '.')) return true;
@@ -152,7 +152,7 @@ static void read_entry(quern_scene *s, const quern_slot *slot, quern_filling *f)
 		const bool map = it->map && it->map->kind == QUERN_NODE_MAP;
 		size_t m = 0;
 		for (size_t i = 0; map && i < it->map->n; i++)
-			if (!opened_by(slot->rows, it->map->entries[i].key)) {
+			if (!quern_rows_open(slot->rows, it->map->entries[i].key)) {
 				also = quern_grow(also, m + 1, &capacity, sizeof(char *));
 				also[m++] = it->map->entries[i].key;
 			}
@@ -241,81 +241,79 @@ static void fill_items(quern_scene *s, quern_section *section, quern_slot_use *u
 	free(list_name);
 }
 
-/* A key of another slot's entry, such as a body's `contact`, gives every plugin here a second instance. */
-static void fill_variants(quern_scene *s, quern_slot_use *use) {
-	const quern_slot_use *other = NULL;
-	for (size_t i = 0; i < s->n_sections && !other; i++)
-		for (size_t k = 0; k < s->sections[i].n_slots; k++)
-			if (s->sections[i].slots[k].slot->override && !s->sections[i].slots[k].borrowed &&
-				!strcmp(s->sections[i].slots[k].slot->override, use->path))
-				other = &s->sections[i].slots[k];
-	const char *key = strchr(use->path, '.');
-	for (size_t j = 0; other && j < use->n; j++) {
-		quern_filling *f = &use->filling[j];
-		f->n_variant = other->n;
-		f->variant = quern_take(other->n, sizeof(quern_instance *));
+quern_instance *quern_instance_again(
+	quern_scene *s, const quern_instance *base, const quern_node *map, quern_mark mark) {
+	quern_instance *it = instance_create(s, base->file, map, mark, base->path);
+	if (!it) return NULL;
+	it->ops = base->ops;
+	const size_t before = quern_report_errors(s->report);
+	instance_read(s, it, NULL);
+	instance_init(s, it, before);
+	return it;
+}
+
+void quern_slot_refuse_key(quern_scene *s, const quern_slot_use *use, const quern_param *own,
+	const char *path, const quern_entry *entry) {
+	const quern_reading r = quern_scene_reading(s);
+	const quern_node one = { .kind = QUERN_NODE_MAP, .entries = (quern_entry *)(uintptr_t)entry, .n = 1 };
+	const char **also = NULL;
+	size_t n = 0, capacity = 0;
+	for (size_t j = 0; j < use->n; j++) {
+		const quern_plugin_file *file = use->filling[j].instance->file;
+		also = first_parts(file->params, &n, also, &capacity);
+		also = quern_grow(also, n + 1, &capacity, sizeof(char *));
+		also[n++] = strchr(file->plugin.id, '.') + 1;
 	}
-	for (size_t b = 0; other && b < other->n; b++) {
-		const quern_node *given = quern_node_find(other->filling[b].instance->map, key + 1);
-		char say[64];
-		if (!given) continue;
-		if (given->kind != QUERN_NODE_MAP) {
-			quern_report_add(s->report, given->mark,
-				"%s: '%s' must be a map of parameters to override, not %s", other->path, key + 1,
-				quern_node_say(given, say));
-			continue;
-		}
-		for (size_t e = 0; e < given->n; e++) {
-			bool known = false;
-			for (size_t j = 0; j < use->n; j++)
-				known = known || opened_by(use->filling[j].instance->file->params, given->entries[e].key);
-			if (!known && use->n) { /* let the first plugin say what it takes */
-				const quern_reading r = quern_scene_reading(s);
-				const quern_node one = { .kind = QUERN_NODE_MAP, .entries = &given->entries[e], .n = 1 };
-				quern_params_check(&r, use->filling[0].instance->file->plugin.id,
-					use->filling[0].instance->file->params, &one, NULL);
-			}
-		}
-		for (size_t j = 0; j < use->n; j++) {
-			quern_instance *base = use->filling[j].instance;
-			quern_tree *keep = quern_take(1, sizeof *keep);
-			s->defaults = quern_grow(s->defaults, s->n_defaults, &s->defaults_capacity, sizeof(keep));
-			s->defaults[s->n_defaults++] = keep;
-			keep->root = quern_node_create(QUERN_NODE_MAP);
-			quern_node_merge(keep->root, base->map);
-			bool any = false;
-			for (size_t e = 0; e < given->n; e++)
-				if (opened_by(base->file->params, given->entries[e].key)) {
-					quern_node_merge_entry(keep->root, &given->entries[e]);
-					any = true;
-				}
-			if (!any) continue;
-			quern_instance *it = instance_create(s, base->file, keep->root, given->mark, use->path);
-			if (!it) continue;
-			it->ops = base->ops;
-			const size_t before = quern_report_errors(s->report);
-			instance_read(s, it, NULL);
-			instance_init(s, it, before);
-			use->filling[j].variant[b] = it;
-		}
-	}
+	also = quern_grow(also, n, &capacity, sizeof(char *));
+	also[n] = NULL;
+	quern_params_check(&r, path, own, &one, also);
+	free(also);
 }
 
 /* ---- sections ---- */
 
-static const char **section_also(const quern_solver_ops *ops, size_t *n) {
+/* What the items of a list take besides their rows is for the plugins of the slot that it refines to check. */
+static const char **refining_keys(quern_scene *s, const quern_node *node, const quern_slot *slot,
+	const quern_param *own, const char **also, size_t *n, size_t *capacity) {
+	const bool list = node && node->kind == QUERN_NODE_LIST;
+	for (size_t i = 0; node && i < (list ? node->n : 1); i++) {
+		const quern_node *item = list ? node->entries[i].value : node;
+		for (size_t e = 0; item->kind == QUERN_NODE_MAP && e < item->n; e++) {
+			if (quern_rows_open(own, item->entries[e].key)) continue;
+			char *name = quern_format("%s.%s", slot->refine, item->entries[e].key);
+			also = quern_grow(also, *n + 1, capacity, sizeof(char *));
+			also[(*n)++] = quern_tree_keep(s->tree, name);
+			free(name);
+		}
+	}
+	return also;
+}
+
+static const char **section_also(
+	quern_scene *s, const quern_section *section, const quern_node *node, size_t *n) {
 	const char **also = NULL;
 	size_t capacity = 0;
 	*n = 0;
-	for (const quern_slot *slot = ops->slots; slot && slot->name; slot++) {
+	for (const quern_slot *slot = section->ops->slots; slot && slot->name; slot++) {
 		if (slot->same_as || !*slot->name) continue;
 		also = quern_grow(also, *n + 2, &capacity, sizeof(char *));
 		also[(*n)++] = slot->name;
+		const quern_param *row =
+			slot->refine ? quern_param_find(section->solver->file->params, slot->refine) : NULL;
+		if (row)
+			also = refining_keys(s, quern_node_find(node, slot->refine), slot, row->rows, also, n, &capacity);
 	}
 	also = quern_grow(also, *n + 1, &capacity, sizeof(char *));
 	also[(*n)++] = "solver";
 	also[*n] = NULL;
 	return also;
+}
+
+const void **quern_filling_refined(const quern_filling *f) {
+	const size_t n = f->n_refined * (1 + f->n_variant);
+	const void **refined = n ? quern_take(n, sizeof(void *)) : NULL;
+	for (size_t i = 0; i < n; i++) refined[i] = f->refined[i]->self;
+	return refined;
 }
 
 /* The plugins of a slot as its solver sees them: with its strides, in memory that finish_slot frees. */
@@ -336,7 +334,9 @@ static void *bind_slot(const quern_section *section, const quern_slot_use *use) 
 			.n_uses = (uint32_t)file->n_uses,
 			.id = file->plugin.id,
 			.path = use->path,
-			.n_variant = (uint32_t)f->n_variant };
+			.n_variant = (uint32_t)f->n_variant,
+			.refined = quern_filling_refined(f),
+			.n_refined = (uint32_t)f->n_refined };
 		memcpy(bound + i * stride, &own, stride < sizeof own ? stride : sizeof own);
 	}
 	return bound;
@@ -348,6 +348,7 @@ static void unbind_slot(const quern_section *section, const quern_slot_use *use,
 		const size_t stride = section->ops->bound_size;
 		memcpy(&own, bound + i * stride, stride < sizeof own ? stride : sizeof own);
 		free((void *)(uintptr_t)own.variant);
+		free((void *)(uintptr_t)own.refined);
 		free((void *)(uintptr_t)own.uses);
 	}
 	free(bound);
@@ -419,7 +420,7 @@ void quern_section_read(quern_scene *s, const quern_plugin_file *file, const que
 		return;
 	}
 	size_t n;
-	const char **also = section_also(section->ops, &n);
+	const char **also = section_also(s, section, map ? node : NULL, &n);
 	const size_t before = quern_report_errors(s->report);
 	if (is_list) section->solver->map = NULL;
 	quern_node *rest = is_list && map ? without_solver(s, node) : node;
@@ -436,7 +437,7 @@ void quern_section_read(quern_scene *s, const quern_plugin_file *file, const que
 		} else if (!*slot->name) quern_slot_fill(s, use, rest, section->mark);
 		else if (strchr(slot->name, '.')) fill_items(s, section, use);
 		else quern_slot_fill(s, use, quern_node_find(node, slot->name), section->mark);
-		if (!slot->same_as) fill_variants(s, use);
+		if (!slot->same_as) quern_slot_override(s, section, use);
 	}
 	section_ready(s, section);
 }
@@ -449,6 +450,7 @@ void quern_slot_finish(quern_slot_use *use) {
 	}
 	for (size_t i = 0; i < use->n; i++) {
 		free(use->filling[i].variant);
+		free(use->filling[i].refined);
 		if (use->slot->rows && use->filling[i].item)
 			quern_params_finish(use->slot->rows, use->filling[i].item);
 		free(use->filling[i].item);

@@ -78,9 +78,17 @@ static int set_of(const quern_plan *p, const char *field) {
 
 /* ---- uses ---- */
 
+/* Where there are cases of their own, a row counts if it does in any of them. */
+static bool holds_refined(const quern_filling *f, const char *when, bool again) {
+	for (size_t i = 0; i < f->n_refined; i++)
+		for (size_t v = again && f->n_variant; v <= (again ? f->n_variant : 0); v++)
+			if (holds(f->refined[i * (1 + f->n_variant) + v], when)) return true;
+	return false;
+}
+
 /* Where some entries override parameters, a repeated row counts if it does for any of them. */
 static bool holds_anywhere(const quern_filling *f, const char *when) {
-	bool any = !f->n_variant && holds(f->instance, when);
+	bool any = (!f->n_variant && holds(f->instance, when)) || holds_refined(f, when, true);
 	for (size_t v = 0; v < f->n_variant; v++)
 		any = any || holds(f->variant[v] ? f->variant[v] : f->instance, when);
 	return any;
@@ -153,6 +161,8 @@ static quern_plan_bound *add_bound(quern_plan *p, const quern_slot *slot, const 
 	b->variant = quern_take(f->n_variant, sizeof(void *));
 	for (size_t v = 0; v < f->n_variant; v++) b->variant[v] = f->variant[v] ? f->variant[v]->self : it->self;
 	b->bound.variant = f->n_variant ? b->variant : NULL;
+	b->bound.refined = b->refined = quern_filling_refined(f);
+	b->bound.n_refined = (uint32_t)f->n_refined;
 	b->column = quern_take(it->file->n_uses, sizeof(quern_column));
 	b->bound.column = b->column;
 	b->first_use = p->n_uses;
@@ -162,7 +172,7 @@ static quern_plan_bound *add_bound(quern_plan *p, const quern_slot *slot, const 
 		const char *called = slot && row->hook < 3 ? slot->stage[row->hook] : NULL;
 		quern_plan_use *u =
 			add_use(p, row, slot ? stage_named(p, called) : stage, it->file->plugin.id, it->mark);
-		u->counts = u->stage >= 0 && holds(it, row->when);
+		u->counts = u->stage >= 0 && (holds(it, row->when) || holds_refined(f, row->when, false));
 		if (slot && slot->particle) rename_set(u, "particle", slot->particle);
 	}
 	if (slot && slot->repeat) {
@@ -455,6 +465,7 @@ void quern_plan_destroy(quern_plan *p) {
 		free(p->bounds[i]->column);
 		free(p->bounds[i]->again);
 		free(p->bounds[i]->variant);
+		free(p->bounds[i]->refined);
 		free(p->bounds[i]->uses);
 		free(p->bounds[i]);
 	}

@@ -35,7 +35,7 @@ typedef struct quern_plan_bound {
 	size_t first_use, first_again; /* into plan->uses; first_again == SIZE_MAX: no repeat */
 	quern_column *column, *again;
 	quern_use *uses; /* with the stride of whoever calls it */
-	const void **variant;
+	const void **variant, **refined;
 } quern_plan_bound;
 
 typedef struct quern_plan {

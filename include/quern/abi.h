@@ -72,7 +72,7 @@ typedef enum {
 	QUERN_T_BOOL,     /* bool */
 	QUERN_T_TEXT,     /* const char *, owned by the host for the length of the run */
 	QUERN_T_VECTOR,   /* quern_real[3]; the scene gives one number per dimension, the rest are zero */
-	QUERN_T_LIST /* quern_list of structs described by `rows`; where that is one vector, the scene may give it bare */
+	QUERN_T_LIST /* quern_list of structs described by `rows`; where that is one value, the scene may give it bare */
 } quern_type;
 
 enum {
@@ -94,7 +94,9 @@ typedef struct quern_param {
 	const char *const *choices; /* NULL-terminated, or NULL */
 	const char
 		*text; /* default of a T_TEXT; of a T_INT, a word: "body" lets the scene say a name instead of the
-	                     number, where somebody has published that number as "body.NAME" */
+	                     number, where somebody has published that number as "body.NAME"; of a T_LIST, the
+	                     T_TEXT row of its items that takes the keys where the scene gives a map instead:
+	                     "name" takes {sand: {...}, steel: {...}} for [{name: sand, ...}, {name: steel, ...}] */
 	const char *from; /* default taken from this published quantity, see publish(); where nobody publishes it,
 	                     `def` if that is not 0, else the scene must give the value, or may leave out a MAYBE */
 	const struct quern_param *rows; /* T_LIST: the rows of one item */
@@ -103,6 +105,8 @@ typedef struct quern_param {
 	uint32_t offset, item_size; /* into the instance; T_LIST: bytes of one item */
 	uint8_t type, flags;
 	uint16_t pad;
+	const char *
+		unless; /* since 2.1: another key beside which this one must not stand, and which makes REQUIRED ask for nothing */
 } quern_param;
 
 typedef struct quern_list {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* quern/contact.h - the kind `contact`: a law for pairs of grains, and what such laws share: restitution, first touch, the Coulomb cone.
- * docs/theory/contacts.md. One law, one pair of materials, one dimension per batch. */
+ * docs/theory/contacts.md. One instance of a law, which is that of a pair of materials, and one dimension per batch. */
 #pragma once
 #include <quern/math.h>
 #include <quern/vec.h>

@@ -58,6 +58,9 @@ typedef struct quern_slot {
 	uint32_t item_size;      /* bytes that `rows` fill */
 	uint32_t list, required; /* required: a list that must be given, be it empty */
 	uint32_t pad;
+	/* since 2.1: "cases", a list among the solver's parameters whose items take, beside their own rows, keys of the plugins here: what
+	 * they are in that case. A key that several of them have is given under a plugin's name: {linear: {friction: 0.1}} */
+	const char *refine;
 } quern_slot;
 
 /* What a solver holds of a plugin in one of its slots. */
@@ -72,6 +75,10 @@ typedef struct quern_bound {
 	const quern_column *again; /* the same for the slot's `again` */
 	uint32_t n_uses, n_variant;
 	const char *id, *path; /* "contact.linear"; "grains.contact", for messages */
+	/* since 2.1: by item of the list that refines this slot, 1 + n_variant instances each: the one to use in that case, then those
+	 * with what entry 0, 1, ... of the overriding slot says on top. All are there; NULL without such a list */
+	const void *const *refined;
+	uint32_t n_refined, pad;
 } quern_bound;
 
 typedef struct quern_step {

@@ -14,6 +14,7 @@ typedef struct body_item {
 	quern_real friction; /* of the boundary; NaN: the choice above holds */
 	const char *name;    /* NULL: it has none */
 	body_motion motion;
+	const char *material; /* a word; NULL: it has none */
 } body_item;
 
 enum { BODY_WORDS = 120 };

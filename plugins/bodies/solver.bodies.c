@@ -30,6 +30,9 @@ static const quern_param rows[] = {
 		.min = 0, .max = 100),
 	QUERN_PARAM(body_item, name, NULL, "A word that messages call it by, and observers may: its own.",
 		.flags = QUERN_MAYBE),
+	QUERN_PARAM(body_item, material, NULL,
+		"What it is made of: one of the grains' materials, or a word of its own that stands in grains.pairs.",
+		.flags = QUERN_MAYBE),
 	QUERN_PARAM_AS(body_item, motion.velocity, "motion.velocity", "m/s", "At which it moves on."),
 	QUERN_PARAM_AS(
 		body_item, motion.spin, "motion.spin", "rad/s", "At which it turns on.", .min = -1e6, .max = 1e6),

@@ -27,11 +27,12 @@ static bool is_watched(const forces_shared *sh, const deep_contact *c) {
 }
 
 /* Half the period of the stiffest law, and the largest stiffness that a law states; whose it is. */
-static void ask_laws(const forces_shared *sh, deep_contact *c, quern_real mass, quern_real radius) {
+static void ask_laws(
+	const forces_shared *sh, deep_contact *c, int32_t item, quern_real mass, quern_real radius) {
 	for (uint32_t l = 0; l < sh->n_laws; l++) {
 		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
 		const quern_contact_ops *ops = law->ops;
-		const void *self = c->second < 0 && law->n_variant ? law->variant[-1 - c->second] : law->self;
+		const void *self = dem_law(law, item, c->second < 0 ? (int32_t)(-1 - c->second) : -1);
 		const quern_real period = ops->period ? ops->period(self, sh->s->dim, mass, radius) : INFINITY;
 		const quern_real k = ops->stiffness ? ops->stiffness(self, sh->s->dim, radius, c->force) : 0;
 		c->period = period < c->period ? period : c->period;
@@ -59,7 +60,7 @@ void quern_dem_check_contacts(const forces_shared *sh, const forces_work *w, con
 			.period = INFINITY,
 			.first = id[w->first[q]],
 			.second = chunk->body < 0 ? id[w->second[q]] : -1 - chunk->body };
-		ask_laws(sh, &c, w->mass[q], w->radius[q]);
+		ask_laws(sh, &c, chunk->item, w->mass[q], w->radius[q]);
 		if (is_worse(&c, &sh->worst[b])) sh->worst[b] = c;
 		if (!sh->looks && is_watched(sh, &c)) sh->watched[b] = c;
 	}

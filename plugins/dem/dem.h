@@ -12,13 +12,22 @@
 #include <quern/neighbours.h>
 #include <quern/packer.h>
 
-typedef struct dem {
-	quern_real density, skin, rest, settle_step; /* from the scene */
+enum { MOST_MATERIALS = 16 };
+
+typedef struct dem_material {
+	const char *name; /* NULL: the only one, which needs none */
+	quern_real density;
 	radius_law radii;
-	quern_list fill, place, source;
+} dem_material;
+
+typedef struct dem {
+	quern_real skin, rest, settle_step; /* from the scene */
+	dem_material alone;
+	quern_list materials, pairs, fill, place, source;
 	const char *file;
 	quern_real overlap_most, overlap_start; /* over the smaller radius */
 	int32_t settle_most;
+	bool mixed;    /* there are several materials */
 	bool fixed;    /* some grains do not move */
 	bool features; /* some bodies have several */
 	bool moving;   /* some bodies do */
@@ -30,16 +39,41 @@ typedef struct dem {
 		stiffness;        /* overlap under the fill's weight over the diameter; N/m, of all laws there */
 	const char *stiffest; /* of the laws */
 	uint32_t dim;
+	/* ---- materials.c ---- */
+	uint64_t stream;
+	const dem_material *material; /* the first stands for all where one number must do */
+	uint32_t n_materials;
+	int32_t pair[MOST_MATERIALS][MOST_MATERIALS]; /* item of `pairs` for grains of both, or -1 */
+	int32_t *on_body;                             /* the same by body and by material of the grain */
 } dem;
+
+typedef struct dem_word {
+	const char *name;
+} dem_word;
+
+/* Two materials whose contacts have parameters of their own. */
+typedef struct dem_pair {
+	quern_list between; /* of dem_word */
+} dem_pair;
+
+typedef struct dem_share {
+	const char *name;
+	quern_real share; /* of the mass */
+} dem_share;
 
 typedef struct dem_fill {
 	quern_real lower[3], upper[3], velocity[3];
 	bool settle, fixed;
+	const char *material;
+	quern_list mix;
+	quern_real share[MOST_MATERIALS]; /* of the mass, by material; they add up to 1 */
 } dem_fill;
 
 typedef struct dem_place {
 	quern_real position[3], velocity[3], spin[3], radius;
 	bool fixed;
+	const char *material;
+	int32_t kind; /* number of the material */
 } dem_place;
 
 /* slots, in the order of the solver's table */
@@ -64,6 +98,25 @@ QUERN_INLINE cloud dem_cloud(const quern_step *s, const quern_real *weight) {
 		s->host->set(s->run, "grain").n };
 }
 
+/* What law to take for item `item` of the pairs (-1: none) and a body (-1: between grains): the contact's own instance. */
+QUERN_INLINE const void *dem_law(const quern_bound *law, int32_t item, int32_t body) {
+	const bool on_body = body >= 0 && law->n_variant;
+	if (item >= 0)
+		return law->refined[(uint32_t)item * (1 + law->n_variant) + (on_body ? 1 + (uint32_t)body : 0)];
+	return on_body ? law->variant[body] : law->self;
+}
+
+/* The pairs' item for two grains, or for a grain on a body; `material` is NULL where there is one alone. */
+QUERN_INLINE int32_t dem_item(const dem *d, const int32_t *material, int32_t first, int32_t second) {
+	return material ? d->pair[material[first]][material[second]] : d->pair[0][0];
+}
+QUERN_INLINE int32_t dem_item_on(const dem *d, const int32_t *material, int32_t grain, int32_t body) {
+	return d->on_body[(uint32_t)body * d->n_materials + (material ? (uint32_t)material[grain] : 0)];
+}
+
+/* m, of the material that stands for all */
+QUERN_INLINE quern_real dem_diameter(const dem *d) { return 2 * d->material[0].radii.mean; }
+
 quern_status quern_dem_fill(const void *self, const quern_step *);
 quern_status quern_dem_pour(const void *self, const quern_step *);
 quern_status quern_dem_outlets(const void *self, const quern_step *);
@@ -76,6 +129,7 @@ quern_status quern_dem_list(const void *self, const quern_step *);
 quern_status quern_dem_observe(const void *self, const quern_step *);
 bool quern_dem_settled(const void *self, const quern_step *);
 quern_real quern_dem_settling(const void *self, const quern_step *);
+quern_real quern_dem_limit(const void *self, const quern_step *, quern_real *hard, char reason[160]);
 
 /* ---- grain_file.c ---- */
 typedef struct grain_table {
@@ -84,6 +138,21 @@ typedef struct grain_table {
 } grain_table;
 /* Reads "x y [z] radius ..." columns; on a fault returns false with one sentence in `why`. Velocities, spins and
  * `fixed` may be left out; a missing radius is NaN. */
-bool quern_grain_table_read(const char *data, size_t length, uint32_t dim, grain_table *, char why[200]);
-bool quern_grain_table_load(const char *path, uint32_t dim, grain_table *, char why[200]);
+bool quern_grain_table_read(const char *data, size_t length, const dem *, grain_table *, char why[200]);
+bool quern_grain_table_load(const char *path, const dem *, grain_table *, char why[200]);
 void quern_grain_table_finish(grain_table *);
+
+/* ---- materials.c ---- */
+/* The number of a material by its name (NULL: the first), or -1. */
+int32_t quern_dem_material(const dem *, const char *name);
+/* Materials, and who is of which: names become numbers. */
+quern_status quern_dem_name_materials(dem *, const quern_setup *, quern_err *);
+/* Which pair of materials, or of a material and a body's, has what item of `pairs`; takes memory, which `part` frees. */
+quern_status quern_dem_pair_up(
+	dem *, const quern_setup *, const quern_bound *body, uint32_t n_bodies, quern_err *);
+void quern_dem_part(dem *);
+/* m, of all materials that a fill has */
+quern_real quern_dem_widest(const dem *, const quern_real share[MOST_MATERIALS]);
+/* The material of the next grain, draw k, where `placed` kg of each are there already: no share is missed by more than a grain. */
+int32_t quern_dem_mix(const dem *, const quern_real share[MOST_MATERIALS],
+	const quern_real placed[MOST_MATERIALS], const quern_host *, uint64_t k);

@@ -17,10 +17,24 @@ typedef struct {
 	uint32_t n, cap;
 	uint64_t draws;
 	const dem_fill *item;
-	quern_real lower[3], upper[3]; /* of the cell that is being filled */
+	quern_real widest;                 /* mean radius of what it has */
+	quern_real placed[MOST_MATERIALS]; /* kg, of this item */
+	int32_t kind;                      /* material of the grain that waits */
+	quern_real lower[3], upper[3];     /* of the cell that is being filled */
 	bool last[3]; /* the cell ends the region along this axis: its upper face belongs to it */
 	bool failed;
 } filling;
+
+static quern_real mass_of(const dem *d, const dem_place *grain) {
+	return quern_radius_mass(grain->radius, d->material[grain->kind].density, d->dim);
+}
+
+/* m, the widest that any fill may bring */
+static quern_real most_of_fills(const dem *d) {
+	quern_real most = 0;
+	for (uint32_t k = 0; k < d->n_materials; k++) most = fmax(most, quern_radius_most(&d->material[k].radii));
+	return most;
+}
 
 static void add(filling *f, const dem_place *grain) {
 	if (f->n == f->cap) {
@@ -38,9 +52,17 @@ static void add(filling *f, const dem_place *grain) {
 	quern_placer_add(&f->placer, &spot);
 }
 
+static void choose_material(filling *f) {
+	const quern_real *share = f->item->share;
+	f->kind = 0;
+	if (f->item->mix.n) f->kind = quern_dem_mix(f->d, share, f->placed, f->step->host, f->draws);
+	else
+		while (!(share[f->kind] > 0)) f->kind++;
+}
+
 static quern_real job_radius(quern_pack_job *job) {
 	const filling *f = job->scene;
-	return quern_radius_draw(&f->d->radii, job->host, f->draws);
+	return quern_radius_draw(&f->d->material[f->kind].radii, job->host, f->draws);
 }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
@@ -56,11 +78,13 @@ static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
 
 static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	filling *f = job->scene;
-	dem_place grain = { .radius = spot->radius, .fixed = f->item->fixed };
+	dem_place grain = { .radius = spot->radius, .fixed = f->item->fixed, .kind = f->kind };
 	for (uint32_t k = 0; k < f->d->dim; k++)
 		grain.position[k] = spot->x[k], grain.velocity[k] = f->item->velocity[k];
 	add(f, &grain);
+	f->placed[f->kind] += mass_of(f->d, &grain);
 	f->draws++;
+	choose_material(f);
 	return !f->failed && !f->placer.failed;
 }
 
@@ -72,7 +96,7 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 		return;
 	}
 	quern_pack_job job = { .dim = f->d->dim,
-		.stream = f->d->radii.stream + 1,
+		.stream = f->d->stream + 1,
 		.key = key,
 		.host = f->step->host,
 		.seed = seed,
@@ -84,7 +108,7 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 	memcpy(job.lower, f->lower, sizeof job.lower);
 	memcpy(job.upper, f->upper, sizeof job.upper);
 	/* a new grain can touch what is as far as its own radius and the other's */
-	const quern_real reach = 4 * quern_radius_most(&f->d->radii);
+	const quern_real reach = 4 * most_of_fills(f->d);
 	const uint32_t n = quern_placer_near(&f->placer, f->lower, f->upper, reach, seed, MOST);
 	job.n_seed = n < MOST ? n : MOST;
 	const quern_packer_ops *ops = packer->ops;
@@ -97,10 +121,13 @@ static void fill_region(filling *f, const dem_fill *item, const quern_bound *pac
 	const uint32_t dim = f->d->dim;
 	uint32_t count[3] = { 1, 1, 1 };
 	f->item = item;
+	f->widest = quern_dem_widest(f->d, item->share);
+	memset(f->placed, 0, sizeof f->placed);
+	choose_material(f);
 	f->placer.n_bodies =
 		item->fixed ? 0 : f->step->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real cells = (item->upper[k] - item->lower[k]) / (4 * f->d->radii.mean);
+		const quern_real cells = (item->upper[k] - item->lower[k]) / (4 * f->widest);
 		count[k] = cells > 1 ? (uint32_t)cells : 1;
 	}
 	for (uint32_t z = 0; z < count[2]; z++)
@@ -175,7 +202,7 @@ static quern_status add_given(filling *f, const dem_place *given, const char *pa
 	const quern_step *s = f->step;
 	dem_place grain = *given;
 	char why[WORDS], item[40];
-	if (isnan(grain.radius)) grain.radius = f->d->radii.mean;
+	if (isnan(grain.radius)) grain.radius = f->d->material[grain.kind].radii.mean;
 	quern_spot centre = { .radius = 1e-3 * grain.radius };
 	memcpy(centre.x, grain.position, sizeof centre.x);
 	bool good = false;
@@ -200,7 +227,7 @@ static quern_status add_all(filling *f, const dem_place *grain, uint32_t n, cons
 
 static quern_status read_file(const dem *d, const quern_step *s, grain_table *table) {
 	char why[200];
-	if (!d->file || quern_grain_table_load(d->file, d->dim, table, why)) return QUERN_OK;
+	if (!d->file || quern_grain_table_load(d->file, d, table, why)) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_PARAM, "file", -1, "%s: %s", d->file, why);
 }
 
@@ -222,7 +249,8 @@ static quern_status store(filling *f) {
 		for (uint32_t k = 0; use[FILL_SPIN].real[0] && k < (dim == 3 ? 3u : 1u); k++)
 			use[FILL_SPIN].real[k][i] = g->fixed ? 0 : g->spin[k];
 		use[FILL_RADIUS].real[0][i] = g->radius;
-		use[FILL_MASS].real[0][i] = quern_radius_mass(g->radius, f->d->density, dim);
+		use[FILL_MASS].real[0][i] = mass_of(f->d, g);
+		if (use[FILL_MATERIAL].index) use[FILL_MATERIAL].index[i] = g->kind;
 		if (use[FILL_FIXED].index) use[FILL_FIXED].index[i] = g->fixed;
 	}
 	use[FILL_DISPLACEMENT].real[0][0] = INFINITY;
@@ -238,7 +266,7 @@ static quern_real widest_of(const dem_place *grain, uint32_t n, quern_real most)
 /* The placer's cells hold the widest grain that any source may bring. */
 static quern_status open_placer(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
-	quern_real most = quern_radius_most(&f->d->radii);
+	quern_real most = most_of_fills(f->d);
 	most = widest_of(f->d->place.items, f->d->place.n, most);
 	most = widest_of(table->grain, table->n, most);
 	for (uint32_t k = 0; k < s->dim; k++)
@@ -257,16 +285,18 @@ static quern_status open_placer(filling *f, const grain_table *table) {
 static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 	const dem_fill *item = (const dem_fill *)d->fill.items + i;
 	char param[40];
-	quern_real grains = 1;
+	quern_real grains = 1, least = INFINITY;
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		if (item->share[k] > 0) least = fmin(least, d->material[k].radii.mean);
 	for (uint32_t k = 0; k < d->dim; k++) {
-		const quern_real across = (item->upper[k] - item->lower[k]) / (2 * d->radii.mean);
+		const quern_real across = (item->upper[k] - item->lower[k]) / (2 * least);
 		grains *= across > 1 ? across : 1;
 	}
 	if (grains <= 0x1p30) return QUERN_OK;
 	snprintf(param, sizeof param, "fill.%u", i);
 	return s->host->stop(s->run, QUERN_E_PARAM, param, -1,
-		"the region holds about %.2g grains of radius %g m; more than %.2g cannot be numbered", grains,
-		d->radii.mean, 0x1p30);
+		"the region holds about %.2g grains of radius %g m; more than %.2g cannot be numbered", grains, least,
+		0x1p30);
 }
 
 static quern_status fill_all(filling *f, const grain_table *table) {
@@ -343,7 +373,7 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 			s->run, 2, "settling was cut off after %d steps: the grains are not at rest", d->settle_most);
 		return true;
 	}
-	const quern_real diameter = 2 * d->radii.mean, g = quern_gravity_size(d->dim, s->gravity);
+	const quern_real diameter = dem_diameter(d), g = quern_gravity_size(d->dim, s->gravity);
 	const quern_real fall = 2 * sqrt(2 * diameter / g);
 	if ((quern_real)s->substep * s->dt < fall) return false;
 	cloud_sums c;
@@ -359,6 +389,6 @@ quern_real quern_dem_settling(const void *self, const quern_step *s) {
 	const dem *d = self;
 	const quern_real g = quern_gravity_size(d->dim, s->gravity);
 	if (!d->settles || !(g > 0) || !(s->dt > 0)) return 0;
-	const quern_real steps = 4 * sqrt((d->height + 2 * d->radii.mean) / g) / s->dt;
+	const quern_real steps = 4 * sqrt((d->height + dem_diameter(d)) / g) / s->dt;
 	return steps < d->settle_most ? steps : d->settle_most;
 }

@@ -128,6 +128,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
 	sh->books = !sh->looks && !s->settling && (s->use[FORCE_DAMPED].real[0] || s->use[FORCE_RUBBED].real[0]);
 	sh->starts = sh->looks && s->step == 0;
+	sh->material = sh->d->pairs.n ? s->use[FORCE_MATERIAL].index : NULL;
 	sh->grain = grains.block;
 	sh->contact = contacts.block;
 	sh->touch = touches.n ? touches.block : NULL;
@@ -232,7 +233,7 @@ static quern_status look_for_trembling(const forces_shared *sh, uint32_t n_block
 	int32_t *score = sh->use[FORCE_TREMBLING].index;
 	quern_real turned = 0, mass = 0;
 	for (uint32_t b = 0; b < n_blocks; b++) turned += sh->turned[2 * b], mass += sh->turned[2 * b + 1];
-	const quern_real way = 1e-9 * sh->d->radii.mean; /* below that it may be round-off */
+	const quern_real way = 1e-9 * sh->d->material[0].radii.mean; /* below that it may be round-off */
 	if (-turned * s->dt * s->dt > mass * way * way) ++*score;
 	else if (*score) --*score;
 	if (*score < MOST) return QUERN_OK;

@@ -51,6 +51,7 @@ typedef struct forces_shared {
 	bool looks;            /* nothing moves: forces and energies of the state as it is */
 	bool starts;           /* losses will be booked from now on: what springs hold is noted */
 	quern_images images;
+	const int32_t *material; /* NULL: no two contacts of a list have parameters of their own */
 	const uint32_t *grain, *contact, *touch; /* partitions */
 	quern_real *booked;   /* [block][body + 1][N_BOOKED]: on the material, by bodies and by fixed grains */
 	quern_real *sums;     /* [block][N_ENERGIES] */
@@ -85,6 +86,7 @@ typedef struct forces_work {
 typedef struct contact_chunk {
 	uint32_t block;
 	int32_t body;               /* the one touched, or -1 */
+	int32_t item;               /* of the pairs of materials that have parameters of their own, or -1 */
 	uint32_t begin, n_slots, n; /* entries begin .. begin + n_slots of the list, of which n are looked at */
 	quern_real *held;           /* by slot: what springs held in the last step; NULL: nobody asks */
 } contact_chunk;

@@ -9,8 +9,8 @@
 
 enum { MOST_COLUMNS = 16, MOST_BYTES = 1 << 30 };
 static const char *const names[] = { "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "fixed",
-	"w" };
-enum { COLUMN_RADIUS = 9, COLUMN_FIXED = 10, COLUMN_W = 11, N_NAMES = 12 };
+	"w", "material" };
+enum { COLUMN_RADIUS = 9, COLUMN_FIXED = 10, COLUMN_W = 11, COLUMN_MATERIAL = 12, N_NAMES = 13 };
 
 typedef struct {
 	const char *at, *end;
@@ -51,8 +51,8 @@ static bool header(cursor *c, uint32_t dim, int column[MOST_COLUMNS], int *n, ch
 		while (k < N_NAMES && strcmp(names[k], text) != 0) k++;
 		if (k == N_NAMES || *n == MOST_COLUMNS) {
 			snprintf(why, 200,
-				"line %zu: unknown column '%.40s'; known: x y z vx vy vz wx wy wz w radius fixed", c->line,
-				text);
+				"line %zu: unknown column '%.40s'; known: x y z vx vy vz wx wy wz w radius fixed material",
+				c->line, text);
 			return false;
 		}
 		if (seen & 1u << k) {
@@ -77,13 +77,19 @@ static void put(dem_place *g, int column, double value) {
 	else g->fixed = value != 0;
 }
 
-static bool row(cursor *c, const int *column, int n, dem_place *g, char why[200]) {
+static bool row(cursor *c, const dem *d, const int *column, int n, dem_place *g, char why[200]) {
 	char text[64];
 	*g = (dem_place) { .radius = NAN };
 	for (int k = 0; k < n; k++) {
 		char *end;
 		if (!word(c, text)) {
 			snprintf(why, 200, "line %zu: %d numbers are wanted, found %d", c->line, n, k);
+			return false;
+		}
+		if (column[k] == COLUMN_MATERIAL) {
+			g->kind = quern_dem_material(d, text);
+			if (g->kind >= 0) continue;
+			snprintf(why, 200, "line %zu: no material is called '%.40s'", c->line, text);
 			return false;
 		}
 		const double value = strtod(text, &end);
@@ -99,14 +105,14 @@ static bool row(cursor *c, const int *column, int n, dem_place *g, char why[200]
 	return false;
 }
 
-bool quern_grain_table_read(const char *data, size_t length, uint32_t dim, grain_table *t, char why[200]) {
+bool quern_grain_table_read(const char *data, size_t length, const dem *d, grain_table *t, char why[200]) {
 	cursor c = { data, data + length, 1 };
 	int column[MOST_COLUMNS], n;
 	if (length && (*data == '\n' || *data == '#') && !next_line(&c)) {
 		snprintf(why, 200, "the table is empty");
 		return false;
 	}
-	if (!header(&c, dim, column, &n, why)) return false;
+	if (!header(&c, d->dim, column, &n, why)) return false;
 	while (next_line(&c)) {
 		if (t->n == t->cap) {
 			const uint32_t cap = t->cap ? 2 * t->cap : 256;
@@ -118,7 +124,7 @@ bool quern_grain_table_read(const char *data, size_t length, uint32_t dim, grain
 			t->grain = grown;
 			t->cap = cap;
 		}
-		if (!row(&c, column, n, &t->grain[t->n], why)) return false;
+		if (!row(&c, d, column, n, &t->grain[t->n], why)) return false;
 		t->n++;
 	}
 	if (t->n) return true;
@@ -126,7 +132,7 @@ bool quern_grain_table_read(const char *data, size_t length, uint32_t dim, grain
 	return false;
 }
 
-bool quern_grain_table_load(const char *path, uint32_t dim, grain_table *t, char why[200]) {
+bool quern_grain_table_load(const char *path, const dem *d, grain_table *t, char why[200]) {
 	FILE *file = fopen(path, "rb");
 	char *data = NULL;
 	size_t n = 0, cap = 0;
@@ -148,7 +154,7 @@ bool quern_grain_table_load(const char *path, uint32_t dim, grain_table *t, char
 	const bool whole = feof(file) && !ferror(file);
 	fclose(file);
 	bool good = false;
-	if (whole) good = quern_grain_table_read(data, n, dim, t, why);
+	if (whole) good = quern_grain_table_read(data, n, d, t, why);
 	else snprintf(why, 200, "cannot be read: it is larger than 1 GiB, or reading fails");
 	free(data);
 	return good;

@@ -102,7 +102,7 @@ void quern_dem_call_laws(const forces_shared *sh, forces_work *w, const contact_
 	clear_given(w, c->n);
 	for (uint32_t l = 0; l < sh->n_laws; l++) {
 		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
-		const void *self = c->body >= 0 && law->n_variant ? law->variant[c->body] : law->self;
+		const void *self = dem_law(law, c->item, c->body);
 		gather_rows(sh, w, c, law, rows, use, use_second);
 		if (c->n) ((const quern_contact_ops *)law->ops)->force[sh->s->dim - 2](self, &b);
 		if (!sh->looks) scatter_rows(sh, w, c, law, rows);

@@ -13,7 +13,7 @@ typedef struct {
 	const quern_bound *search;
 	const quern_neighbour_ops *ops;
 	quern_neighbour_job job;
-	const int32_t *fixed;
+	const int32_t *fixed, *material;
 	const int64_t *id;
 	uint32_t cap;     /* of each block's buffer, in pairs per grain */
 	quern_pair *pair; /* buffers of all blocks, one after the other */
@@ -50,10 +50,11 @@ static void set_job(listing *l) {
 	}
 	l->job.radius = s->use[NEAR_RADIUS].real[0];
 	l->job.largest = largest_radius(l->job.radius, grains.n);
-	l->job.reach = d->skin * 2 * d->radii.mean + d->reach;
+	l->job.reach = d->skin * 2 * d->material[0].radii.mean + d->reach;
 	l->job.n_blocks = grains.n_blocks;
 	l->job.block = grains.block;
 	l->fixed = s->use[NEAR_FIXED].index;
+	l->material = d->pairs.n ? s->use[NEAR_MATERIAL].index : NULL;
 	l->id = s->use[NEAR_ID].id;
 }
 
@@ -83,20 +84,28 @@ static quern_status sort_grains(listing *l) {
 
 /* ---- pairs ---- */
 
-/* One of the two passes of a sort by two numbers: by the id of the second grains, then, keeping that order among
- * equals, of the first. */
-static void sort_by_id(const listing *l, quern_pair *pair, uint32_t n, bool second, uint64_t *memory) {
+enum { BY_SECOND, BY_FIRST, BY_LAW };
+
+static uint64_t key_of(const listing *l, const quern_pair *pair, int by) {
+	if (by == BY_LAW) return (uint64_t)(1 + dem_item(l->d, l->material, pair->first, pair->second));
+	return (uint64_t)l->id[by == BY_SECOND ? pair->second : pair->first];
+}
+
+/* One of the passes of a sort by several numbers: by the id of the second grains, then, keeping that order among equals, of
+ * the first. */
+static void sort_by(const listing *l, quern_pair *pair, uint32_t n, int by, uint64_t *memory) {
 	uint64_t *key = memory, *work = key + n;
 	int32_t *from = (int32_t *)(void *)(work + quern_sort_bytes(n) / sizeof *work + 1);
 	quern_pair *copy = (quern_pair *)(void *)(from + n + n % 2);
-	for (uint32_t i = 0; i < n; i++) key[i] = (uint64_t)l->id[second ? pair[i].second : pair[i].first];
+	for (uint32_t i = 0; i < n; i++) key[i] = key_of(l, &pair[i], by);
 	quern_sort_order(n, key, from, work);
 	memcpy(copy, pair, n * sizeof *pair);
 	for (uint32_t i = 0; i < n; i++) pair[i] = copy[from[i]];
 }
 
 /* The first of a pair is the one of lower id, for ever. In the order of ids, every grain adds up its forces in the
- * order of its partners' ids: sums have the same bits for any search, in whatever order it keeps the grains. */
+ * order of its partners' ids: sums have the same bits for any search, in whatever order it keeps the grains. Where pairs of
+ * materials have parameters of their own, those of one pair come together, so that a law is called for many at once. */
 static bool sort_pairs(const listing *l, quern_pair *pair, uint32_t n, uint32_t worker) {
 	const size_t bytes = quern_sort_bytes(n) + (n + 2) * (sizeof(uint64_t) + sizeof(int32_t) + sizeof *pair);
 	uint64_t *memory = l->s->host->scratch(l->s->run, worker, bytes);
@@ -104,8 +113,9 @@ static bool sort_pairs(const listing *l, quern_pair *pair, uint32_t n, uint32_t 
 	for (uint32_t i = 0; i < n; i++)
 		if (l->id[pair[i].first] > l->id[pair[i].second])
 			pair[i] = (quern_pair) { pair[i].second, pair[i].first };
-	sort_by_id(l, pair, n, true, memory);
-	sort_by_id(l, pair, n, false, memory);
+	sort_by(l, pair, n, BY_SECOND, memory);
+	sort_by(l, pair, n, BY_FIRST, memory);
+	if (l->material) sort_by(l, pair, n, BY_LAW, memory);
 	return true;
 }
 
@@ -243,18 +253,30 @@ static uint32_t find_features(const listing *l, uint32_t b, uint32_t i, near_bod
 		body->self, &l->pose[b].pose, x, l->job.radius[i] + l->job.reach, MOST_FEATURES, w->feature);
 }
 
+/* Whether any grain has this item of the pairs on a body. */
+static bool is_met(const dem *d, uint32_t body, int32_t item) {
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		if (d->on_body[body * d->n_materials + k] == item) return true;
+	return false;
+}
+
 /* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too
- * many. */
+ * many. Of a body those with parameters of one pair of materials come together. */
 static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, const uint32_t *to) {
 	const quern_step *s = l->s;
+	const uint32_t rounds = 1 + l->d->pairs.n;
 	uint32_t n = 0;
-	for (uint32_t body = 0; body < s->n_slot[SLOT_BODIES]; body++) {
-		if (!quern_body_is_there(&s->slot[SLOT_BODIES][body], s->settling)) continue;
+	for (uint32_t round = 0; round < s->n_slot[SLOT_BODIES] * rounds; round++) {
+		const uint32_t body = round / rounds;
+		const int32_t item = (int32_t)(round % rounds) - 1;
+		if (!quern_body_is_there(&s->slot[SLOT_BODIES][body], s->settling) || !is_met(l->d, body, item))
+			continue;
 		for (uint32_t i = l->job.block[b]; i < l->job.block[b + 1]; i += CHUNK) {
 			const uint32_t m = l->job.block[b + 1] - i < CHUNK ? l->job.block[b + 1] - i : CHUNK;
 			find_gaps(l, body, i, m, w);
 			for (uint32_t k = 0; k < m; k++) {
 				if (!(w->gap[k] < l->job.reach) || (l->fixed && l->fixed[i + k])) continue;
+				if (dem_item_on(l->d, l->material, (int32_t)(i + k), (int32_t)body) != item) continue;
 				const uint32_t features = find_features(l, body, i + k, w);
 				if (features > MOST_FEATURES) return UINT32_MAX;
 				for (uint32_t f = 0; f < features; f++, n++) {
@@ -372,7 +394,7 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 	listing l = { .d = self, .s = s, .search = &s->slot[SLOT_NEIGHBOURS][0] };
 	l.ops = l.search->ops;
 	const quern_real moved = s->use[NEAR_DISPLACEMENT].real[0][0];
-	if (moved < 0.5 * l.d->skin * 2 * l.d->radii.mean && !is_release(s)) return QUERN_OK;
+	if (moved < 0.5 * l.d->skin * 2 * l.d->material[0].radii.mean && !is_release(s)) return QUERN_OK;
 	quern_status status = keep_inside(&l);
 	if (status == QUERN_OK) status = sort_grains(&l);
 	if (status == QUERN_OK) status = check_periodic(&l);

@@ -128,13 +128,33 @@ static void masses(const forces_shared *sh, const forces_work *w, uint32_t n) {
 		}
 }
 
+static int32_t item_at(const forces_shared *sh, uint32_t k) {
+	return dem_item(sh->d, sh->material, sh->use[FORCE_FIRST].index[k], sh->use[FORCE_SECOND].index[k]);
+}
+
+/* How many of n entries of the list have the parameters of the first: they are sorted by that, so that the end is found by
+ * halving. */
+static uint32_t alike(const forces_shared *sh, uint32_t begin, uint32_t n) {
+	uint32_t low = 1, high = n;
+	if (!sh->material) return n;
+	const int32_t item = item_at(sh, begin);
+	while (low < high) {
+		const uint32_t middle = low + (high - low + 1) / 2;
+		if (item_at(sh, begin + middle - 1) == item) low = middle;
+		else high = middle - 1;
+	}
+	return low;
+}
+
 QUERN_INLINE void block(
 	const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums, const int dim, const bool spin) {
-	for (uint32_t begin = sh->contact[b], end = sh->contact[b + 1]; begin < end; begin += sh->cap) {
+	for (uint32_t begin = sh->contact[b], end = sh->contact[b + 1], n; begin < end; begin += n) {
+		n = alike(sh, begin, end - begin < sh->cap ? end - begin : sh->cap);
 		contact_chunk c = { .block = b,
 			.body = -1,
+			.item = item_at(sh, begin),
 			.begin = begin,
-			.n_slots = end - begin < sh->cap ? end - begin : sh->cap,
+			.n_slots = n,
 			.held = quern_dem_held(sh, FORCE_CONTACT_SHEARED, begin) };
 		c.n = compact(sh, w, begin, c.n_slots, c.held, dim);
 		geometry(sh, w, c.n, dim);

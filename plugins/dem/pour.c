@@ -30,7 +30,7 @@ static quern_real waiting(const pouring *p) {
 }
 
 static quern_real mass_of(const pouring *p, quern_real radius) {
-	return quern_radius_mass(radius, p->d->density, p->s->dim);
+	return quern_radius_mass(radius, p->d->material[0].density, p->s->dim);
 }
 
 static bool is_due(const pouring *p) { return p->rest >= mass_of(p, waiting(p)); }
@@ -215,7 +215,7 @@ static quern_status pour_one(pouring *p) {
 }
 
 quern_status quern_dem_pour(const void *self, const quern_step *s) {
-	pouring p = { .d = self, .s = s, .law = ((const dem *)self)->radii };
+	pouring p = { .d = self, .s = s, .law = ((const dem *)self)->material[0].radii };
 	/* as many as the scene itself has, whatever one of its stages says */
 	const uint32_t n = s->host->set(s->run, "grain_source").n;
 	quern_status status = QUERN_OK;

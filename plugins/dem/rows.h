@@ -14,6 +14,8 @@
 	.doc = "Farthest way of a body's surface since the last list, at most."
 #define FIXED_USE(access) \
 	"grain.fixed", "1", access, QUERN_INDEX, .flags = QUERN_SHOWN, .when = "fixed", .doc = "1: it does not move."
+#define MATERIAL_USE(access, ...) \
+	"grain.material", "1", access, QUERN_INDEX, .when = "mixed", __VA_ARGS__
 #define ENERGY_USE(name, access, text) \
 	"total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, .doc = text
 
@@ -27,6 +29,7 @@
 	X(FILL_WEIGHT, "grain.weight", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, .initial = 1, \
 		.doc = "Share of its mass that the grain carries.") \
 	X(FILL_FIXED, FIXED_USE(QUERN_WRITE)) \
+	X(FILL_MATERIAL, MATERIAL_USE(QUERN_WRITE, .flags = QUERN_SHOWN, .doc = "Number of its material, from 0.")) \
 	X(FILL_ID, "grain.id", "1", QUERN_WRITE, QUERN_ID, .flags = QUERN_SHOWN, \
 		.doc = "Number of the grain, for ever.") \
 	X(FILL_DISPLACEMENT, DISPLACEMENT_USE) \
@@ -80,6 +83,7 @@ QUERN_USE_ENUM(POUR_USES);
 	X(NEAR_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS) \
 	X(NEAR_ID, "grain.id", "1", QUERN_READ, QUERN_ID, .flags = QUERN_OTHERS) \
 	X(NEAR_FIXED, FIXED_USE(QUERN_READ)) \
+	X(NEAR_MATERIAL, MATERIAL_USE(QUERN_READ, .flags = QUERN_OTHERS)) \
 	X(NEAR_DISPLACEMENT, DISPLACEMENT_USE) \
 	X(NEAR_SWEPT, SWEPT_USE(QUERN_WRITE)) \
 	X(NEAR_ANCHOR, "grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made.") \
@@ -105,6 +109,7 @@ QUERN_USE_ENUM(NEAR_USES);
 	X(FORCE_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS) \
 	X(FORCE_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OTHERS | QUERN_OPTIONAL) \
 	X(FORCE_FIXED, FIXED_USE(QUERN_READ)) \
+	X(FORCE_MATERIAL, MATERIAL_USE(QUERN_READ, .flags = QUERN_OTHERS)) \
 	X(FORCE_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
 	X(FORCE_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
 	X(FORCE_GRAIN, "touch.grain", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \

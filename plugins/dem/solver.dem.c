@@ -8,6 +8,10 @@
 #include <stdio.h>
 
 static const char *const radius_laws[] = { "normal", "uniform", NULL };
+static const quern_param mix_rows[] = { QUERN_PARAM_AS(dem_share, name, "material", NULL, "Which material.",
+											.flags = QUERN_REQUIRED),
+	QUERN_PARAM(dem_share, share, "1", "Of the mass.", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1),
+	QUERN_END_PARAMS };
 static const quern_param fill_rows[] = { QUERN_PARAM_AS(dem_fill, lower, "region.box.lower", "m",
 											 "Lower corner of the region of centres.",
 											 .flags = QUERN_REQUIRED),
@@ -15,32 +19,64 @@ static const quern_param fill_rows[] = { QUERN_PARAM_AS(dem_fill, lower, "region
 		"Upper corner; may equal the lower one along an axis.", .flags = QUERN_REQUIRED),
 	QUERN_PARAM(dem_fill, velocity, "m/s", "Velocity at the start."),
 	QUERN_PARAM(dem_fill, settle, NULL, "Let the grains come to rest before time starts."),
-	QUERN_PARAM(dem_fill, fixed, NULL, "These grains never move: a rough floor."), QUERN_END_PARAMS };
+	QUERN_PARAM(dem_fill, fixed, NULL, "These grains never move: a rough floor."),
+	QUERN_PARAM(dem_fill, material, NULL, "Of which material they are; default: the first.",
+		.flags = QUERN_MAYBE, .unless = "mix"),
+	QUERN_PARAM(dem_fill, mix, NULL,
+		"Of which materials they are, by share of the mass: {sand: 70 %, steel: 30 %}.", .rows = mix_rows,
+		.item_size = sizeof(dem_share), .text = "material", .max = MOST_MATERIALS),
+	QUERN_END_PARAMS };
 static const quern_param place_rows[] = { QUERN_PARAM(
 											  dem_place, position, "m", "Centre.", .flags = QUERN_REQUIRED),
 	QUERN_PARAM(dem_place, velocity, "m/s", "Velocity."),
 	QUERN_PARAM(dem_place, spin, "rad/s", "Angular velocity; in 2-D the first number counts."),
 	QUERN_PARAM(dem_place, radius, "m", "Radius; default: the mean.", .flags = QUERN_MAYBE | QUERN_MIN_OPEN,
 		.max = 1e6),
-	QUERN_PARAM(dem_place, fixed, NULL, "It never moves."), QUERN_END_PARAMS };
+	QUERN_PARAM(dem_place, fixed, NULL, "It never moves."),
+	QUERN_PARAM(
+		dem_place, material, NULL, "Of which material it is; default: the first.", .flags = QUERN_MAYBE),
+	QUERN_END_PARAMS };
+#define MATERIAL_ROWS(T, member, before, ...)                                                                \
+	QUERN_PARAM_AS(T, member density, before "density", "kg/m^3", "Density of the grains' material.",        \
+		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e6, __VA_ARGS__),                     \
+		QUERN_PARAM_AS(T, member radii.mean, before "radius.mean", "m", "Mean radius.",                      \
+			.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6, __VA_ARGS__),                              \
+		QUERN_PARAM_AS(T, member radii.spread, before "radius.spread", "1",                                  \
+			"Over the mean: standard deviation (normal, cut at two of them) or half-width (uniform).",       \
+			.max = 0.45, __VA_ARGS__),                                                                       \
+		QUERN_PARAM_AS(T, member radii.law, before "radius.law", "1", "Distribution of radii.",              \
+			.choices = radius_laws, __VA_ARGS__)
+static const quern_param material_rows[] = { QUERN_PARAM(dem_material, name, NULL,
+												 "What the material is called.", .flags = QUERN_REQUIRED),
+	MATERIAL_ROWS(dem_material, , "", .pad = 0), QUERN_END_PARAMS };
+static const quern_param word_rows[] = { QUERN_PARAM(dem_word, name, NULL,
+											 "A material of grains or of a body.", .flags = QUERN_REQUIRED),
+	QUERN_END_PARAMS };
+static const quern_param pair_rows[] = {
+	QUERN_PARAM(dem_pair, between, NULL, "Two materials, of which one at least is of grains: [sand, steel].",
+		.rows = word_rows, .item_size = sizeof(dem_word), .flags = QUERN_REQUIRED),
+	QUERN_END_PARAMS
+};
 static const quern_param source_rows[] = SOURCE_ROWS(100);
-static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.density", "kg/m^3",
-										  "Density of the grains' material.",
-										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e6),
-	QUERN_PARAM_AS(dem, radii.mean, "material.radius.mean", "m", "Mean radius.",
-		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM_AS(dem, radii.spread, "material.radius.spread", "1",
-		"Over the mean: standard deviation (normal, cut at two of them) or half-width (uniform).",
-		.max = 0.45),
-	QUERN_PARAM_AS(
-		dem, radii.law, "material.radius.law", "1", "Distribution of radii.", .choices = radius_laws),
+static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .unless = "materials"),
+	QUERN_PARAM(dem, materials, NULL,
+		"Several materials, by name: {sand: {density: ..., radius: ...}, ...}. The first stands for all "
+		"where a number "
+		"such as `grain.diameter` is taken.",
+		.rows = material_rows, .item_size = sizeof(dem_material), .text = "name", .max = MOST_MATERIALS,
+		.flags = QUERN_ONCE),
+	QUERN_PARAM(dem, pairs, NULL,
+		"Pairs of materials whose contacts have parameters of their own, such as {between: [sand, steel], "
+		"friction: 0.2}.",
+		.rows = pair_rows, .item_size = sizeof(dem_pair), .max = 256),
 	QUERN_PARAM(
 		dem, fill, NULL, "Regions to fill with grains.", .rows = fill_rows, .item_size = sizeof(dem_fill)),
 	QUERN_PARAM(dem, place, NULL, "Single grains.", .rows = place_rows, .item_size = sizeof(dem_place)),
-	QUERN_PARAM(dem, file, NULL, "Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed].",
+	QUERN_PARAM(dem, file, NULL,
+		"Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed] [material].",
 		.flags = QUERN_FILE),
-	QUERN_PARAM(
-		dem, source, NULL, "Regions that pour grains.", .rows = source_rows, .item_size = sizeof(source)),
+	QUERN_PARAM(dem, source, NULL, "Regions that pour grains, of the first material where there are several.",
+		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
@@ -60,6 +96,9 @@ static const quern_param params[] = { QUERN_PARAM_AS(dem, density, "material.den
 		"Most steps of settling; then the run goes on with a warning.", .def = 1e6, .min = 1, .max = 2e9),
 	QUERN_PARAM(dem, fixed, NULL,
 		"Keep a flag for grains that do not move; set by itself where one is needed.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, mixed, NULL,
+		"Keep of which material each grain is; set by itself where there are several.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(dem, features, NULL,
 		"Keep with every touch which feature of the body it is on; set by itself where bodies have several.",
@@ -104,7 +143,8 @@ static const quern_slot slots[] = {
 		.required = 1,
 		.stage = { "dem.forces" },
 		.repeat = "contact",
-		.again = "touch" },
+		.again = "touch",
+		.refine = "pairs" },
 	{ .name = "neighbours",
 		.kind = &quern_neighbours_kind,
 		.doc = "the search for near pairs",
@@ -205,7 +245,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	dem *d = self;
 	fill_height loose = fill_height_of(setup);
 	d->dim = setup->dim;
-	d->radii.stream = setup->stream;
+	if (quern_dem_name_materials(d, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	const dem_fill *fill = d->fill.items;
 	for (uint32_t i = 0; i < d->fill.n; i++) {
 		for (uint32_t k = 0; k < d->dim; k++) {
@@ -235,16 +275,16 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	d->sources = d->sources || d->source.n;
 	setup->host->publish(setup, "grain.sources", "1", d->source.n);
 	if (d->file) d->fixed = true; /* its header may say so */
-	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = 2 * d->radii.mean;
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = dem_diameter(d);
 	if (d->settles && !(gravity > 0) && !setup->later)
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
 	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
 	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
-	setup->host->publish(setup, "grain.density", "kg/m^3", d->density);
-	setup->host->publish(setup, "grain.radius_spread", "1", d->radii.spread);
-	setup->host->publish(setup, "grain.radius_law", "1", d->radii.law);
+	setup->host->publish(setup, "grain.density", "kg/m^3", d->material[0].density);
+	setup->host->publish(setup, "grain.radius_spread", "1", d->material[0].radii.spread);
+	setup->host->publish(setup, "grain.radius_law", "1", d->material[0].radii.law);
 	const quern_real height = fill_height_all(&loose);
 	d->height = height > 0 ? height : setup->upper[loose.axis] - setup->lower[loose.axis];
 	setup->host->publish(setup, "fill.height", "m", d->height);
@@ -252,29 +292,31 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
+static void finish(void *self) { quern_dem_part(self); }
+
 /* The largest grain that any source brings; a table that cannot be read is found later, with its place. */
 static quern_real widest(const dem *d) {
 	const dem_place *place = d->place.items;
-	quern_real most = quern_radius_most(&d->radii);
+	quern_real most = 0;
 	grain_table table = { 0 };
 	char why[200];
+	for (uint32_t k = 0; k < d->n_materials; k++) most = fmax(most, quern_radius_most(&d->material[k].radii));
 	for (uint32_t i = 0; i < d->place.n; i++) most = place[i].radius > most ? place[i].radius : most;
-	if (d->file && quern_grain_table_load(d->file, d->dim, &table, why))
+	if (d->file && quern_grain_table_load(d->file, d, &table, why))
 		for (uint32_t i = 0; i < table.n; i++)
 			most = table.grain[i].radius > most ? table.grain[i].radius : most;
 	quern_grain_table_finish(&table);
 	return most;
 }
 
-/* How far the law acts beyond touching, between two of the largest grains and of one on each body. */
+/* How far the law acts beyond touching, between two of the largest grains and of one on each body, in every case. */
 static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32_t bodies) {
 	const quern_contact_ops *ops = law->ops;
-	quern_real reach = ops->reach(law->self, 0.5 * radius);
-	for (uint32_t b = 0; b < bodies; b++) {
-		const quern_real on_body = ops->reach(law->n_variant ? law->variant[b] : law->self, radius);
-		reach = on_body > reach ? on_body : reach;
-	}
-	d->reach = reach > d->reach ? reach : d->reach;
+	for (int32_t item = -1; item < (int32_t)law->n_refined; item++)
+		for (int32_t body = -1; body < (int32_t)bodies; body++) {
+			const quern_real reach = ops->reach(dem_law(law, item, body), body < 0 ? 0.5 * radius : radius);
+			d->reach = reach > d->reach ? reach : d->reach;
+		}
 }
 
 /* A law that is bounded by the force of those before it in the list does nothing where there are none. */
@@ -286,158 +328,84 @@ static quern_status refuse_order(const quern_setup *setup, const quern_bound *la
 		law->id);
 }
 
+/* N/m of all laws between grains of a pair of materials, and who is the stiffest of them. */
+static quern_real stiffness_of(const dem *d, const quern_bound *law, uint32_t n_laws, int32_t item,
+	quern_real radius, quern_real force, const char **stiffest) {
+	quern_real sum = 0, most = 0;
+	for (uint32_t l = 0; l < n_laws; l++) {
+		const quern_contact_ops *ops = law[l].ops;
+		const quern_real k =
+			ops->stiffness ? ops->stiffness(dem_law(&law[l], item, -1), d->dim, radius, force) : 0;
+		sum += k;
+		if (k > most) most = k, *stiffest = law[l].id;
+	}
+	return sum;
+}
+
+/* Of a random packing. */
+static quern_real packing_of(uint32_t dim) { return dim == 2 ? 0.82 : 0.60; }
+
+/* N between grains at the bottom of the fill, were it all of that density. */
+static quern_real force_under(
+	const dem *d, const quern_setup *setup, quern_real density, quern_real diameter) {
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
+	const quern_real pressure = packing_of(d->dim) * density * gravity * d->height;
+	return pressure * diameter * (d->dim == 3 ? diameter : 1);
+}
+
+/* How far the softest pair of materials gives way under the fill, were it all of the densest. */
+static void find_sinking(dem *d, const quern_setup *setup, const quern_bound *law, uint32_t n_laws) {
+	quern_real density = 0;
+	for (uint32_t k = 0; k < d->n_materials; k++) density = fmax(density, d->material[k].density);
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		for (uint32_t l = k; l < d->n_materials; l++) {
+			const quern_real a = d->material[k].radii.mean, b = d->material[l].radii.mean;
+			const quern_real force = force_under(d, setup, density, a + b);
+			const char *stiffest = NULL;
+			const quern_real stiffness = stiffness_of(
+				d, law, n_laws, d->pair[k][l], k == l ? 0.5 * a : a * b / (a + b), 0.5 * force, &stiffest);
+			const quern_real sinks = stiffness > 0 ? force / (stiffness * (a + b)) : 0;
+			if (sinks > d->sinks) d->sinks = sinks, d->stiffness = stiffness, d->stiffest = stiffest;
+		}
+}
+
 /* A random packing's bulk modulus, from the affine estimates of docs/theory/grains.md, section 5, with what real
  * packings reach of them: 0.3 k_n for discs, 0.6 of z phi k_n / (3 pi D) for spheres (z = 5). */
+static void publish_packing(const dem *d, const quern_setup *setup, const quern_bound *law, uint32_t n_laws) {
+	const quern_real packing = packing_of(d->dim), diameter = dem_diameter(d),
+					 density = d->material[0].density;
+	const quern_real force = force_under(d, setup, density, diameter);
+	const char *stiffest;
+	const quern_real kn =
+		stiffness_of(d, law, n_laws, d->pair[0][0], 0.25 * diameter, 0.5 * force, &stiffest);
+	const quern_real bulk =
+		d->dim == 2 ? 0.3 * kn : 0.6 * 5 * packing * kn / (3 * 3.141592653589793 * diameter);
+	setup->host->publish(setup, "grain.stiffness", "N/m", kn);
+	setup->host->publish(setup, "grain.bulk_modulus", "Pa", bulk);
+	setup->host->publish(setup, "grain.packed_density", "kg/m^3", packing * density);
+	setup->host->publish(setup, "grain.critical_density", "kg/m^3", (packing - 0.03) * density);
+}
+
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	dem *d = self;
-	quern_real kn = 0, most = 0;
+	const quern_bound *law = slot[SLOT_CONTACT];
 	if (d->settles && !n_slot[SLOT_CONTACT])
 		return refuse_settling(d, setup, err, "without a contact law grains fall for ever: give contact one");
-	if (n_slot[SLOT_CONTACT] && ((const quern_contact_ops *)slot[SLOT_CONTACT][0].ops)->follows)
-		return refuse_order(setup, &slot[SLOT_CONTACT][0], err);
+	if (n_slot[SLOT_CONTACT] && ((const quern_contact_ops *)law[0].ops)->follows)
+		return refuse_order(setup, &law[0], err);
+	const quern_status status = quern_dem_pair_up(d, setup, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err);
+	if (status != QUERN_OK) return status;
 	d->features = false;
 	d->moving = n_slot[SLOT_BODIES] && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
-	const quern_real packing = d->dim == 2 ? 0.82 : 0.60, diameter = 2 * d->radii.mean;
-	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
-	const quern_real pressure = packing * d->density * gravity * d->height;
-	const quern_real force = pressure * diameter * (d->dim == 3 ? diameter : 1);
-	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
-		const quern_bound *law = &slot[SLOT_CONTACT][l];
-		const quern_contact_ops *ops = law->ops;
-		const quern_real k =
-			ops->stiffness ? ops->stiffness(law->self, d->dim, 0.5 * d->radii.mean, 0.5 * force) : 0;
-		kn += k;
-		if (k > most) most = k, d->stiffest = law->id;
-		if (ops->reach) find_reach(d, law, widest(d), n_slot[SLOT_BODIES]);
-	}
-	const quern_real bulk =
-		d->dim == 2 ? 0.3 * kn : 0.6 * 5 * packing * kn / (3 * 3.141592653589793 * diameter);
-	d->stiffness = kn;
-	d->sinks = kn > 0 ? force / (kn * diameter) : 0;
-	setup->host->publish(setup, "grain.stiffness", "N/m", kn);
-	setup->host->publish(setup, "grain.bulk_modulus", "Pa", bulk);
-	setup->host->publish(setup, "grain.packed_density", "kg/m^3", packing * d->density);
-	setup->host->publish(setup, "grain.critical_density", "kg/m^3", (packing - 0.03) * d->density);
+	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++)
+		if (((const quern_contact_ops *)law[l].ops)->reach)
+			find_reach(d, &law[l], widest(d), n_slot[SLOT_BODIES]);
+	find_sinking(d, setup, law, n_slot[SLOT_CONTACT]);
+	publish_packing(d, setup, law, n_slot[SLOT_CONTACT]);
 	return QUERN_OK;
-}
-
-/* ---- the step ---- */
-
-/* A kind of contact as the step sees it: half the shortest period, the limit of the step, and the damping ratio at that
- * period. The stiffest of its laws gives the name. */
-typedef struct {
-	quern_real period, hard, damping;
-	const char *law, *where, *body;
-	uint32_t others; /* laws beside that one */
-} contact_limit;
-
-/* The fastest mode of a packing: a grain has several contacts. omega_max^2 = 6 k/m of a triangular lattice and 8 k/m
- * of a face-centred one are 3 and 4 times that of a pair. */
-static quern_real crowding(uint32_t dim) { return dim == 2 ? 1.7320508075688772 : 2; }
-
-/* All laws together: stiffnesses add up, and so do the squares of frequencies; damping coefficients too. */
-static contact_limit all_laws(const quern_step *s, quern_real mass, quern_real radius, int32_t body) {
-	contact_limit c = { .period = INFINITY, .hard = INFINITY };
-	quern_real square = 0, drag = 0, shortest = INFINITY;
-	uint32_t n = 0;
-	for (uint32_t l = 0; l < s->n_slot[SLOT_CONTACT]; l++) {
-		const quern_bound *law = &s->slot[SLOT_CONTACT][l];
-		const quern_contact_ops *ops = law->ops;
-		const void *self = body >= 0 && law->n_variant ? law->variant[body] : law->self;
-		if (!ops->period) continue;
-		const quern_real t = ops->period(self, s->dim, mass, radius);
-		const quern_real ratio = ops->damping ? ops->damping(self, s->dim) : 0;
-		square += 1 / (t * t);
-		drag += ratio / t;
-		n++;
-		if (t < shortest) shortest = t, c.law = law->id, c.damping = ratio;
-	}
-	c.period = n > 1 ? 1 / sqrt(square) : shortest;
-	if (n > 1) c.damping = drag * c.period, c.others = n - 1;
-	return c;
-}
-
-/* 0.2 of the half-period, or the limit of explicit dashpots in a packing, omega dt < 2 (sqrt(1 + zeta^2) - zeta). */
-static contact_limit limit_of(const quern_step *s, quern_real mass, quern_real radius, int32_t body) {
-	contact_limit c = all_laws(s, mass, radius, body);
-	const quern_real crowd = crowding(s->dim), zeta = crowd * c.damping;
-	const quern_real damped = 2 * (sqrt(1 + zeta * zeta) - zeta) / crowd * c.period / 3.141592653589793;
-	c.hard = damped < 0.2 * c.period ? damped : 0.2 * c.period;
-	c.where = "of the lightest grain on ";
-	c.body = body >= 0 ? s->slot[SLOT_BODIES][body].id : "";
-	return c;
-}
-
-static void say_limit(
-	const contact_limit *fast, const contact_limit *hard, bool by_period, char reason[160]) {
-	const contact_limit *c = by_period ? fast : hard;
-	const bool same = c->period == hard->period && c->damping == hard->damping;
-	char others[24] = "", damped[120] = "";
-	if (c->others) snprintf(others, sizeof others, " and %u more", c->others);
-	if (hard->hard < 0.2 * hard->period)
-		snprintf(damped, sizeof damped, "%s%s%s, damping ratio %.3g", same ? "" : "; hard limit ",
-			same ? "" : hard->where, same ? "" : hard->body, hard->damping);
-	snprintf(reason, 160, "%s%s %s%s, half-period %.3g s%s%s", c->law, others, c->where, c->body, c->period,
-		by_period ? " / 50" : "", damped);
-}
-
-typedef struct {
-	quern_real mass[2],
-		radius; /* of the two lightest, the second infinite if there is one alone; of the lightest */
-} lightest;
-
-/* Before there are grains, and where sources bring more, what the distribution may bring. */
-static lightest lightest_grains(const dem *d, const quern_step *s) {
-	const uint32_t n = s->host->set(s->run, "grain").n;
-	const quern_real *mass = s->use[FILL_MASS].real[0], *radius = s->use[FILL_RADIUS].real[0];
-	const int32_t *fixed = s->use[FILL_FIXED].index;
-	lightest l = { { INFINITY, INFINITY }, INFINITY };
-	for (uint32_t i = 0; i < n; i++) {
-		if (fixed && fixed[i]) continue;
-		if (mass[i] < l.mass[0]) l.mass[1] = l.mass[0], l.mass[0] = mass[i], l.radius = radius[i];
-		else if (mass[i] < l.mass[1]) l.mass[1] = mass[i];
-	}
-	if (isfinite(l.mass[0]) && !d->source.n) return l;
-	const quern_real least = quern_radius_least(&d->radii),
-					 light = quern_radius_mass(least, d->density, d->dim);
-	if (light < l.mass[0]) l.mass[0] = light, l.radius = least;
-	if (light < l.mass[1]) l.mass[1] = light;
-	return l;
-}
-
-static contact_limit limit_of_pair(const quern_step *s, const lightest *l) {
-	const bool two = isfinite(l->mass[1]);
-	const quern_real pair = two ? l->mass[0] * l->mass[1] / (l->mass[0] + l->mass[1]) : l->mass[0];
-	contact_limit c = limit_of(s, pair, 0.5 * l->radius, -1);
-	c.where = two ? "between the two lightest grains" : "on the lightest grain";
-	return c;
-}
-
-/* The stiffest contact is that of the two lightest grains, or of the lightest against a body. */
-static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
-	const dem *d = self;
-	const lightest l = lightest_grains(d, s);
-	contact_limit fast = limit_of_pair(s, &l),
-				  first = fast; /* the shortest; the first to fail when the step grows */
-	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
-		const contact_limit c = limit_of(s, l.mass[0], l.radius, (int32_t)b);
-		if (c.period < fast.period) fast = c;
-		if (c.hard < first.hard) first = c;
-	}
-	*hard = first.hard;
-	const bool by_period = fast.period / 50 <= 0.5 * first.hard;
-	if (isfinite(fast.period)) say_limit(&fast, &first, by_period, reason);
-	else snprintf(reason, 160, "grains without a contact law");
-	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
-	const quern_real chosen = by_period ? fast.period / 50 : 0.5 * first.hard;
-	const quern_real speed =
-		d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY) : 0;
-	if (!(0.1 * l.radius < speed * chosen)) return chosen;
-	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, l.radius);
-	return 0.1 * l.radius / speed;
 }
 
 enum { SUM_DISCRETE = SUM_OWN, SUM_LEFT, SUM_POURED };
@@ -472,8 +440,13 @@ static bool radii_hold(const quern_step *s, const quern_real *radius, uint32_t n
 }
 
 static quern_status accept(const void *self, const quern_step *s) {
+	const dem *d = self;
 	const uint32_t n = s->host->set(s->run, "grain").n;
-	(void)self;
+	const int32_t *material = s->use[FILL_MATERIAL].index;
+	for (uint32_t i = 0; i < n && material; i++)
+		if (material[i] < 0 || material[i] >= (int32_t)d->n_materials)
+			return s->host->stop(
+				s->run, QUERN_E_NUMERIC, NULL, -1, "grain.material holds the number of no material");
 	if (!radii_hold(s, s->use[FILL_RADIUS].real[0], n))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 			"grain.radius holds a radius of no grain, or far wider than the domain");
@@ -486,7 +459,7 @@ static quern_status accept(const void *self, const quern_step *s) {
 static const char *const with[] = { "bodies", NULL };
 
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .with = with, .after = with,
-	.sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready, .limit = limit,
+	.sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready, .limit = quern_dem_limit,
 	.settled = quern_dem_settled, .account = account, .settling = quern_dem_settling, .accept = accept };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
@@ -499,5 +472,6 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.params = params,
 	.uses = uses,
 	.init = init,
+	.finish = finish,
 	.ops = &ops };
 QUERN_LIBRARY(plugin, "0.1.0", "MIT");

@@ -172,12 +172,18 @@ static void book(const forces_shared *sh, const forces_work *w, const contact_ch
 	if (sh->pose[c->body].moves && w->wall[0]) book_work(sh, w, c, sums);
 }
 
-/* A chunk is of one body. */
+static int32_t item_at(const forces_shared *sh, uint32_t k) {
+	return dem_item_on(sh->d, sh->material, sh->use[FORCE_GRAIN].index[k], sh->use[FORCE_BODY].index[k]);
+}
+
+/* A chunk is of one body, and of grains that have the same parameters on it. */
 void quern_dem_touches(const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums) {
 	const int32_t *body = sh->use[FORCE_BODY].index;
 	for (uint32_t begin = sh->touch[b], end = sh->touch[b + 1], n; begin < end; begin += n) {
-		for (n = 1; begin + n < end && n < sh->cap && body[begin + n] == body[begin]; n++) {}
-		const contact_chunk c = { b, body[begin], begin, n, n,
+		const int32_t item = item_at(sh, begin);
+		for (n = 1; begin + n < end && n < sh->cap && body[begin + n] == body[begin]; n++)
+			if (sh->material && item_at(sh, begin + n) != item) break;
+		const contact_chunk c = { b, body[begin], item, begin, n, n,
 			quern_dem_held(sh, FORCE_TOUCH_SHEARED, begin) };
 		load(sh, w, &c);
 		geometry(sh, w, &c);

@@ -48,6 +48,23 @@ def elastic_bar(place):
     near("elastic_bar: swing", max(u for _, u in swing), 0.05 * 13 / 10, 0.1)
 
 
+def mixture(place):
+    """Sand and steel are poured by their shares of the mass, and flow; nobody is lost or becomes another."""
+    out = place / "mixture"
+    lab.run("mixture", out)
+    kinds = []
+    for path in (lab.frames(out)[0], lab.frames(out)[-1]):
+        with h5py.File(path) as file:
+            grains = file["grains"]
+            id, kind, mass, moves = (grains[name][:] for name in ("id", "material", "mass", "fixed"))
+            kinds.append({i: (k, m) for i, k, m in zip(id, kind, mass)})
+            poured, speed = mass * (moves == 0), grains["velocity"][:, 0]
+    assert kinds[0] == kinds[1] and set(kind) == {0, 1}
+    steel = poured[kind == 1].sum() / poured.sum()
+    print(f"mixture: {len(kind)} grains, {steel:.4f} of the mass is steel, asked 0.4; fastest {speed.max():.3g} m/s")
+    assert abs(steel - 0.4) < mass.max() / poured.sum() and speed.max() > 0.1
+
+
 def drum(place):
     """A quarter of a turn, with coarser grains: none is lost, the surface leans against the turning as sand does, the drum's torque is
     what keeps the grains' weight aside, and its work is what was lost and what was raised."""
@@ -119,5 +136,5 @@ def heap(place):
 if __name__ == "__main__":
     assert math.isclose(math.hypot(3.3552, 9.2184), 9.81, rel_tol=1e-4)
     with lab.workplace() as name:
-        for test in (incline, elastic_bar, two_grains, drum, hopper, heap):
+        for test in (incline, elastic_bar, mixture, two_grains, drum, hopper, heap):
             test(pathlib.Path(name))

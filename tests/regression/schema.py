@@ -38,7 +38,9 @@ def check_tables():
     assert scene["output"]["properties"]["compress"]["default"] is True
     assert scene["checkpoint"]["properties"]["every"]["default"] == 300
     grains = scene["grains"]["else"]
-    assert not grains["additionalProperties"] and {"material", "contact"} <= set(grains["required"])
+    assert not grains["additionalProperties"] and "contact" in grains["required"]
+    assert {"required": ["material"]} in grains["anyOf"] and {"required": ["materials"]} in grains["anyOf"]
+    assert {"density", "radius"} <= set(grains["properties"]["material"]["required"])
     law = next(one for one in grains["properties"]["contact"]["anyOf"][0]["anyOf"] if "properties" in one)["properties"]
     assert law["linear"]["required"] == ["stiffness"] and not law["linear"]["additionalProperties"]
     assert {"type": "number", "exclusiveMinimum": 0.0, "maximum": 1e15} in law["linear"]["properties"]["stiffness"]["anyOf"]
@@ -92,6 +94,13 @@ def check_words(validator, yaml):
             other = copy.deepcopy(scene)
             other[place[0]][place[1]] = value
             assert validator.is_valid(other), f"{place}: {value}"
+    grains = scene["grains"]
+    one = {"density": 2500, "radius": {"mean": "1 mm"}}
+    pair = {"between": ["sand", "steel"], "friction": 0.2}
+    for material in ({"materials": {"sand": one, "steel": one}, "pairs": [pair]}, {"materials": [{"name": "sand", **one}], "pairs": pair}):
+        other = {**scene, "grains": {**{k: v for k, v in grains.items() if k != "material"}, **material}}
+        assert validator.is_valid(other), list(validator.iter_errors(other))[:3]
+    assert not validator.is_valid({**scene, "grains": {k: v for k, v in grains.items() if k != "material"}}), "no material passes"
     for place, value in {("time", "end"): "soon", ("output", "compress"): "maybe", ("time", "step"): "never",
                          ("seed",): 1.5, ("time", "end "): 1}.items():
         other = copy.deepcopy(scene)

@@ -180,6 +180,116 @@ static void writes(void **state) {
 	finish(&r);
 }
 
+/* ---- lists whose items have names, items that are one value, keys that exclude each other ---- */
+
+typedef struct {
+	const char *word;
+	quern_real share;
+} part;
+typedef struct {
+	quern_real alone;
+	quern_list parts, words;
+} mixed;
+
+static const quern_param part_rows[] = { QUERN_PARAM(part, word, NULL, "Its name.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM(part, share, "1", "Share.", .flags = QUERN_REQUIRED, .max = 1), QUERN_END_PARAMS };
+static const quern_param word_rows[] = { QUERN_PARAM(part, word, NULL, "A word.", .flags = QUERN_REQUIRED),
+	QUERN_END_PARAMS };
+static const quern_param mixed_rows[] = {
+	QUERN_PARAM(mixed, alone, "m", "One for all.", .flags = QUERN_REQUIRED, .unless = "parts"),
+	QUERN_PARAM(mixed, parts, NULL, "Parts.", .rows = part_rows, .item_size = sizeof(part), .text = "word"),
+	QUERN_PARAM(mixed, words, NULL, "Words.", .rows = word_rows, .item_size = sizeof(part)), QUERN_END_PARAMS
+};
+
+typedef struct {
+	char *said;
+	size_t faults;
+	mixed m;
+	quern_tree *tree;
+} mixture;
+
+static mixture read_mixture(const char *text) {
+	quern_report *report = quern_report_create();
+	quern_units *units = quern_units_create();
+	mixture r = { .tree = quern_tree_parse("t.yaml", text, strlen(text), report) };
+	const quern_reading how = { report, units, 2, NULL, 0, r.tree };
+	size_t size = 0;
+	quern_params_read(&how, "m", mixed_rows, r.tree->root, (quern_mark) { "t.yaml", 1, 1 }, NULL, &r.m);
+	FILE *out = open_memstream(&r.said, &size);
+	quern_report_print(report, out);
+	fclose(out);
+	r.faults = quern_report_errors(report);
+	quern_units_destroy(units);
+	quern_report_destroy(report);
+	return r;
+}
+
+static void forget(mixture *r) {
+	free(r->said);
+	quern_params_finish(mixed_rows, &r->m);
+	quern_tree_destroy(r->tree);
+}
+
+/* A map of names, a list of items that have one, and single values for whole items mean the same. */
+static void named_items(void **state) {
+	static const char *const forms[] = { "parts: {sand: 70 %, rock: {share: 0.3}}\nwords: [a, b]",
+		"parts: [{word: sand, share: 0.7}, {share: 30 %, word: rock}]\nwords: [{word: a}, b]" };
+	(void)state;
+	for (size_t i = 0; i < sizeof forms / sizeof *forms; i++) {
+		mixture r = read_mixture(forms[i]);
+		if (r.faults) fail_msg("%s", r.said);
+		const part *parts = r.m.parts.items, *words = r.m.words.items;
+		assert_true(r.m.parts.n == 2 && r.m.words.n == 2 && isnan(r.m.alone));
+		assert_string_equal(parts[0].word, "sand");
+		assert_string_equal(parts[1].word, "rock");
+		assert_true(fabs(parts[0].share - 0.7) < 1e-15 && fabs(parts[1].share - 0.3) < 1e-15);
+		assert_string_equal(words[0].word, "a");
+		assert_string_equal(words[1].word, "b");
+		forget(&r);
+	}
+}
+
+static void named_faults(void **state) {
+	static const char *const cases[][2] = { { "{}", "'alone' is missing: One for all [m]" },
+		{ "parts: {}", "'alone' is missing" }, { "parts: []", "'alone' is missing" },
+		{ "alone: 1\nparts: {a: 1}", "alone does not go with parts: give one of them" },
+		{ "parts: {a: {}}", "m.parts: 'share' is missing" },
+		{ "parts: {a: }", "m.parts: 'share' is missing" },
+		{ "parts: {a: {share: 1, word: b}}", "m.parts: 'a' has its word already: its key" },
+		{ "parts: {a: 2}", "m.parts: share is 2, must be between 0 and 1" },
+		{ "parts: {a: {shrae: 1}}", "unknown key 'shrae'; did you mean 'share'?" },
+		{ "parts: [{share: 1}]", "m.parts: 'word' is missing" },
+		{ "alone: 1\nwords: [[a]]", "must be a text" } };
+	(void)state;
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		mixture r = read_mixture(cases[i][0]);
+		if (r.faults != 1 || !strstr(r.said, cases[i][1]))
+			fail_msg("%s\nshould be one fault: %s", r.said, cases[i][1]);
+		forget(&r);
+	}
+}
+
+/* What is written reads back, also where a default must not stand beside what excludes it. */
+static void named_writes(void **state) {
+	static const char *const forms[] = { "alone: 3", "parts: {a: 0.25, b: 0.75}\nwords: [c]" };
+	(void)state;
+	for (size_t i = 0; i < sizeof forms / sizeof *forms; i++) {
+		mixture r = read_mixture(forms[i]);
+		quern_node *map = quern_node_create(QUERN_NODE_MAP);
+		quern_text out = { 0 };
+		quern_params_write(mixed_rows, &r.m, 2, NULL, map);
+		quern_node_print(map, 0, &out);
+		mixture again = read_mixture(quern_text_string(&out));
+		if (again.faults) fail_msg("%s\nin\n%s", again.said, out.data);
+		assert_true(again.m.parts.n == r.m.parts.n && again.m.words.n == r.m.words.n);
+		assert_true(i ? ((const part *)again.m.parts.items)[1].share == 0.75 : again.m.alone == 3);
+		quern_text_finish(&out);
+		quern_node_destroy(map);
+		forget(&again);
+		forget(&r);
+	}
+}
+
 static void marks(void **state) {
 	reading r = read_text("stiffness: 1\nnumber:\n  of: 2\n", 2);
 	(void)state;
@@ -193,6 +303,7 @@ static void marks(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(defaults), cmocka_unit_test(values),
 		cmocka_unit_test(faults), cmocka_unit_test(from_nobody), cmocka_unit_test(writes),
-		cmocka_unit_test(marks) };
+		cmocka_unit_test(marks), cmocka_unit_test(named_items), cmocka_unit_test(named_faults),
+		cmocka_unit_test(named_writes) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
