@@ -40,12 +40,12 @@ static const quern_param place_rows[] = { QUERN_PARAM(
 	QUERN_PARAM_AS(T, member density, before "density", "kg/m^3", "Density of the grains' material.",        \
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e6, __VA_ARGS__),                     \
 		QUERN_PARAM_AS(T, member radii.mean, before "radius.mean", "m", "Mean radius.",                      \
-			.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6, __VA_ARGS__),                              \
+			.flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e6, __VA_ARGS__),                 \
 		QUERN_PARAM_AS(T, member radii.spread, before "radius.spread", "1",                                  \
 			"Over the mean: standard deviation (normal, cut at two of them) or half-width (uniform).",       \
-			.max = 0.45, __VA_ARGS__),                                                                       \
+			.flags = QUERN_ONCE, .max = 0.45, __VA_ARGS__),                                                  \
 		QUERN_PARAM_AS(T, member radii.law, before "radius.law", "1", "Distribution of radii.",              \
-			.choices = radius_laws, __VA_ARGS__)
+			.flags = QUERN_ONCE, .choices = radius_laws, __VA_ARGS__)
 static const quern_param material_rows[] = { QUERN_PARAM(dem_material, name, NULL,
 												 "What the material is called.", .flags = QUERN_REQUIRED),
 	MATERIAL_ROWS(dem_material, , "", .pad = 0), QUERN_END_PARAMS };
@@ -69,12 +69,13 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		"Pairs of materials whose contacts have parameters of their own, such as {between: [sand, steel], "
 		"friction: 0.2}.",
 		.rows = pair_rows, .item_size = sizeof(dem_pair), .max = 256),
-	QUERN_PARAM(
-		dem, fill, NULL, "Regions to fill with grains.", .rows = fill_rows, .item_size = sizeof(dem_fill)),
-	QUERN_PARAM(dem, place, NULL, "Single grains.", .rows = place_rows, .item_size = sizeof(dem_place)),
+	QUERN_PARAM(dem, fill, NULL, "Regions to fill with grains.", .rows = fill_rows,
+		.item_size = sizeof(dem_fill), .flags = QUERN_ONCE),
+	QUERN_PARAM(dem, place, NULL, "Single grains.", .rows = place_rows, .item_size = sizeof(dem_place),
+		.flags = QUERN_ONCE),
 	QUERN_PARAM(dem, file, NULL,
 		"Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed] [material].",
-		.flags = QUERN_FILE),
+		.flags = QUERN_FILE | QUERN_ONCE),
 	QUERN_PARAM(dem, source, NULL, "Regions that pour grains, of the first material where there are several.",
 		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(dem, skin, "1",
