@@ -123,8 +123,7 @@ static void begin(const quern_step *s, const sums *now) {
 	const quern_column *u = s->use;
 	u[A_AUDITS].index[0] = 1;
 	u[A_MASS].real[0][0] = now->mass + now->left - now->poured;
-	u[A_ENERGY].real[0][0] = now->kinetic + quern_hybrid_held(s);
-	u[A_WORK].real[0][0] = 0;
+	quern_hybrid_begin_gain(s, now->kinetic);
 	for (uint32_t k = 0; k < s->dim; k++) {
 		u[A_MOMENTUM].real[k][0] = now->momentum[k] + now->owed_momentum[k] - impulse(s, k);
 		u[A_LEFT].real[k][0] = 0;
@@ -152,6 +151,8 @@ quern_status quern_hybrid_audit(const void *self, const quern_step *s) {
 			u[A_GRAVITY].real[k][0] += now.carried * s->gravity[k] * s->dt;
 			u[A_WORK].real[0][0] += now.momentum[k] * s->gravity[k] * s->dt;
 		}
+	/* what was held before may be worth more by the values of a new stage */
+	if (s->step == s->stage_step && s->step) quern_hybrid_begin_gain(s, now.kinetic);
 	const quern_status status = judge(s, &now);
 	return status == QUERN_OK ? quern_hybrid_judge_gain(self, s, now.kinetic, now.carried) : status;
 }

@@ -60,14 +60,21 @@ static quern_real by_bodies(const quern_step *s) {
 	return sum;
 }
 
+static quern_real poured(const quern_step *s) {
+	return book_total(s->use[A_POURED_ENERGY].real[0], s->host->set(s->run, "grain_source").n);
+}
+
+void quern_hybrid_begin_gain(const quern_step *s, quern_real kinetic) {
+	s->use[A_ENERGY].real[0][0] = kinetic + quern_hybrid_held(s) - poured(s);
+	s->use[A_WORK].real[0][0] = -by_bodies(s);
+}
+
 /* Bodies that stand still do no work, contacts and the coupling take energy. Twice what there can be, since a
  * conversion may make some; what lifts all by a diameter, since steps within their limits keep energy about as well
  * as that; and, where nothing pulls, what round-off moves: a millionth of a diameter in a step. */
 quern_status quern_hybrid_judge_gain(
 	const hybrid *h, const quern_step *s, quern_real kinetic, quern_real carried) {
-	const quern_real brought =
-		book_total(s->use[A_POURED_ENERGY].real[0], s->host->set(s->run, "grain_source").n);
-	const quern_real had = s->use[A_ENERGY].real[0][0] + brought,
+	const quern_real had = s->use[A_ENERGY].real[0][0] + poured(s),
 					 work = s->use[A_WORK].real[0][0] + by_bodies(s);
 	const quern_real still = 1e-6 * h->diameter / s->dt;
 	const quern_real lift = h->gain * quern_gravity_size(s->dim, s->gravity) * h->diameter;

@@ -44,6 +44,8 @@ quern_status quern_hybrid_back(const void *self, const quern_step *);
 quern_status quern_hybrid_audit(const void *self, const quern_step *);
 /* Rows of the audit: J that grains and points have in their springs and in turning, an upper bound. */
 quern_real quern_hybrid_held(const quern_step *);
+/* Rows of the audit: from now on motion is judged by what there is now. */
+void quern_hybrid_begin_gain(const quern_step *, quern_real kinetic);
 /* Rows of the audit: ends the run if grains and points, which carry so much mass, move with more energy than there was,
  * gravity has given and `gain` allows. */
 quern_status quern_hybrid_judge_gain(
