@@ -66,6 +66,10 @@ quern_real quern_source_due(const source *p, quern_real time, uint32_t i, const 
 	return all > p->most ? p->most : all;
 }
 
+void quern_source_even(const source *p, uint32_t i, const quern_column *due, const quern_column *poured) {
+	if (p->keep == SOURCE_FULL) due->real[0][i] = poured->real[0][i];
+}
+
 void quern_source_note(const quern_step *s, uint32_t i, const char *section, const source *p,
 	quern_real waiting, const quern_column *row) {
 	const bool waits = waiting > 0 && p->keep == SOURCE_BY_RATE;

@@ -41,6 +41,8 @@ quern_status quern_sources_check(const quern_list *, bool flat, const quern_setu
 bool quern_source_acts(const source *, const quern_step *);
 /* kg that shall have been poured by now; infinite where the region is kept full. Entry i of rows of DUE_USE and LOOKED_USE. */
 quern_real quern_source_due(const source *, quern_real time, uint32_t i, const quern_column *row);
+/* A source that keeps its region full is due nothing else: what it has poured is not held against a rate that a stage brings. */
+void quern_source_even(const source *, uint32_t i, const quern_column *due, const quern_column *poured);
 /* Notes what of source i of a section is due and has no room, and says so once: rows of WAITING_USE and LATE_USE. */
 void quern_source_note(const quern_step *, uint32_t i, const char *section, const source *,
 	quern_real waiting, const quern_column *row);

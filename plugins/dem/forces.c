@@ -267,6 +267,8 @@ quern_status quern_dem_observe(const void *self, const quern_step *s) {
 	now.dt = s->dt > 0 ? s->dt / s->n_substeps : NO_TIME;
 	forces_shared sh = { .d = self, .s = &now, .looks = true };
 	const quern_set_view grains = s->host->set(s->run, "grain");
+	for (int e = E_KINETIC; e <= E_SHEARED && !grains.n; e++) /* the last one may have left */
+		if (s->use[OBSERVE_KINETIC + e].real[0]) s->use[OBSERVE_KINETIC + e].real[0][0] = 0;
 	if (!grains.n) return QUERN_OK;
 	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);

@@ -211,7 +211,9 @@ static quern_status pour_one(pouring *p) {
 	}
 	*draws = (int32_t)p->draws;
 	quern_source_note(s, p->i, "grains", p->item, is_due(p) ? p->rest : 0, &s->use[POUR_WAITING]);
-	return p->n ? add_grains(p) : QUERN_OK;
+	const quern_status status = p->n ? add_grains(p) : QUERN_OK;
+	quern_source_even(p->item, p->i, &s->use[POUR_DUE], &s->use[POURED_MASS]);
+	return status;
 }
 
 quern_status quern_dem_pour(const void *self, const quern_step *s) {

@@ -75,18 +75,20 @@ static bool take_sums(const quern_step *s, sums *out) {
  * the same sign for long: half a unit in the last place for each grain step is allowed on top. */
 static quern_status judge_momentum(const quern_step *s, const sums *now) {
 	const quern_column *u = s->use;
-	quern_real off = 0, leak = 0, pull = 0;
+	quern_real off = 0, leak = 0, pull = 0, passed = 0;
 	for (uint32_t k = 0; k < s->dim; k++) {
 		const quern_real left =
 			now->momentum[k] + now->owed_momentum[k] - impulse(s, k) - u[A_MOMENTUM].real[k][0];
 		off = fmax(off, fabs(left));
 		leak = fmax(leak, fabs(left - u[A_LEFT].real[k][0]));
 		pull = fmax(pull, fabs(u[A_GRAVITY].real[k][0]));
+		if (u[A_PASSED].real[0])
+			passed = fmax(passed, fabs(book_total(u[A_POURED_MOMENTUM].real[k], entries(s, "grain_source"))));
 		u[A_LEFT].real[k][0] = left;
 	}
 	quern_real *scale = u[A_SCALE].real[0], *worst = u[A_MOMENTUM_DEFECT].real[0];
 	*scale = fmax(*scale, now->speed);
-	const quern_real size = *scale + pull, allowed = tolerance + 1.2e-16 * (quern_real)s->substep;
+	const quern_real size = *scale + pull + passed, allowed = tolerance + 1.2e-16 * (quern_real)s->substep;
 	if (!(size > 0)) return QUERN_OK;
 	*worst = fmax(*worst, off / size);
 	if (!(leak <= tolerance * size))

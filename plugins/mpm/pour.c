@@ -138,7 +138,9 @@ static quern_status pour_one(pouring *w) {
 		if (failed) return QUERN_E_MEMORY;
 	}
 	quern_source_note(s, w->i, "continuum", w->item, rest >= w->mass ? rest : 0, &s->use[POUR_WAITING]);
-	return w->n ? add_points(w) : QUERN_OK;
+	const quern_status status = w->n ? add_points(w) : QUERN_OK;
+	quern_source_even(w->item, w->i, &s->use[POUR_DUE], &s->use[POURED_MASS]);
+	return status;
 }
 
 /* In a hybrid grains are poured, and its oracle decides what becomes of them. */
