@@ -88,9 +88,22 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	return !f->failed && !f->placer.failed;
 }
 
+/* m, the widest grain that these shares may bring. */
+static quern_real most_of(const dem *d, const quern_real share[MOST_MATERIALS]) {
+	quern_real most = 0;
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		if (share[k] > 0) most = fmax(most, quern_radius_most(&d->material[k].radii));
+	return most;
+}
+
 static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
-	enum { MOST = 4096 };
-	quern_spot *seed = malloc(MOST * sizeof(quern_spot));
+	const dem_fill *fill = f->d->fill.items;
+	quern_real others = 0;
+	for (uint32_t i = 0; i < f->d->fill.n; i++) others = fmax(others, most_of(f->d, fill[i].share));
+	/* a new grain can touch what is as far as its own radius and the other's */
+	const quern_real reach = 2 * most_of(f->d, f->item->share) + 2 * others;
+	const uint32_t n = quern_placer_near(&f->placer, f->lower, f->upper, reach, NULL, 0);
+	quern_spot *seed = malloc(((size_t)n + 1) * sizeof(quern_spot));
 	if (!seed) {
 		f->failed = true;
 		return;
@@ -107,10 +120,7 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 		.scene = f };
 	memcpy(job.lower, f->lower, sizeof job.lower);
 	memcpy(job.upper, f->upper, sizeof job.upper);
-	/* a new grain can touch what is as far as its own radius and the other's */
-	const quern_real reach = 4 * most_of_fills(f->d);
-	const uint32_t n = quern_placer_near(&f->placer, f->lower, f->upper, reach, seed, MOST);
-	job.n_seed = n < MOST ? n : MOST;
+	job.n_seed = quern_placer_near(&f->placer, f->lower, f->upper, reach, seed, n);
 	const quern_packer_ops *ops = packer->ops;
 	ops->pack[f->d->dim - 2](packer->self, &job);
 	free(seed);

@@ -143,7 +143,9 @@ static void find_limits(
 	const dem *d, const quern_step *s, const lightest *l, contact_limit *fast, contact_limit *first) {
 	contact_limit c;
 	for (uint32_t k = 0; k < d->n_materials; k++) {
-		if (isfinite(l[k].mass[0])) c = limit_of_two(d, s, &l[k], k), take_shorter(fast, first, &c);
+		/* a grain that is alone of its material meets none of it */
+		const bool others = d->n_materials == 1 || isfinite(l[k].mass[1]) || l[k].fixed;
+		if (isfinite(l[k].mass[0]) && others) c = limit_of_two(d, s, &l[k], k), take_shorter(fast, first, &c);
 		for (uint32_t m = k + 1; m < d->n_materials; m++)
 			if (may_meet(&l[k], &l[m])) c = limit_of_pair(d, s, l, k, m), take_shorter(fast, first, &c);
 	}

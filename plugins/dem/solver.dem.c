@@ -354,12 +354,22 @@ static quern_real force_under(
 	return pressure * diameter * (d->dim == 3 ? diameter : 1);
 }
 
+/* Whether a fill of loose grains, or a source, brings a material. */
+static bool is_in_bed(const dem *d, uint32_t k) {
+	const dem_fill *fill = d->fill.items;
+	for (uint32_t i = 0; i < d->fill.n; i++)
+		if (!fill[i].fixed && fill[i].share[k] > 0) return true;
+	return k == 0 && (d->source.n || d->n_materials == 1);
+}
+
 /* How far the softest pair of materials gives way under the fill, were it all of the densest. */
 static void find_sinking(dem *d, const quern_setup *setup, const quern_bound *law, uint32_t n_laws) {
 	quern_real density = 0;
-	for (uint32_t k = 0; k < d->n_materials; k++) density = fmax(density, d->material[k].density);
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		if (is_in_bed(d, k)) density = fmax(density, d->material[k].density);
 	for (uint32_t k = 0; k < d->n_materials; k++)
 		for (uint32_t l = k; l < d->n_materials; l++) {
+			if (!is_in_bed(d, k) || !is_in_bed(d, l)) continue;
 			const quern_real a = d->material[k].radii.mean, b = d->material[l].radii.mean;
 			const quern_real force = force_under(d, setup, density, a + b);
 			const char *stiffest = NULL;

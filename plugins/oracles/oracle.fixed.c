@@ -20,6 +20,8 @@ typedef struct {
 	quern_list boxes, spheres, half_spaces;
 	int32_t otherwise;
 	quern_real ramp, cell;
+	quern_real length[3];    /* m, of the domain along periodic axes, else 0 */
+	quern_real domain[2][3]; /* m, its corners; infinite along periodic axes */
 } fixed;
 
 static const char *const zones[] = { "discrete", "hybrid", "continuum", NULL };
@@ -48,7 +50,9 @@ static const quern_param params[] = { QUERN_PARAM(fixed, boxes, NULL, "Boxes alo
 	QUERN_PARAM(fixed, ramp, "m",
 		"How far the hybrid zone reaches from grains into the continuum, whose share grows on that way from "
 		"none "
-		"to all; 0: it is only where it is drawn.",
+		"to all; 0: it is only where it is drawn. It begins at the face of each region by itself: let "
+		"regions that "
+		"shall be one overlap by as much.",
 		.max = 1e6),
 	QUERN_PARAM(
 		fixed, cell, "m", "Cell of the grid.", .from = "grid.cell", .flags = QUERN_MAYBE | QUERN_ADVANCED),
@@ -76,7 +80,17 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			return setup->host->fail(
 				err, QUERN_E_PARAM, "half_spaces", "the normal of half space %u has no length", i);
 		for (uint32_t k = 0; k < setup->dim; k++) sum += h[i].normal[k] / size * (h[i].normal[k] / size);
-		for (uint32_t k = 0; k < setup->dim; k++) h[i].normal[k] = h[i].normal[k] / size / sqrt(sum);
+		for (uint32_t k = 0; k < setup->dim; k++) {
+			h[i].normal[k] = h[i].normal[k] / size / sqrt(sum);
+			if (setup->periodic[k] && h[i].normal[k] != 0)
+				return setup->host->fail(err, QUERN_E_PARAM, "half_spaces",
+					"half space %u ends along axis %u, along which the domain is periodic: draw a box", i, k);
+		}
+	}
+	for (uint32_t k = 0; k < setup->dim; k++) {
+		p->length[k] = setup->periodic[k] ? setup->upper[k] - setup->lower[k] : 0;
+		p->domain[0][k] = setup->periodic[k] ? -INFINITY : setup->lower[k];
+		p->domain[1][k] = setup->periodic[k] ? INFINITY : setup->upper[k];
 	}
 	if (p->ramp > 0 && p->ramp < (1 - 1e-9) * p->cell)
 		return setup->host->fail(err, QUERN_E_PARAM, "ramp",
@@ -84,19 +98,33 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return check_boxes(p, setup, err);
 }
 
-/* m from the surface of a region to x: less than 0 inside. */
-static quern_real from_box(const box *b, const quern_real x[3], uint32_t dim) {
+/* From a middle to x, or to the image of x that is nearest to it. */
+static quern_real way_from(const fixed *p, uint32_t k, quern_real middle, quern_real x) {
+	const quern_real way = x - middle, length = p->length[k];
+	return length > 0 ? way - length * quern_floor(way / length + 0.5) : way;
+}
+
+/* m from the surface of a region to x: less than 0 inside. Faces that lie on the domain's are none: nothing is beyond. */
+static quern_real from_box(const fixed *p, const box *b, const quern_real x[3], uint32_t dim) {
 	quern_real inside = -INFINITY, outside2 = 0;
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real way = quern_max(b->lower[k] - x[k], x[k] - b->upper[k]), out = quern_max(way, 0);
+		const quern_real half = 0.5 * (b->upper[k] - b->lower[k]),
+						 at = way_from(p, k, b->lower[k] + half, x[k]);
+		const bool around = p->length[k] > 0 && 2 * half >= p->length[k];
+		const quern_real below = around || b->lower[k] <= p->domain[0][k] ? -INFINITY : -half - at;
+		const quern_real above = around || b->upper[k] >= p->domain[1][k] ? -INFINITY : at - half;
+		const quern_real way = quern_max(below, above), out = quern_max(way, 0);
 		inside = quern_max(inside, way);
 		outside2 += out * out;
 	}
 	return inside > 0 ? sqrt(outside2) : inside;
 }
-static quern_real from_sphere(const sphere *s, const quern_real x[3], uint32_t dim) {
+static quern_real from_sphere(const fixed *p, const sphere *s, const quern_real x[3], uint32_t dim) {
 	quern_real sum = 0;
-	for (uint32_t k = 0; k < dim; k++) sum += (x[k] - s->centre[k]) * (x[k] - s->centre[k]);
+	for (uint32_t k = 0; k < dim; k++) {
+		const quern_real way = way_from(p, k, s->centre[k], x[k]);
+		sum += way * way;
+	}
 	return sqrt(sum) - s->radius;
 }
 static quern_real from_half_space(const half_space *h, const quern_real x[3], uint32_t dim) {
@@ -123,8 +151,8 @@ static place look(const fixed *p, const quern_real x[3], uint32_t dim) {
 	const sphere *s = p->spheres.items;
 	const half_space *h = p->half_spaces.items;
 	place at = { 3, INFINITY, -INFINITY };
-	for (uint32_t i = 0; i < p->boxes.n; i++) meet(&at, from_box(&b[i], x, dim), b[i].zone);
-	for (uint32_t i = 0; i < p->spheres.n; i++) meet(&at, from_sphere(&s[i], x, dim), s[i].zone);
+	for (uint32_t i = 0; i < p->boxes.n; i++) meet(&at, from_box(p, &b[i], x, dim), b[i].zone);
+	for (uint32_t i = 0; i < p->spheres.n; i++) meet(&at, from_sphere(p, &s[i], x, dim), s[i].zone);
 	for (uint32_t i = 0; i < p->half_spaces.n; i++) meet(&at, from_half_space(&h[i], x, dim), h[i].zone);
 	if (at.zone == 3) at.zone = p->otherwise;
 	if (p->otherwise == QUERN_DISCRETE) at.to_discrete = quern_min(at.to_discrete, at.depth);

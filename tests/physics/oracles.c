@@ -74,6 +74,7 @@ static double left_of_box(double x, double y) {
 }
 static double from_disc(double x, double y) { return hypot(x - 0.06, y - 0.06) - 0.02; }
 static double behind_plane(double x, double y) { return 0.6 * (x - 0.05) + 0.8 * (y - 0.05); }
+static double into_corner(double x, double y) { return fmin(0.06 - x, 0.1 - y); }
 static double into_box(double x, double y) { return fmin(fmin(x - 0.03, 0.1 - x), fmin(y - 0.02, 0.1 - y)); }
 
 /* What the scene draws is where it draws it, with a cosine of the way to the grains as the continuum's share. */
@@ -90,6 +91,10 @@ static void drawn_zones(void **state) {
 		{ "{fixed: {boxes: [{lower: [0.03, 0.02], upper: [0.1, 0.1], zone: continuum}], otherwise: discrete, "
 		  "ramp: 0.012}}",
 			into_box, 0.012 },
+		/* where it lies on the domain's own faces it has none */
+		{ "{fixed: {boxes: [{lower: [0, -1], upper: [0.06, 0.1], zone: continuum}], otherwise: discrete, "
+		  "ramp: 0.012}}",
+			into_corner, 0.012 },
 	};
 	(void)state;
 	bool good = true;
