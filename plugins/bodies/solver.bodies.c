@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* solver.bodies - walls and bodies: who is there, how they move, and what each has given to the material.
  * docs/theory/bodies.md, section 3 */
+#include "../common/name.h"
 #include "bodies.h"
 #include <string.h>
 
@@ -106,20 +107,7 @@ static const quern_use follow_uses[] = QUERN_USE_ROWS(FOLLOW_USES);
 static const quern_use show_uses[] = QUERN_USE_ROWS(SHOW_USES);
 static const quern_use join_uses[] = QUERN_USE_ROWS(JOIN_USES);
 
-enum { LONGEST_NAME = 40 };
-
 static const char *name_of(const quern_bound *body) { return ((const body_item *)body->item)->name; }
-
-static bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-
-static bool is_word(const char *name) {
-	uint32_t n = 0;
-	for (; name[n]; n++)
-		if (n == LONGEST_NAME ||
-			!(is_letter(name[n]) || (n && (name[n] == '_' || (name[n] >= '0' && name[n] <= '9')))))
-			return false;
-	return n > 0;
-}
 
 /* Names are words of their own, published as the number of the body. */
 static quern_status name_body(const quern_setup *setup, const quern_bound *body, uint32_t i, quern_err *err) {
@@ -127,7 +115,7 @@ static quern_status name_body(const quern_setup *setup, const quern_bound *body,
 	char where[120], published[60];
 	snprintf(where, sizeof where, "%u.%.60s.name", i, dot ? dot + 1 : body[i].id);
 	if (!name) return QUERN_OK;
-	if (!is_word(name))
+	if (!quern_name_is_good(name))
 		return setup->host->fail(err, QUERN_E_PARAM, where,
 			"'%.60s' is no name: it must be letters, digits and '_', beginning with a letter, at most %d of "
 			"them",

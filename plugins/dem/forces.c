@@ -137,8 +137,6 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 		sh->most_grains = n > sh->most_grains ? n : sh->most_grains;
 	}
 	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
-	sh->booked =
-		s->host->memory(s->run, (size_t)grains.n_blocks * (sh->n_bodies + 1) * N_BOOKED * sizeof(quern_real));
 	/* an integrator in two parts has moved the grains on already: bodies are where they will be then */
 	const quern_real ahead = !sh->looks && integrator->open[s->dim - 2] ? 1 : 0;
 	const quern_real now = s->time + ((quern_real)s->within + ahead) * s->dt;
@@ -159,7 +157,8 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	}
 	if (!sh->bad || !sh->outside) return false;
 	for (uint32_t b = 0; b < grains.n_blocks; b++) sh->bad[b] = sh->outside[b] = -1;
-	return sh->booked && sh->sums && sh->farthest && sh->turned;
+	return body_books_open(&sh->books_of_bodies, s, grains.n_blocks, sh->n_bodies) && sh->sums &&
+		   sh->farthest && sh->turned;
 }
 
 /* How far bodies have come at most since the last list: at the speed at the beginning of the step or at its end. A list holds
@@ -173,11 +172,6 @@ static quern_real farthest_with_bodies(const forces_shared *sh, quern_real farth
 	return fmax(farthest, 0.5 * (farthest + *swept));
 }
 
-static void add_booked(
-	const quern_column *to, int first, uint32_t n, uint32_t body, const quern_real *booked) {
-	for (uint32_t k = 0; k < n && to->real[0]; k++) to->real[k][body] += booked[first + (int)k];
-}
-
 /* Blocks in order, so that sums do not depend on who did what. */
 static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_step *s = sh->s;
@@ -187,16 +181,11 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	for (uint32_t b = 0; b < n_blocks; b++) {
 		const quern_real way = sqrt(sh->farthest[b]);
 		farthest = way > farthest ? way : farthest;
-		for (uint32_t body = 0; body < sh->n_bodies && !s->settling; body++) {
-			const quern_real *booked = quern_dem_booked(sh, b, body);
-			add_booked(&u[FORCE_IMPULSE], B_IMPULSE, s->dim, body, booked);
-			add_booked(&u[FORCE_TWIST], B_TWIST, s->dim == 3 ? 3 : 1, body, booked);
-			add_booked(&u[FORCE_WORK], B_WORK, 1, body, booked);
-		}
-		if (!s->settling)
-			add_booked(&u[FORCE_SUPPORT], B_IMPULSE, s->dim, 0, quern_dem_booked(sh, b, sh->n_bodies));
 		for (int e = 0; e < N_ENERGIES; e++) energy[e] += sh->sums[(size_t)b * N_ENERGIES + (uint32_t)e];
 	}
+	if (!s->settling)
+		body_books_close(&sh->books_of_bodies, s, n_blocks, &u[FORCE_IMPULSE], &u[FORCE_TWIST],
+			&u[FORCE_WORK], &u[FORCE_SUPPORT]);
 	u[FORCE_DISPLACEMENT].real[0][0] = farthest_with_bodies(sh, farthest);
 	if (u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
 	if (u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* forces - what the parts of the force stage share: pairs of grains, grains on bodies, integration */
 #pragma once
+#include "../bodies/books.h"
 #include "dem.h"
 #include <quern/space.h>
 
@@ -23,9 +24,6 @@ enum {
  * 3-D have a row of their own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
-
-/* Impulse, its moment about the pivot, and work. */
-enum { B_IMPULSE, B_TWIST = 3, B_WORK = 6, N_BOOKED };
 
 /* A row at once: the same bits for any instruction set. */
 typedef quern_real lanes8 __attribute__((vector_size(64)));
@@ -53,13 +51,13 @@ typedef struct forces_shared {
 	quern_images images;
 	const int32_t *material; /* NULL: no two contacts of a list have parameters of their own */
 	const uint32_t *grain, *contact, *touch; /* partitions */
-	quern_real *booked;   /* [block][body + 1][N_BOOKED]: on the material, by bodies and by fixed grains */
-	quern_real *sums;     /* [block][N_ENERGIES] */
-	quern_real *farthest; /* [block] square of the way since the last list */
-	quern_real *turned;   /* [block][2] sums of m v.v', of old and new velocity, and of m */
-	int32_t *bad;         /* [block] first grain that is lost, or -1 */
-	bool checks, deep;    /* grains are checked in this step; contacts are */
-	int32_t *outside;     /* [block] first grain out of the domain, or -1 */
+	body_books books_of_bodies;              /* the last one of a block: by fixed grains */
+	quern_real *sums;                        /* [block][N_ENERGIES] */
+	quern_real *farthest;                    /* [block] square of the way since the last list */
+	quern_real *turned;            /* [block][2] sums of m v.v', of old and new velocity, and of m */
+	int32_t *bad;                  /* [block] first grain that is lost, or -1 */
+	bool checks, deep;             /* grains are checked in this step; contacts are */
+	int32_t *outside;              /* [block] first grain out of the domain, or -1 */
 	deep_contact *worst, *watched; /* [block] */
 } forces_shared;
 
@@ -90,11 +88,6 @@ typedef struct contact_chunk {
 	uint32_t begin, n_slots, n; /* entries begin .. begin + n_slots of the list, of which n are looked at */
 	quern_real *held;           /* by slot: what springs held in the last step; NULL: nobody asks */
 } contact_chunk;
-
-/* What a body (n_bodies: fixed grains) has given to the grains of a block in this step. */
-QUERN_INLINE quern_real *quern_dem_booked(const forces_shared *sh, uint32_t block, uint32_t body) {
-	return sh->booked + ((size_t)block * (sh->n_bodies + 1) + body) * N_BOOKED;
-}
 
 /* Adds what the contacts of block b do to its rows, and to its energies. */
 void quern_dem_pairs(const forces_shared *, forces_work *, uint32_t b, quern_real *sums);

@@ -70,7 +70,7 @@ static void hold_fixed(
 	const forces_shared *sh, const forces_work *w, uint32_t b, uint32_t begin, uint32_t n) {
 	const quern_column *u = sh->use;
 	const int32_t *fixed = u[FORCE_FIXED].index;
-	quern_real *support = quern_dem_booked(sh, b, sh->n_bodies);
+	quern_real *support = body_booked(&sh->books_of_bodies, b, sh->n_bodies);
 	for (uint32_t i = 0; i < n && fixed; i++) {
 		if (!fixed[begin + i]) continue;
 		for (uint32_t k = 0; k < sh->s->dim; k++) {

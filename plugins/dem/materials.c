@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* materials - what grains are made of, by name: who is of which, what pairs of them have of their own, and mixtures by mass.
  * docs/theory/grains.md, section 7 */
+#include "../common/name.h"
 #include "dem.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { LONGEST_NAME = 40, WORDS = 240 };
+enum { WORDS = 240 };
 
 /* ---- names ---- */
 
@@ -16,17 +17,6 @@ int32_t quern_dem_material(const dem *d, const char *name) {
 	for (uint32_t k = 0; k < d->n_materials; k++)
 		if (d->material[k].name && !strcmp(d->material[k].name, name)) return (int32_t)k;
 	return -1;
-}
-
-static bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-
-static bool is_word(const char *name) {
-	uint32_t n = 0;
-	for (; name[n]; n++)
-		if (n == LONGEST_NAME ||
-			!(is_letter(name[n]) || (n && (name[n] == '_' || (name[n] >= '0' && name[n] <= '9')))))
-			return false;
-	return n > 0;
 }
 
 /* Which there are, or what to do where none has a name. */
@@ -52,7 +42,7 @@ static quern_status check_name(const dem *d, const quern_setup *setup, uint32_t 
 	const char *name = d->material[k].name;
 	char param[80];
 	snprintf(param, sizeof param, "materials.%.60s", name);
-	if (!is_word(name))
+	if (!quern_name_is_good(name))
 		return setup->host->fail(err, QUERN_E_PARAM, param,
 			"'%.60s' is no name: it must be letters, digits and '_', beginning with a letter, at most %d of "
 			"them",

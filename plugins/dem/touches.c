@@ -109,7 +109,7 @@ static void move(const forces_shared *sh, const forces_work *w, uint32_t n) {
 
 static void book_impulse(const forces_shared *sh, const forces_work *w, const contact_chunk *c) {
 	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
-	quern_real *impulse = quern_dem_booked(sh, c->block, (uint32_t)c->body) + B_IMPULSE;
+	quern_real *impulse = body_booked(&sh->books_of_bodies, c->block, (uint32_t)c->body) + B_IMPULSE;
 	for (uint32_t q = 0; q < c->n; q++)
 		for (uint32_t k = 0; k < sh->s->dim; k++)
 			impulse[k] += (weighted ? w->weight[q] : 1) * w->force[k][q] * sh->s->dt;
@@ -133,7 +133,7 @@ static void book_twist(const forces_shared *sh, const forces_work *w, const cont
 	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
 	const uint32_t dim = sh->s->dim;
 	const quern_vec pivot = QUERN_VEC_OF(sh->pose[c->body].pivot);
-	quern_real *twist = quern_dem_booked(sh, c->block, (uint32_t)c->body) + B_TWIST;
+	quern_real *booked = body_booked(&sh->books_of_bodies, c->block, (uint32_t)c->body);
 	for (uint32_t q = 0; q < c->n; q++) {
 		const quern_vec x = place_of(sh, c, w->first[q]);
 		const quern_vec at = quern_vec_axpy(-w->arm[0][q], QUERN_VEC_AT(w->normal, q, dim), x);
@@ -141,8 +141,7 @@ static void book_twist(const forces_shared *sh, const forces_work *w, const cont
 			quern_vec_add(quern_vec_cross(quern_vec_sub(at, pivot), QUERN_VEC_AT(w->force, q, dim)),
 				couple_at(w->couple, q, dim));
 		const quern_real share = (weighted ? w->weight[q] : 1) * sh->s->dt;
-		if (dim == 3) twist[0] += share * moment.x, twist[1] += share * moment.y;
-		twist[dim == 3 ? 2 : 0] += share * moment.z;
+		body_book_twist(booked, moment, share, dim);
 	}
 }
 
@@ -158,7 +157,7 @@ static void book_work(
 	const forces_shared *sh, const forces_work *w, const contact_chunk *c, quern_real *sums) {
 	const bool weighted = sh->use[FORCE_WEIGHT].real[0] != NULL;
 	const quern_vec spin = QUERN_VEC_OF(sh->pose[c->body].pose.spin);
-	quern_real *work = quern_dem_booked(sh, c->block, (uint32_t)c->body) + B_WORK;
+	quern_real *work = body_booked(&sh->books_of_bodies, c->block, (uint32_t)c->body) + B_WORK;
 	for (uint32_t q = 0; q < c->n; q++) {
 		const quern_real share = (weighted ? w->weight[q] : 1) * sh->s->dt;
 		if (sh->works) *work += share * power(w, w->force, w->couple, spin, q, sh->s->dim);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* nodes - the grid between scatter and gather: velocities from momenta and forces, and what bodies do to them */
+#include "../bodies/books.h"
 #include "mpm.h"
 #include <math.h>
 #include <quern/vec.h>
@@ -15,12 +16,8 @@ typedef struct {
 	uint32_t n_bodies;
 	const body_pose *pose; /* by body */
 	bool twists;           /* moments and work are booked too */
-	quern_real
-		*booked; /* [block][n_bodies + 1][N_BOOKED]: on the material; the last by faces and for light nodes */
+	body_books books;      /* on the material; the last one of a block: by faces and for light nodes */
 } grid_work;
-
-/* Impulse, its moment about the pivot, and work. */
-enum { B_IMPULSE, B_TWIST = 3, B_WORK = 6, N_BOOKED };
 
 typedef struct {
 	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
@@ -71,17 +68,15 @@ static void touch_node(const grid_work *w, uint32_t j, const near_nodes *n, uint
 	quern_row *motion, quern_real *booked) {
 	const body_item *item = w->s->slot[SLOT_BODIES][j].item;
 	const uint32_t dim = w->s->dim;
-	const quern_vec before = QUERN_VEC_OF(booked);
-	meet_body(item, n, i, dim, mass, motion, booked + B_IMPULSE);
+	quern_real given[3] = { 0 };
+	meet_body(item, n, i, dim, mass, motion, given);
+	for (uint32_t k = 0; k < dim; k++) booked[B_IMPULSE + k] += given[k];
 	if (!w->twists) return;
-	const quern_vec given = quern_vec_sub(QUERN_VEC_OF(booked), before);
 	quern_real x[3] = { 0 };
 	for (uint32_t k = 0; k < dim; k++) x[k] = quern_motion_bring(&w->pose[j], k, n->position[k][i]);
 	const quern_vec arm = quern_vec_sub(QUERN_VEC_OF(x), QUERN_VEC_OF(w->pose[j].pivot));
-	const quern_vec moment = quern_vec_cross(arm, given);
-	if (dim == 3) booked[B_TWIST] += moment.x, booked[B_TWIST + 1] += moment.y;
-	booked[B_TWIST + (dim == 3 ? 2 : 0)] += moment.z;
-	booked[B_WORK] += quern_vec_dot(given, QUERN_VEC_AT(n->velocity, i, dim), 3);
+	body_book_twist(booked, quern_vec_cross(arm, QUERN_VEC_OF(given)), 1, dim);
+	booked[B_WORK] += quern_vec_dot(QUERN_VEC_OF(given), QUERN_VEC_AT(n->velocity, i, dim), 3);
 }
 
 static bool body_is_far(
@@ -109,7 +104,7 @@ static void bring_nodes(const body_pose *pose, uint32_t dim, near_nodes *n) {
 		(quern_real *const[3]) { n->own[0], n->own[1], n->own[2] });
 }
 
-static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_real *booked) {
+static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 	const quern_step *s = w->s;
 	quern_body_batch batch = { .n = N, .cap = N, .dim = s->dim, .radius = n->radius, .gap = n->gap };
 	for (uint32_t k = 0; k < s->dim; k++) {
@@ -137,7 +132,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n, quern_rea
 		for (uint32_t i = 0; i < N; i++) {
 			const quern_real mass = w->node[(size_t)b * N + i][0];
 			if (mass > 0 && n->gap[i] <= 1e-9 * w->g->cell)
-				touch_node(w, j, n, i, mass, &w->motion[(size_t)b * N + i], booked + (size_t)N_BOOKED * j);
+				touch_node(w, j, n, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
 		}
 	}
 }
@@ -165,13 +160,12 @@ static void close_faces(const grid_work *w, uint32_t b, quern_real *impulse) {
 
 static void meet_walls(void *arg, uint32_t b, uint32_t worker) {
 	const grid_work *w = arg;
-	quern_real *booked = w->booked + (size_t)b * (w->n_bodies + 1) * N_BOOKED;
 	near_nodes *n = w->s->host->scratch(w->s->run, worker, sizeof *n);
 	bool any = false;
 	for (uint32_t i = 0; i < N && !any; i++) any = w->node[(size_t)b * N + i][0] > 0;
 	if (!any || !n) return;
-	meet_bodies(w, b, n, booked);
-	close_faces(w, b, booked + (size_t)N_BOOKED * w->n_bodies);
+	meet_bodies(w, b, n);
+	close_faces(w, b, body_booked(&w->books, b, w->n_bodies));
 }
 
 /* v = v_0 + dt (f/m + g); a light node's force is limited to what a mass m_cut would feel of it. */
@@ -180,7 +174,7 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 	const quern_step *s = w->s;
 	const uint32_t dim = s->dim;
 	const quern_real volume = quern_grid_cell_volume(w->g), cut = w->p->cut * w->p->density * volume;
-	quern_real *left = w->booked + ((size_t)b * (w->n_bodies + 1) + w->n_bodies) * N_BOOKED;
+	quern_real *left = body_booked(&w->books, b, w->n_bodies) + B_IMPULSE;
 	for (uint32_t i = 0; i < N; i++) {
 		const quern_row row = w->node[(size_t)b * N + i];
 		quern_row out = { 0 };
@@ -209,26 +203,7 @@ static bool prepare(grid_work *w, quern_column node, quern_column motion) {
 	w->motion = (quern_row *)(void *)motion.real[0];
 	/* a wall moves on by half a step until its nodes do */
 	w->pose = quern_body_poses(s, SLOT_BODIES, s->time, s->time + 0.5 * s->dt);
-	w->booked = s->host->memory(
-		s->run, (size_t)w->g->n_blocks * (w->n_bodies + 1) * N_BOOKED * sizeof(quern_real) + 64);
-	return w->booked && w->pose;
-}
-
-/* Block after block, so that the sums do not depend on who did what. */
-static void collect(
-	const grid_work *w, quern_column bodies, quern_column faces, quern_column twist, quern_column work) {
-	const uint32_t dim = w->s->dim, turns = dim == 3 ? 3 : 1;
-	for (uint32_t b = 0; b < w->g->n_blocks; b++)
-		for (uint32_t j = 0; j <= w->n_bodies; j++) {
-			const quern_real *booked = w->booked + ((size_t)b * (w->n_bodies + 1) + j) * N_BOOKED;
-			const bool face = j == w->n_bodies;
-			const quern_column *to = face ? &faces : &bodies;
-			for (uint32_t k = 0; k < dim && to->real[0]; k++)
-				to->real[k][face ? 0 : j] += booked[B_IMPULSE + k];
-			for (uint32_t k = 0; k < turns && twist.real[0] && !face; k++)
-				twist.real[k][j] += booked[B_TWIST + k];
-			if (work.real[0] && !face) work.real[0][j] += booked[B_WORK];
-		}
+	return body_books_open(&w->books, s, w->g->n_blocks, w->n_bodies) && w->pose;
 }
 
 quern_status quern_mpm_nodes(const void *self, const quern_step *s) {
@@ -236,7 +211,8 @@ quern_status quern_mpm_nodes(const void *self, const quern_step *s) {
 	w.twists = s->use[NODES_TWIST].real[0] || s->use[NODES_WORK].real[0];
 	if (!prepare(&w, s->use[NODES_NODE], s->use[NODES_MOTION])) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, move_nodes, &w);
-	collect(&w, s->use[NODES_IMPULSE], s->use[NODES_FACES], s->use[NODES_TWIST], s->use[NODES_WORK]);
+	body_books_close(&w.books, s, w.g->n_blocks, &s->use[NODES_IMPULSE], &s->use[NODES_TWIST],
+		&s->use[NODES_WORK], &s->use[NODES_FACES]);
 	return QUERN_OK;
 }
 
@@ -247,6 +223,7 @@ quern_status quern_mpm_walls(const void *self, const quern_step *s) {
 	w.twists = s->use[WALLS_TWIST].real[0] || s->use[WALLS_WORK].real[0];
 	if (!prepare(&w, s->use[WALLS_NODE], s->use[WALLS_MOTION])) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, meet_walls, &w);
-	collect(&w, s->use[WALLS_IMPULSE], s->use[WALLS_FACES], s->use[WALLS_TWIST], s->use[WALLS_WORK]);
+	body_books_close(&w.books, s, w.g->n_blocks, &s->use[WALLS_IMPULSE], &s->use[WALLS_TWIST],
+		&s->use[WALLS_WORK], &s->use[WALLS_FACES]);
 	return QUERN_OK;
 }
