@@ -202,3 +202,11 @@ uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const que
 			}
 	return n;
 }
+
+quern_spot *quern_placer_seeds(
+	const placer *p, const quern_real lower[3], const quern_real upper[3], quern_real reach, uint32_t *n) {
+	*n = quern_placer_near(p, lower, upper, reach, NULL, 0);
+	quern_spot *seed = malloc(((size_t)*n + 1) * sizeof *seed);
+	if (seed) quern_placer_near(p, lower, upper, reach, seed, *n);
+	return seed;
+}

@@ -41,3 +41,6 @@ int32_t quern_placer_worst(const placer *, const quern_spot *, quern_real share,
  * image nearest to it. Returns how many there are. */
 uint32_t quern_placer_near(const placer *, const quern_real lower[3], const quern_real upper[3],
 	quern_real reach, quern_spot *out, uint32_t cap);
+/* All of them, n, to free(); NULL if memory is gone. */
+quern_spot *quern_placer_seeds(
+	const placer *, const quern_real lower[3], const quern_real upper[3], quern_real reach, uint32_t *n);

@@ -70,6 +70,19 @@ void quern_source_even(const source *p, uint32_t i, const quern_column *due, con
 	if (p->keep == SOURCE_FULL) due->real[0][i] = poured->real[0][i];
 }
 
+quern_status quern_source_room(
+	const quern_step *s, const char *set, const char *what, uint32_t n, uint32_t *old) {
+	enum { MOST = 1 << 30 };
+	*old = s->host->set(s->run, set).n;
+	if (n > MOST - *old)
+		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+			"sources have poured more %s than can be numbered, %d", what, MOST);
+	int32_t *from = s->host->memory(s->run, ((size_t)*old + n + 1) * sizeof(int32_t));
+	if (!from) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < *old + n; i++) from[i] = i < *old ? (int32_t)i : -1;
+	return s->host->remap(s->run, set, *old + n, from, 0, NULL);
+}
+
 void quern_source_note(const quern_step *s, uint32_t i, const char *section, const source *p,
 	quern_real waiting, const quern_column *row) {
 	const bool waits = waiting > 0 && p->keep == SOURCE_BY_RATE;

@@ -43,6 +43,9 @@ bool quern_source_acts(const source *, const quern_step *);
 quern_real quern_source_due(const source *, quern_real time, uint32_t i, const quern_column *row);
 /* A source that keeps its region full is due nothing else: what it has poured is not held against a rate that a stage brings. */
 void quern_source_even(const source *, uint32_t i, const quern_column *due, const quern_column *poured);
+/* Room for n fresh entries behind the `old` ones of a set; the run is stopped where there is none. `what`: its plural. */
+quern_status quern_source_room(
+	const quern_step *, const char *set, const char *what, uint32_t n, uint32_t *old);
 /* Notes what of source i of a section is due and has no room, and says so once: rows of WAITING_USE and LATE_USE. */
 void quern_source_note(const quern_step *, uint32_t i, const char *section, const source *,
 	quern_real waiting, const quern_column *row);

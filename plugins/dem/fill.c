@@ -17,7 +17,9 @@ typedef struct {
 	uint32_t n, cap;
 	uint64_t draws;
 	const dem_fill *item;
-	quern_real widest;                 /* mean radius of what it has */
+	quern_real widest; /* mean radius of what it has */
+	quern_real
+		reach; /* m around a cell, of seeds: twice the widest radii of a new grain and of one that is there */
 	quern_real placed[MOST_MATERIALS]; /* kg, of this item */
 	int32_t kind;                      /* material of the grain that waits */
 	quern_real lower[3], upper[3];     /* of the cell that is being filled */
@@ -29,10 +31,11 @@ static quern_real mass_of(const dem *d, const dem_place *grain) {
 	return quern_radius_mass(grain->radius, d->material[grain->kind].density, d->dim);
 }
 
-/* m, the widest that any fill may bring */
-static quern_real most_of_fills(const dem *d) {
+/* m, the widest grain that these shares may bring; NULL: that any material may. */
+static quern_real most_of(const dem *d, const quern_real *share) {
 	quern_real most = 0;
-	for (uint32_t k = 0; k < d->n_materials; k++) most = fmax(most, quern_radius_most(&d->material[k].radii));
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		if (!share || share[k] > 0) most = fmax(most, quern_radius_most(&d->material[k].radii));
 	return most;
 }
 
@@ -88,22 +91,9 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	return !f->failed && !f->placer.failed;
 }
 
-/* m, the widest grain that these shares may bring. */
-static quern_real most_of(const dem *d, const quern_real share[MOST_MATERIALS]) {
-	quern_real most = 0;
-	for (uint32_t k = 0; k < d->n_materials; k++)
-		if (share[k] > 0) most = fmax(most, quern_radius_most(&d->material[k].radii));
-	return most;
-}
-
 static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
-	const dem_fill *fill = f->d->fill.items;
-	quern_real others = 0;
-	for (uint32_t i = 0; i < f->d->fill.n; i++) others = fmax(others, most_of(f->d, fill[i].share));
-	/* a new grain can touch what is as far as its own radius and the other's */
-	const quern_real reach = 2 * most_of(f->d, f->item->share) + 2 * others;
-	const uint32_t n = quern_placer_near(&f->placer, f->lower, f->upper, reach, NULL, 0);
-	quern_spot *seed = malloc(((size_t)n + 1) * sizeof(quern_spot));
+	uint32_t n = 0;
+	quern_spot *seed = quern_placer_seeds(&f->placer, f->lower, f->upper, f->reach, &n);
 	if (!seed) {
 		f->failed = true;
 		return;
@@ -113,6 +103,7 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 		.key = key,
 		.host = f->step->host,
 		.seed = seed,
+		.n_seed = n,
 		.radius = job_radius,
 		.inside = job_inside,
 		.free = job_free,
@@ -120,7 +111,6 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 		.scene = f };
 	memcpy(job.lower, f->lower, sizeof job.lower);
 	memcpy(job.upper, f->upper, sizeof job.upper);
-	job.n_seed = quern_placer_near(&f->placer, f->lower, f->upper, reach, seed, n);
 	const quern_packer_ops *ops = packer->ops;
 	ops->pack[f->d->dim - 2](packer->self, &job);
 	free(seed);
@@ -131,7 +121,11 @@ static void fill_region(filling *f, const dem_fill *item, const quern_bound *pac
 	const uint32_t dim = f->d->dim;
 	uint32_t count[3] = { 1, 1, 1 };
 	f->item = item;
+	const dem_fill *fill = f->d->fill.items;
+	quern_real others = 0;
+	for (uint32_t i = 0; i < f->d->fill.n; i++) others = fmax(others, most_of(f->d, fill[i].share));
 	f->widest = quern_dem_widest(f->d, item->share);
+	f->reach = 2 * most_of(f->d, item->share) + 2 * others;
 	memset(f->placed, 0, sizeof f->placed);
 	choose_material(f);
 	f->placer.n_bodies =
@@ -276,7 +270,7 @@ static quern_real widest_of(const dem_place *grain, uint32_t n, quern_real most)
 /* The placer's cells hold the widest grain that any source may bring. */
 static quern_status open_placer(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
-	quern_real most = most_of_fills(f->d);
+	quern_real most = most_of(f->d, NULL);
 	most = widest_of(f->d->place.items, f->d->place.n, most);
 	most = widest_of(table->grain, table->n, most);
 	for (uint32_t k = 0; k < s->dim; k++)

@@ -7,8 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_GRAINS = 1 << 30, MOST_SEEDS = 4096 };
-
 typedef struct {
 	const dem *d;
 	const quern_step *s;
@@ -138,7 +136,8 @@ static bool gather_near(pouring *p) {
 
 static void pack(pouring *p, const quern_bound *packer) {
 	const quern_step *s = p->s;
-	quern_spot *seed = s->host->memory(s->run, MOST_SEEDS * sizeof *seed);
+	uint32_t n = 0;
+	quern_spot *seed = quern_placer_seeds(&p->placer, p->item->lower, p->item->upper, 2 * p->most, &n);
 	if (!seed) {
 		p->failed = true;
 		return;
@@ -149,6 +148,7 @@ static void pack(pouring *p, const quern_bound *packer) {
 		.counter = (uint64_t)s->step << 24,
 		.host = s->host,
 		.seed = seed,
+		.n_seed = n,
 		.radius = job_radius,
 		.inside = job_inside,
 		.free = job_free,
@@ -156,10 +156,8 @@ static void pack(pouring *p, const quern_bound *packer) {
 		.scene = p };
 	memcpy(job.lower, p->item->lower, sizeof job.lower);
 	memcpy(job.upper, p->item->upper, sizeof job.upper);
-	const uint32_t n =
-		quern_placer_near(&p->placer, p->item->lower, p->item->upper, 2 * p->most, seed, MOST_SEEDS);
-	job.n_seed = n < MOST_SEEDS ? n : MOST_SEEDS;
 	((const quern_packer_ops *)packer->ops)->pack[s->dim - 2](packer->self, &job);
+	free(seed);
 }
 
 static void write_grains(const pouring *p, uint32_t old) {
@@ -184,14 +182,8 @@ static void write_grains(const pouring *p, uint32_t old) {
 
 static quern_status add_grains(const pouring *p) {
 	const quern_step *s = p->s;
-	const uint32_t old = s->host->set(s->run, "grain").n;
-	if (p->n > MOST_GRAINS - old)
-		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
-			"sources have poured more grains than can be numbered, %d", MOST_GRAINS);
-	int32_t *from = s->host->memory(s->run, ((size_t)old + p->n + 1) * sizeof(int32_t));
-	if (!from) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < old + p->n; i++) from[i] = i < old ? (int32_t)i : -1;
-	const quern_status status = s->host->remap(s->run, "grain", old + p->n, from, 0, NULL);
+	uint32_t old;
+	const quern_status status = quern_source_room(s, "grain", "grains", p->n, &old);
 	if (status != QUERN_OK) return status;
 	write_grains(p, old);
 	s->use[POUR_DISPLACEMENT].real[0][0] = INFINITY; /* the list misses new grains */

@@ -112,14 +112,8 @@ static void write_points(const pouring *w, uint32_t old) {
 
 static quern_status add_points(const pouring *w) {
 	const quern_step *s = w->s;
-	const uint32_t old = s->host->set(s->run, "point").n;
-	if (w->n > MOST_POINTS - old)
-		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
-			"sources have poured more points than can be numbered, %d", MOST_POINTS);
-	int32_t *from = s->host->memory(s->run, ((size_t)old + w->n + 1) * sizeof(int32_t));
-	if (!from) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < old + w->n; i++) from[i] = i < old ? (int32_t)i : -1;
-	const quern_status status = s->host->remap(s->run, "point", old + w->n, from, 0, NULL);
+	uint32_t old;
+	const quern_status status = quern_source_room(s, "point", "points", w->n, &old);
 	if (status != QUERN_OK) return status;
 	write_points(w, old);
 	s->use[POUR_UNSORTED].index[0] = 1;
