@@ -58,25 +58,40 @@ static const char *other_plugins(const quern_scene *a, const quern_scene *b) {
 }
 
 /* A parameter that counts before the first step alone, and has another value; NULL: there is none. */
-static const char *other_start(const quern_scene *a, const quern_scene *b, const char **of) {
-	for (size_t i = 0; i < a->n_instances && i < b->n_instances; i++) {
-		const quern_instance *one = a->instances[i], *two = b->instances[i];
-		for (const quern_param *row = one->file->params; row && row->name; row++) {
-			if (!(row->flags & QUERN_ONCE)) continue;
-			const quern_param alone[] = { *row, { .name = NULL } };
-			quern_text text[2] = { { 0 }, { 0 } };
-			const void *self[2] = { one->self, two->self };
-			for (int k = 0; k < 2; k++) {
-				quern_node *map = quern_node_create(QUERN_NODE_MAP);
-				quern_params_write(alone, self[k], (uint32_t)a->general.dimension, NULL, map);
-				quern_node_print(map, 0, &text[k]);
-				quern_node_destroy(map);
-			}
-			const bool same = !strcmp(quern_text_string(&text[0]), quern_text_string(&text[1]));
-			for (int k = 0; k < 2; k++) quern_text_finish(&text[k]);
-			*of = one->path;
-			if (!same) return row->name;
+static const char *other_value(const quern_instance *a, const quern_instance *b, uint32_t dim) {
+	for (const quern_param *row = a->file->params; row && row->name; row++) {
+		if (!(row->flags & QUERN_ONCE)) continue;
+		const quern_param alone[] = { *row, { .name = NULL } };
+		quern_text text[2] = { { 0 }, { 0 } };
+		const void *self[2] = { a->self, b->self };
+		for (int k = 0; k < 2; k++) {
+			quern_node *map = quern_node_create(QUERN_NODE_MAP);
+			quern_params_write(alone, self[k], dim, NULL, map);
+			quern_node_print(map, 0, &text[k]);
+			quern_node_destroy(map);
 		}
+		const bool same = !strcmp(quern_text_string(&text[0]), quern_text_string(&text[1]));
+		for (int k = 0; k < 2; k++) quern_text_finish(&text[k]);
+		if (!same) return row->name;
+	}
+	return NULL;
+}
+
+/* The same of solvers and of plugins in slots, of which there are as many in both. What overrides a plugin is told by the instance that
+ * it makes, and one scene may have more of these than another. */
+static const char *other_start(const quern_scene *a, const quern_scene *b, const char **of) {
+	const uint32_t dim = (uint32_t)a->general.dimension;
+	const char *name = NULL;
+	for (size_t i = 0; i < a->n_sections; i++) {
+		const quern_section *one = &a->sections[i], *two = &b->sections[i];
+		*of = one->name;
+		if ((name = other_value(one->solver, two->solver, dim))) return name;
+		for (size_t k = 0; k < one->n_slots; k++)
+			for (size_t j = 0; j < one->slots[k].n; j++) {
+				*of = one->slots[k].path;
+				name = other_value(one->slots[k].filling[j].instance, two->slots[k].filling[j].instance, dim);
+				if (name) return name;
+			}
 	}
 	return NULL;
 }

@@ -8,6 +8,7 @@ import pathlib
 import h5py
 
 import lab
+from workshop import quern
 
 FLIGHT = """
 quern: 1
@@ -173,6 +174,23 @@ def frames_stand_alone(place):
     print("frames where stages end stand alone")
 
 
+def walls_become_smooth(place):
+    """Walls get a friction of their own in a stage, for which plugins are made that the scene does not have: grains move otherwise from then
+    on, and not before. That this is no other start is seen beside solvers whose keys count before the first step alone."""
+    held = [*lab.SMALL["column"], "--set=time.end=12 ms", "--set=output.every=4 ms", "--set=hybrid=null", "--set=continuum=null",
+            "--set=observe=null", "--set=output.fields=[grain.velocity]"]
+    stages = "--set=stages=[{for: 8 ms}, {set: {bodies.0.plane.contact: {friction: 0.1}, bodies.1.plane.contact.friction: 0.2}}]"
+    lab.run("column", place / "held", *held)
+    lab.run("column", place / "smooth", *held, stages)
+    for number, same in ((1, True), (2, True), (3, False)):
+        with h5py.File(lab.frames(place / "held")[number]) as a, h5py.File(lab.frames(place / "smooth")[number]) as b:
+            assert (a["grains/velocity"][:] == b["grains/velocity"][:]).all() == same, number
+    lab.plan("column", stages)
+    said = quern("plan", lab.scene("column"), "--set=stages=[{for: 1 ms}, {set: {bodies.0.plane.contact: {friction: 0.1}, continuum.points: 3}}]",
+                 status=2)
+    assert "stages: continuum.points cannot change in the course of a run" in said, said
+
+
 def substeps_change(place):
     """Another number of substeps from a stage on: bodies are where their time says, in every one of them."""
     text = lab.scene("column")
@@ -193,5 +211,5 @@ if __name__ == "__main__":
     os.environ["QUERN_CACHE"] = ""
     with lab.workplace() as name:
         for test in (gravity_turns, a_block_begins_to_slide, a_gate_opens, stages_of_one_value_change_nothing, courses_lead_on,
-                     frames_stand_alone, substeps_change):
+                     walls_become_smooth, frames_stand_alone, substeps_change):
             test(pathlib.Path(name))
