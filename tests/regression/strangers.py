@@ -96,6 +96,8 @@ def check_starts(place):
         checked = quern("check", PLUGINS / "coupling.lumped.so", status=0, QUERN_PLUGIN_PATH=folder)
         assert "all ok" in checked, checked
     said = quern("plan", scene(place, "x"), status=2, QUERN_PLUGIN_PATH=place / "crash")
+    staged = "--set=stages=[{for: 5 ms}, {set: {gravity: [0, 0]}}]"
+    quern("plan", SCENE, staged, status=0, QUERN_PLUGIN_PATH=place / "crash")
     assert "unknown key 'x'" in said and "solver.x.so crashed (SIGSEGV) while it was asked which section it reads" in said, said
 
 
@@ -116,6 +118,11 @@ def check_clashes(place):
     after = ', .after = (const char *const[]) { "%s", NULL }'
     refused("circle", ["one", "two"], "waits for another one that waits for it", dict(name="one", more=after % "two"),
             dict(name="two", set="pearl", plural="pearls", more=after % "one"))
+    claim = place / "claim"
+    claim.mkdir()
+    counter(claim, "one", section="stages")
+    quern("plan", scene(claim, "stages"), status=2, QUERN_PLUGIN_PATH=claim)
+    quern("plan", SCENE, "--set=stages=[{for: 5 ms}, {set: {}}]", status=0, QUERN_PLUGIN_PATH=claim)
     copies = place / "copies"
     copies.mkdir()
     counter(copies, "one")
