@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "estimate.h"
+#include "wishes.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -24,7 +25,7 @@ static double price(const quern_run *run, bool substeps) {
 quern_estimate quern_estimate_of(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	const double substep = price(run, true), step = price(run, false);
-	quern_estimate e = { .substeps = quern_run_substeps(run) };
+	quern_estimate e = { .substeps = quern_wish_substeps(run->plan->scene) };
 	const double limit = quern_run_limit(run, &e.hard, e.reason, e.hard_reason);
 	e.step = g->step > 0 ? g->step : limit;
 	if (g->step > 0) snprintf(e.reason, sizeof e.reason, "the scene's time.step");
