@@ -2,6 +2,7 @@
 #include "observe.h"
 #include "text.h"
 #include "watch.h"
+#include "wishes.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -20,22 +21,6 @@ static uint32_t rows_of(const quern_observer_ops *ops) {
 	uint32_t n = 0;
 	while (ops->outputs[n].name) n++;
 	return n;
-}
-
-/* How often they come. */
-static uint32_t repeats(const quern_run *run, size_t e) {
-	enum { MOST = 1000 };
-	const quern_bound *bound = &run->plan->observers[e]->bound;
-	const quern_observer_ops *ops = bound->ops;
-	if (!ops->repeat) return 1;
-	quern_watch_enter(bound->id, "repeat");
-	const uint32_t n = ops->repeat(bound->self);
-	quern_watch_leave();
-	return n < 1 ? 1 : n < MOST ? n : MOST;
-}
-
-static uint32_t outputs_of(const quern_run *run, size_t e) {
-	return rows_of(ops_of(run, e)) * repeats(run, e);
 }
 
 const char *quern_observer_label(const quern_run *run, size_t e) {
@@ -129,10 +114,13 @@ static void add_columns(quern_series *s, const quern_run *run) {
 	for (size_t k = 0; k < run->plan->store.n_sets; k++)
 		if (quern_set_is_counted(&run->plan->store.sets[k]))
 			add_column(s, quern_copy(quern_set_plural(&run->plan->store.sets[k])), "1");
+	s->n_outputs = quern_take(run->scene->observe.n, sizeof *s->n_outputs);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
 		const quern_observer_ops *ops = ops_of(run, e);
 		const char *label = quern_observer_label(run, e);
-		for (uint32_t k = 0, n = rows_of(ops); k < outputs_of(run, e); k++) {
+		const uint32_t n = rows_of(ops);
+		s->n_outputs[e] = n * quern_wish_repeats(&run->plan->observers[e]->bound);
+		for (uint32_t k = 0; k < s->n_outputs[e]; k++) {
 			const quern_output *out = &ops->outputs[k % n];
 			char *name = ops->repeat ? quern_format("%s.%s_%u", label, out->name, k / n)
 									 : quern_format("%s.%s", label, out->name);
@@ -165,6 +153,7 @@ void quern_series_finish(quern_series *s) {
 		free(s->column[c].unit);
 	}
 	free(s->column);
+	free(s->n_outputs);
 	free(s->path);
 	*s = (quern_series) { 0 };
 }
@@ -237,13 +226,11 @@ static quern_status ask_all(asking *a, quern_run *run, double *out) {
 	return QUERN_OK;
 }
 
-static quern_status ask(quern_run *run, size_t e, double *out) {
+static quern_status ask(quern_run *run, size_t e, uint32_t n_outputs, double *out) {
 	const quern_bound *bound = &run->plan->observers[e]->bound;
 	const quern_general *g = &run->plan->scene->general;
 	const size_t n_uses = (size_t)bound->n_uses + 1;
-	asking a = {
-		.bound = bound, .ops = bound->ops, .n_rows = rows_of(bound->ops), .n_outputs = outputs_of(run, e)
-	};
+	asking a = { .bound = bound, .ops = bound->ops, .n_rows = rows_of(bound->ops), .n_outputs = n_outputs };
 	a.batch = (quern_observer_batch) {
 		.dim = (uint32_t)g->dimension, .time = quern_run_time(run), .use = bound->column
 	};
@@ -266,7 +253,7 @@ static quern_status ask(quern_run *run, size_t e, double *out) {
 
 /* Numbers that are not finite come out nowhere: they end the run, which says whose they are. */
 static quern_status take_answers(quern_series *s, quern_run *run, size_t e, size_t first, const double *out) {
-	for (uint32_t k = 0; k < outputs_of(run, e); k++) {
+	for (uint32_t k = 0; k < s->n_outputs[e]; k++) {
 		if (!isfinite(out[k]))
 			return quern_run_stop(run, QUERN_E_NUMERIC,
 				"observer %s: column %s is %s at t = %.6g s (step %lld)", quern_observer_label(run, e),
@@ -299,10 +286,10 @@ quern_status quern_series_add(quern_series *s, quern_run *run) {
 		if (quern_set_is_counted(&run->plan->store.sets[k]))
 			note(&s->column[c++], run->plan->store.sets[k].n);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
-		const uint32_t n = outputs_of(run, e);
+		const uint32_t n = s->n_outputs[e];
 		double *out = calloc(n + 1u, sizeof *out);
 		quern_watch_enter(run->plan->observers[e]->bound.id, ops_of(run, e)->map ? "map" : "whole");
-		quern_status status = out ? ask(run, e, out) : QUERN_E_MEMORY;
+		quern_status status = out ? ask(run, e, n, out) : QUERN_E_MEMORY;
 		quern_watch_leave();
 		if (status == QUERN_OK) status = take_answers(s, run, e, c, out);
 		free(out);
