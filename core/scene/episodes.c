@@ -29,7 +29,7 @@ static quern_scene *vary(quern_scene *s, const quern_node *set) {
 		else quern_tree_replace(tree, e->key, e->value, e->mark, s->report);
 	}
 	if (quern_report_errors(s->report) == before) {
-		quern_scene *other = quern_scene_vary(tree, s->host);
+		quern_scene *other = quern_scene_vary(s, tree);
 		if (!quern_report_errors(other->report)) return other;
 		quern_report_take(s->report, other->report);
 		quern_scene_destroy(other);

@@ -369,12 +369,17 @@ static void resolve(quern_scene *s) {
 	label_observers(s);
 }
 
-static quern_scene *create(const quern_host *host) {
+static quern_scene *create(const quern_host *host, quern_loader *loader) {
 	quern_scene *s = quern_take(1, sizeof *s);
 	s->host = host;
 	s->report = quern_report_create();
 	s->units = quern_units_create();
-	s->loader = quern_loader_create();
+	s->loader = loader;
+	return s;
+}
+
+static quern_scene *create_alone(const quern_host *host) {
+	quern_scene *s = create(host, quern_loader_create());
 	quern_watch_know(s->loader);
 	return s;
 }
@@ -384,7 +389,7 @@ bool quern_scene_is_whole(const quern_scene *s) {
 }
 
 quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *host) {
-	quern_scene *s = create(host);
+	quern_scene *s = create_alone(host);
 	s->tree = quern_tree_read(path, s->report);
 	for (; sets && *sets && s->tree->root; sets++) quern_tree_set(s->tree, *sets, s->report);
 	resolve(s);
@@ -392,8 +397,8 @@ quern_scene *quern_scene_read(const char *path, const char *const *sets, const q
 	return s;
 }
 
-quern_scene *quern_scene_vary(quern_tree *tree, const quern_host *host) {
-	quern_scene *s = create(host);
+quern_scene *quern_scene_vary(const quern_scene *base, quern_tree *tree) {
+	quern_scene *s = create(base->host, base->loader);
 	s->tree = tree;
 	s->later = true;
 	resolve(s);
@@ -401,7 +406,7 @@ quern_scene *quern_scene_vary(quern_tree *tree, const quern_host *host) {
 }
 
 quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *host) {
-	quern_scene *s = create(host);
+	quern_scene *s = create_alone(host);
 	s->tree = quern_tree_parse(name, data, length, s->report);
 	resolve(s);
 	if (!quern_report_errors(s->report)) quern_episodes_read(s);
@@ -431,8 +436,10 @@ void quern_scene_destroy(quern_scene *s) {
 	free(s->field_marks);
 	free(s->published);
 	quern_tree_destroy(s->tree);
-	quern_watch_know(NULL);
-	quern_loader_destroy(s->loader);
+	if (!s->later) { /* a stage's plugins are those of its scene */
+		quern_watch_know(NULL);
+		quern_loader_destroy(s->loader);
+	}
 	quern_units_destroy(s->units);
 	quern_report_destroy(s->report);
 	free(s);

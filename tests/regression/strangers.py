@@ -124,6 +124,15 @@ def check_starts(place):
     assert "unknown key 'x'" in said and "solver.x.so crashed (SIGSEGV) while it was asked which section it reads" in said, said
 
 
+def check_asked_once(place):
+    """However many stages a scene has, solvers are asked once which section they read, as each has the same plugins."""
+    note = place / "asked"
+    counter(place, "x", before="#include <stdio.h>\n" + BEGINS % f'FILE *f = fopen("{note}", "a"); fputs("x\\n", f); fclose(f);')
+    stages = "--set=stages=[" + ", ".join(f"{{for: 1 ms, set: {{gravity: [0, {k}]}}}}" for k in range(1, 6)) + "]"
+    quern("plan", SCENE, stages, "--set=time.end=5 ms", status=0, QUERN_PLUGIN_PATH=place)
+    assert note.read_text() == "x\n", note.read_text()
+
+
 def check_clashes(place):
     def refused(what, sections, expected, *solvers):
         folder = place / what
@@ -190,7 +199,7 @@ def check_stages(place):
 
 
 if __name__ == "__main__":
-    for test in (check_starts, check_clashes, check_stages, check_sums):
+    for test in (check_starts, check_asked_once, check_clashes, check_stages, check_sums):
         with tempfile.TemporaryDirectory() as name:
             test(pathlib.Path(name))
         print(test.__name__.replace("_", " "), "ok")
