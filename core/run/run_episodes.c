@@ -73,41 +73,52 @@ static const char *other_plugins(const quern_scene *a, const quern_scene *b) {
 	return a->n_sections == b->n_sections ? NULL : "one of the sections";
 }
 
-/* A parameter that counts before the first step alone, and has another value; NULL: there is none. */
-static const char *other_value(const quern_instance *a, const quern_instance *b, uint32_t dim) {
-	for (const quern_param *row = a->file->params; row && row->name; row++) {
-		if (!(row->flags & QUERN_ONCE)) continue;
-		const quern_param alone[] = { *row, { .name = NULL } };
-		quern_text text[2] = { { 0 }, { 0 } };
-		const void *self[2] = { a->self, b->self };
-		for (int k = 0; k < 2; k++) {
-			quern_node *map = quern_node_create(QUERN_NODE_MAP);
-			quern_params_write(alone, self[k], dim, NULL, map);
-			quern_node_print(map, 0, &text[k]);
-			quern_node_destroy(map);
-		}
-		const bool same = !strcmp(quern_text_string(&text[0]), quern_text_string(&text[1]));
-		for (int k = 0; k < 2; k++) quern_text_finish(&text[k]);
-		if (!same) return row->name;
+static bool same_value(const quern_param *row, const void *a, const void *b, uint32_t dim) {
+	const quern_param alone[] = { *row, { .name = NULL } };
+	const void *self[2] = { a, b };
+	quern_text text[2] = { { 0 }, { 0 } };
+	for (int k = 0; k < 2; k++) {
+		quern_node *map = quern_node_create(QUERN_NODE_MAP);
+		quern_params_write(alone, self[k], dim, NULL, map);
+		quern_node_print(map, 0, &text[k]);
+		quern_node_destroy(map);
 	}
+	const bool same = !strcmp(quern_text_string(&text[0]), quern_text_string(&text[1]));
+	for (int k = 0; k < 2; k++) quern_text_finish(&text[k]);
+	return same;
+}
+
+/* A parameter that counts before the first step alone, as all of them may, and has another value; NULL: there is none. */
+static const char *other_value(const quern_instance *a, const quern_instance *b, uint32_t dim, bool all) {
+	for (const quern_param *row = a->file->params; row && row->name; row++)
+		if ((all || row->flags & QUERN_ONCE) && !same_value(row, a->self, b->self, dim)) return row->name;
 	return NULL;
 }
 
-/* The same of solvers and of plugins in slots, of which there are as many in both. What overrides a plugin is told by the instance that
- * it makes, and one scene may have more of these than another. */
+/* A slot in the items of a list that counts once. */
+static bool is_once(const quern_section *section, const quern_slot *slot) {
+	for (const quern_param *row = section->solver->file->params; row && row->name; row++)
+		if (strchr(slot->name, '.') && row->flags & QUERN_ONCE && quern_same_head(row->name, slot->name))
+			return true;
+	return false;
+}
+
+/* The same of solvers and of plugins in slots, of which there are as many in both; what overrides a plugin makes instances that one scene
+ * alone may have, so that their running numbers tell nothing. */
 static const char *other_start(const quern_scene *a, const quern_scene *b, const char **of) {
 	const uint32_t dim = (uint32_t)a->general.dimension;
-	const char *name = NULL;
 	for (size_t i = 0; i < a->n_sections; i++) {
 		const quern_section *one = &a->sections[i], *two = &b->sections[i];
+		const char *name = other_value(one->solver, two->solver, dim, false);
 		*of = one->name;
-		if ((name = other_value(one->solver, two->solver, dim))) return name;
-		for (size_t k = 0; k < one->n_slots; k++)
-			for (size_t j = 0; j < one->slots[k].n; j++) {
-				*of = one->slots[k].path;
-				name = other_value(one->slots[k].filling[j].instance, two->slots[k].filling[j].instance, dim);
-				if (name) return name;
-			}
+		for (size_t k = 0; k < one->n_slots && !name; k++) {
+			const quern_slot_use *use = &one->slots[k];
+			*of = use->path;
+			for (size_t j = 0; j < use->n && !name; j++)
+				name = other_value(use->filling[j].instance, two->slots[k].filling[j].instance, dim,
+					is_once(one, use->slot));
+		}
+		if (name) return name;
 	}
 	return NULL;
 }

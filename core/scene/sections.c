@@ -29,10 +29,8 @@ static const char *named_solver(const quern_node *section) {
 
 /* Whether the scene itself reads what stands there: a row or a list of its own begins with this word, or its observers do. */
 static bool is_key_of_scene(const char *key) {
-	for (const quern_general_list *l = quern_general_lists; l->name; l++) {
-		const size_t n = strcspn(l->name, ".");
-		if (strlen(key) == n && !strncmp(l->name, key, n)) return true;
-	}
+	for (const quern_general_list *l = quern_general_lists; l->name; l++)
+		if (quern_same_head(l->name, key)) return true;
 	return quern_rows_open(quern_general_rows, key) || !strcmp(key, quern_observe_slot.name);
 }
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Stages of a scene: values change when they shall, and nothing else does; runs with them are the same for any number of threads,
 stopped anywhere, and from the scene that they leave."""
+import json
 import math
 import os
 import pathlib
@@ -158,6 +159,16 @@ def courses_lead_on(place):
     print("courses lead on, or are refused; gravity may go")
 
 
+def keys_that_stay(place):
+    """Of the scene's own keys, a stage may change those alone of which `describe` does not say that none does."""
+    keys = json.loads(quern("describe", "scene", "--json", status=0))["params"]
+    assert [key["name"] for key in keys if not key["once"]] == ["gravity"]
+    for key in [*(key["name"] for key in keys if key["once"]), "observe", "domain", "observe.0.mass"]:
+        said = quern("plan", lab.scene("two_grains"), f"--set=stages=[{{for: 5 ms}}, {{set: {{{key}: 1}}}}]", status=2)
+        assert f"stages: {key} cannot change in the course of a run" in said, said
+    print(f"{len(keys) - 1} keys of the scene stay as they are")
+
+
 def frames_stand_alone(place):
     """Where a stage ends with a frame but for round-off, there is one frame and no step of no length."""
     for every, first, second in (("10 ms", "10 ms", "50 ms"), ("0.3", "0.1", "0.2"), ("0.1", "0.1", "0.2")):
@@ -211,5 +222,5 @@ if __name__ == "__main__":
     os.environ["QUERN_CACHE"] = ""
     with lab.workplace() as name:
         for test in (gravity_turns, a_block_begins_to_slide, a_gate_opens, stages_of_one_value_change_nothing, courses_lead_on,
-                     walls_become_smooth, frames_stand_alone, substeps_change):
+                     walls_become_smooth, keys_that_stay, frames_stand_alone, substeps_change):
             test(pathlib.Path(name))
