@@ -339,7 +339,7 @@ static void label_observers(quern_scene *s) {
 	for (size_t e = 0; e < n; e++)
 		if (observe_item(s, e)->label) check_label(s, e);
 	for (size_t e = 0; e < n; e++) {
-		const char *name = strchr(s->observe.filling[e].instance->file->plugin.id, '.') + 1;
+		const char *name = quern_id_name(s->observe.filling[e].instance->file->plugin.id);
 		char *label = quern_copy(name);
 		for (int k = 2; !observe_item(s, e)->label && labelled(s, n, label) < n; k++) {
 			free(label);
