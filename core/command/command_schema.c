@@ -32,7 +32,7 @@ static void require(json_t *object, const char *name) {
 	json_array_append_new(list, json_string(name));
 }
 
-/* The map that stands under a name, made if there is none; beside it may stand a word: "boundary", "boundary.frictional". */
+/* The map that stands under a name, made if there is none; beside it may stand a word: "law", "law.key". */
 static json_t *map_in(json_t *object, const char *name) {
 	json_t *properties = json_object_get(object, "properties"), *there = json_object_get(properties, name),
 		   *one;
