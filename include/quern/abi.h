@@ -72,7 +72,9 @@ typedef enum {
 	QUERN_T_BOOL,     /* bool */
 	QUERN_T_TEXT,     /* const char *, owned by the host for the length of the run */
 	QUERN_T_VECTOR,   /* quern_real[3]; the scene gives one number per dimension, the rest are zero */
-	QUERN_T_LIST /* quern_list of structs described by `rows`; where that is one value, the scene may give it bare */
+	/* quern_list of structs described by `rows`; where that is one vector, or since 2.1 one value, the scene may give it
+	 * bare */
+	QUERN_T_LIST
 } quern_type;
 
 enum {
@@ -94,7 +96,7 @@ typedef struct quern_param {
 	const char *const *choices; /* NULL-terminated, or NULL */
 	const char
 		*text; /* default of a T_TEXT; of a T_INT, a word: "body" lets the scene say a name instead of the
-	                     number, where somebody has published that number as "body.NAME"; of a T_LIST, the
+	                     number, where somebody has published that number as "body.NAME"; since 2.1, of a T_LIST, the
 	                     T_TEXT row of its items that takes the keys where the scene gives a map instead:
 	                     "name" takes {sand: {...}, steel: {...}} for [{name: sand, ...}, {name: steel, ...}] */
 	const char *from; /* default taken from this published quantity, see publish(); where nobody publishes it,
@@ -241,7 +243,9 @@ typedef struct quern_host {
 	 * returns the status it was given, so that `return host->fail(...)` reads well. Never ends the program. */
 	quern_status (*fail)(quern_err *, quern_status, const char *param, const char *fmt, ...)
 		__attribute__((format(printf, 4, 5)));
-	/* [setup] Offers a number that rows with `from` may take as their default: "grain.diameter". */
+	/* [setup] Offers a number in SI under a name, "grain.diameter": what is read later takes it, a row with `from`
+	 * as its default, a whole number with a `text` under the word behind the dot. Of several under one name the
+	 * first counts. The name is copied. */
 	void (*publish)(const struct quern_setup *, const char *name, const char *unit, quern_real value);
 	/* [any] Philox 4x32-10: two uniforms in [0, 1) from (seed, stream, key, counter), whatever the thread or order. */
 	void (*random)(uint64_t stream, uint64_t key, uint64_t counter, quern_real out[2]);
