@@ -400,7 +400,8 @@ const char *quern_node_say(const quern_node *node, char buffer[64]) {
 	return buffer;
 }
 
-/* The one thing in a list's item, {kind: {name: one, ...}}, by its name, "one", or by what it is if no other is: "kind". */
+/* The one thing in a list's item, {kind: {name: one, ...}}, by its name, "one", or by what it is if no other is:
+ * "kind". */
 static quern_entry *called(quern_node *list, const char *name) {
 	quern_entry *found = NULL;
 	size_t n = 0;

@@ -276,7 +276,8 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 		g->step, hard, hard_reason, recommended);
 }
 
-/* Begins the interval to the next frame that is due, and chooses its steps from the state as it is. */
+/* Begins the interval up to the next frame that is due, or to the end of the scene's stage if that comes first, with
+ * the values that hold from here on; and chooses its steps from the state as it is. */
 static quern_status begin_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;

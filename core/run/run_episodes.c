@@ -88,7 +88,8 @@ static bool same_value(const quern_param *row, const void *a, const void *b, uin
 	return same;
 }
 
-/* A parameter that counts before the first step alone, as all of them may, and has another value; NULL: there is none. */
+/* A parameter that counts before the first step alone, as all of them may, and has another value; NULL: there is
+ * none. */
 static const char *other_value(const quern_instance *a, const quern_instance *b, uint32_t dim, bool all) {
 	for (const quern_param *row = a->file->params; row && row->name; row++)
 		if ((all || row->flags & QUERN_ONCE) && !same_value(row, a->self, b->self, dim)) return row->name;
@@ -103,8 +104,8 @@ static bool is_once(const quern_section *section, const quern_slot *slot) {
 	return false;
 }
 
-/* The same of solvers and of plugins in slots, of which there are as many in both; what overrides a plugin makes instances that one scene
- * alone may have, so that their running numbers tell nothing. */
+/* The same of solvers and of plugins in slots, of which there are as many in both; what overrides a plugin makes
+ * instances that one scene alone may have, so that their running numbers tell nothing. */
 static const char *other_start(const quern_scene *a, const quern_scene *b, const char **of) {
 	const uint32_t dim = (uint32_t)a->general.dimension;
 	for (size_t i = 0; i < a->n_sections; i++) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* wishes - what solvers and observers wish of the run as a whole: one grid for all, one number of substeps, so many columns */
+/* wishes - what solvers and observers wish of the run as a whole: one grid for all, one number of substeps, so many
+ * columns */
 #pragma once
 #include "plan.h"
 
@@ -10,5 +11,6 @@ uint32_t quern_wish_substeps(const quern_scene *);
 /* How often an observer's outputs come, 1 to 1000. */
 uint32_t quern_wish_repeats(const quern_bound *observer);
 
-/* A fault of the scene for each wish that is not that of a solver before it. `grid`: there is one, and somebody must give its cells. */
+/* A fault of the scene for each wish that is not that of a solver before it. `grid`: there is one, and somebody must
+ * give its cells. */
 void quern_wishes_check(const quern_scene *, bool grid);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* override - plugins of a slot once more, with parameters that are given elsewhere: by an entry of another slot, for what it meets; or
- * by an item of a list beside the slot, for a case of its own; or by both, the entry's on top */
+/* override - plugins of a slot once more, with parameters that are given elsewhere: by an entry of another slot, for
+ * what it meets; or by an item of a list beside the slot, for a case of its own; or by both, the entry's on top */
 #include "section.h"
 #include "text.h"
 #include <stdlib.h>

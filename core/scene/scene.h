@@ -103,8 +103,8 @@ typedef struct quern_scene {
 /* Reads and resolves; faults are in scene->report. `sets` are the --set options, NULL-terminated. Never NULL. */
 quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *);
 quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *);
-/* The scene of a tree, which it takes over, for a stage of another one, which must outlive it and whose plugins it has; `stages` in the
- * tree count for nothing. */
+/* The scene of a tree, which it takes over, for a stage of another one, which must outlive it and whose plugins it
+ * has; `stages` in the tree count for nothing. */
 quern_scene *quern_scene_vary(const quern_scene *, quern_tree *);
 void quern_scene_destroy(quern_scene *);
 

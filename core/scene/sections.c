@@ -27,7 +27,8 @@ static const char *named_solver(const quern_node *section) {
 	return solver && solver->kind == QUERN_NODE_SCALAR ? solver->text : NULL;
 }
 
-/* Whether the scene itself reads what stands there: a row or a list of its own begins with this word, or its observers do. */
+/* Whether the scene itself reads what stands there: a row or a list of its own begins with this word, or its
+ * observers do. */
 static bool is_key_of_scene(const char *key) {
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
 		if (quern_same_head(l->name, key)) return true;
