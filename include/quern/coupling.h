@@ -37,8 +37,8 @@ typedef struct quern_coupling_ops {
 	uint32_t size, affine; /* affine: 1 lets both clouds send v + L (x_i - x) */
 	void (*couple)(
 		const void *self, const quern_coupling_job *); /* [batch] conserves mass * velocity, node by node */
-	/* since 2.1: [stage] once a step, in place of `couple` and of the grains' transfer; conserves the sum of mass *
-	 * velocity over nodes and of grain_weight * grain_mass * grain_velocity over grains. May be NULL */
+	/* since 2.1: [stage] once a step, in place of `couple` and of the grains' transfer; conserves the sum of
+	 * mass * velocity over nodes and of grain_weight * grain_mass * grain_velocity over grains. May be NULL */
 	quern_status (*solve)(const void *self, const quern_coupling_system *);
 } quern_coupling_ops;
 

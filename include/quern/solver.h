@@ -143,7 +143,7 @@ typedef struct quern_solver_ops {
 	/* [stage] after every substep while settling: true when at rest. NULL: nothing to settle */
 	bool (*settled)(const void *self, const quern_step *);
 	/* [stage] one number for each of `sums`, of what the solver carries now. Of the names, the program knows mass
-	 * (kg; none may get lost), owed (kg, of mass that is on its way between solvers), since 2.1 left and poured (kg
+	 * (kg; none may get lost), owed (kg, of mass that is on its way between solvers), left and poured (since 2.1; kg
 	 * so far, out through faces of the domain and in by sources), momentum_x, momentum_y, momentum_z (kg m/s),
 	 * kinetic, potential, elastic (J), discrete (kg of mass that single bodies carry), and defect (of the solver's
 	 * own invariants so far, relative); all others stand in summary.json under `sums`. NULL: nothing */
