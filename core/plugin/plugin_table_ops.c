@@ -43,8 +43,7 @@ void *quern_table_ops_for(const quern_table *t, const quern_kind *kind, quern_te
 	if (size > kind->ops_size) {
 		quern_text_add(why,
 			"has %u bytes of functions, where whoever calls it knows %u of a %s: it is built with a newer "
-			"header "
-			"of its kind; rebuild both with one",
+			"header of its kind; rebuild both with one",
 			size, kind->ops_size, kind->name);
 		return NULL;
 	}

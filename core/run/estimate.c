@@ -60,9 +60,8 @@ bool quern_estimate_is_long(const quern_estimate *e, uint32_t cores, char say[60
 	quern_estimate_time(e->settling / cores, settling);
 	quern_estimate_time(e->running / cores, running);
 	snprintf(say, 600,
-		"this will take long on %u core%s: %s of settling, %.2g steps of %.2g s, and %s of running, "
-		"%.2g steps of "
-		"%.2g s, set by %s",
+		"this will take long on %u core%s: %s of settling, %.2g steps of %.2g s, and %s of running, %.2g "
+		"steps of %.2g s, set by %s",
 		cores, cores > 1 ? "s" : "", settling, e->settle_steps, e->settle_step, running, e->steps, e->step,
 		e->reason);
 	return true;

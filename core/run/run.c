@@ -271,8 +271,8 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 	const quern_general *g = &run->plan->scene->general;
 	if (g->force || !(g->step > hard)) return QUERN_OK;
 	return quern_run_refuse(run, "time.step",
-		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it "
-		"all the same)",
+		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it all "
+		"the same)",
 		g->step, hard, hard_reason, recommended);
 }
 

@@ -134,8 +134,7 @@ static void check(quern_run *run, size_t episode, const quern_scene *other, cons
 	if (which)
 		quern_report_add(report, mark,
 			"stages: %s must hold the same plugins as the scene, in the same order and by the same names: a "
-			"stage "
-			"changes values, not what takes part",
+			"stage changes values, not what takes part",
 			which);
 	else if ((which = other_start(run->scene, other, &of)))
 		quern_report_add(report, mark,

@@ -99,8 +99,7 @@ static void read_item(quern_scene *s, const quern_node *list, size_t i, double *
 	if (last && isfinite(length) && fabs(*begin - s->general.end) > 1e-9 * s->general.end)
 		quern_report_add(s->report, item->value->mark,
 			"stages: the last one would end at %.6g s, and time.end is %.6g s: leave its 'for' out, or "
-			"change one of "
-			"them",
+			"change one of them",
 			*begin, s->general.end);
 }
 

@@ -30,14 +30,13 @@ const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version o
 		.min = -1e9, .max = 1e9),
 	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED | QUERN_ONCE, .max = 1e12),
 	ROW(step_text, "time.step", "s",
-		"The long step, or auto. Taken a little shorter, so that a whole number of "
-		"equal steps leads to the next frame.",
+		"The long step, or auto. Taken a little shorter, so that a whole number of equal steps leads to the "
+		"next frame.",
 		.text = "auto", .flags = QUERN_ONCE),
 	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit.", .flags = QUERN_ONCE),
 	ROW(every, "output.every", "s",
 		"Time between frames and between rows of series.csv; default: end/50. It is divided into equal "
-		"steps, "
-		"so another value changes the step a little, and with it the numbers.",
+		"steps, so another value changes the step a little, and with it the numbers.",
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e12),
 	ROW(compress, "output.compress", NULL, "Deflate the frames.", .def = 1, .flags = QUERN_ONCE),
 	ROW(checkpoint, "checkpoint.every", "s",
@@ -59,8 +58,7 @@ const quern_general_list quern_general_lists[] = {
 		"Fields to write out beside those that frames always have: SET.NAME, as `quern plan` lists them." },
 	{ "stages", "{for: TIME, set: {path.to.key: value}}",
 		"Intervals of time, one after the other, in which keys have other values than the scene gives them; "
-		"the "
-		"last one needs no `for`. Settling comes before them all." },
+		"the last one needs no `for`. Settling comes before them all." },
 	{ NULL, NULL, NULL }
 };
 
