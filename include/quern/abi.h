@@ -219,6 +219,21 @@ typedef struct quern_set_view {
 	const uint32_t *block; /* NULL if the set has no partition */
 } quern_set_view;
 
+/* Since 2.1: how a set is cut. Its results may depend on the order of the blocks' places and on that of the entries within one,
+ * never on the numbers that blocks and entries have: the same scene then has the same bits however its sets are cut, be it among
+ * machines. So whoever adds up one entry after the other, or lets the first one win, goes through entries by quern_nth(entry, q) and
+ * through blocks by quern_nth(by_place, q). Entries from `owned` on are copies of what another process owns: they are there to be
+ * looked at, and count in no sum. Today there is one process, and it owns all. */
+typedef struct quern_parts {
+	uint32_t size, n, owned, n_blocks;
+	const uint32_t *block;    /* as in quern_set_view */
+	const uint32_t *by_place; /* blocks in the order of their places; NULL: in their own */
+	const uint32_t *entry;    /* entries in the order of their blocks' places; NULL: in their own */
+} quern_parts;
+
+/* The q-th of what stands in an order; NULL: in its own. */
+#define quern_nth(order, q) ((order) ? (order)[q] : (q))
+
 /* The sparse grid: blocks of `edge` cells per axis (8 in 2-D, 4 in 3-D: 64 cells in both), allocated where
  * there is material. Block at[b] holds the cells, and the nodes at their lower corners, from edge * at[b] on.
  * Entry b * 64 + k of the set "cell" and of every row set is cell or node k of block b, x fastest. */
@@ -229,12 +244,13 @@ typedef struct quern_grid_view {
 	uint32_t tile_size; /* span^dim */
 	int32_t cells[3];   /* of the domain, per axis: at most 2^22, and fewer than 2^31 in all */
 	bool periodic[3];
-	const int32_t (*at)[3]; /* sorted */
+	const int32_t (*at)[3]; /* in the order of places: by z, then y, then x; unless `by_place` says another */
 	const uint8_t *asked;   /* 1: by the last cover(); 0: a neighbour of such a block */
 	const int32_t *tile;    /* [n_blocks][tile_size]: entry of each tile node, -1 where there is none */
 	uint32_t n_colours;
 	const uint32_t *colour; /* colour[c] .. colour[c + 1] into by_colour: no two tiles share a node */
 	const uint32_t *by_colour;
+	const uint32_t *by_place; /* since 2.1: blocks in the order of their places; NULL: in their own */
 } quern_grid_view;
 
 typedef struct quern_host {
@@ -261,7 +277,7 @@ typedef struct quern_host {
 	/* [stage] Zeroed, 64-byte aligned memory until the stage returns, also of 0 bytes. NULL only if memory is
 	 * gone: return QUERN_E_MEMORY. */
 	void *(*memory)(quern_run *, size_t bytes);
-	/* [stage] Sum in a fixed binary tree over the index: the same for any number of threads. */
+	/* [stage] Sum in a fixed binary tree over the index: the same for any number of threads. Of a set, see sum_set. */
 	quern_real (*sum)(quern_run *, size_t n, const quern_real *);
 	/* [stage] Ends the run with a message that names set and entity (id < 0: none); returns its status. With
 	 * QUERN_E_PARAM, the scene is at fault: `set` then names a parameter of the section, as in fail(). */
@@ -269,7 +285,8 @@ typedef struct quern_host {
 		__attribute__((format(printf, 5, 6)));
 	quern_set_view (*set)(quern_run *, const char *name); /* [stage] n = 0 if there is none */
 	/* [stage] The one structural change: new entry i is old entry from[i]; fresh if from[i] == -1; and below that a
-	 * copy of old entry -2 - from[i], with an ID of its own. Carries every field of the set, rewrites every INDEX
+	 * copy of old entry -2 - from[i], with an ID of its own. New IDs count on in the order of `from`: list what is new by
+	 * when and where it appears. Carries every field of the set, rewrites every INDEX
 	 * that points into it, drops entries whose target is gone, and refreshes every column pointer the host handed
 	 * out. `block` (n_blocks + 1 entries) is copied. */
 	quern_status (*remap)(quern_run *, const char *set, uint32_t n, const int32_t *from, uint32_t n_blocks,
@@ -283,6 +300,14 @@ typedef struct quern_host {
 	bool (*has)(quern_run *, const char *section);
 	/* [setup] The same while the scene is read: sections that come later count too. */
 	bool (*keeps)(const struct quern_setup *, const char *section);
+	const quern_parts *(*parts)(quern_run *,
+		const char *set); /* since 2.1 [stage] valid until the set changes; NULL if there is none */
+	/* since 2.1 [stage] The order of the places of a set's blocks, until it is cut anew: by_place[0] comes first. Nobody has to
+	 * say it of blocks that are in order, or of cells. NULL: in their own. */
+	quern_status (*arrange)(quern_run *, const char *set, const uint32_t *by_place);
+	/* since 2.1 [stage] Sum of a number per entry of a set, of those that are owned: in a fixed tree over each block, and then
+	 * over blocks in the order of their places. */
+	quern_real (*sum_set)(quern_run *, const char *set, const quern_real *);
 } quern_host;
 
 typedef struct quern_setup {

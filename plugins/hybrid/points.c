@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* points - mass owed to the continuum becomes points, or joins those that are there; few are split, many are merged */
+#include "../common/renew.h"
 #include "../common/stressed.h"
 #include "update.h"
 #include <math.h>
@@ -280,7 +281,8 @@ static void merge(update *d, uint32_t c) {
 }
 
 void quern_hybrid_points(update *d) {
-	for (uint32_t c = 0; c < d->n_cells; c++) {
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
 		if (d->zone[c] == QUERN_DISCRETE) continue;
 		const uint32_t before = d->n_new_points;
 		if (d->u[U_POINT_OWED].real[0][c] != 0) settle(d, c);
@@ -304,22 +306,19 @@ static void take_part(const update *d, const new_point *p, uint32_t to, const in
 quern_status quern_hybrid_apply_points(update *d) {
 	const quern_step *s = d->s;
 	const uint32_t dim = s->dim;
-	uint32_t kept = 0;
-	int32_t *from = s->host->memory(s->run, ((size_t)d->n_points + d->n_new_points + 1) * sizeof(int32_t));
+	int32_t *parent = s->host->memory(s->run, ((size_t)d->n_new_points + 1) * sizeof(int32_t));
 	int32_t *now = s->host->memory(s->run, ((size_t)d->n_points + 1) * sizeof(int32_t));
-	if (!from || !now) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < d->n_points; i++) {
-		now[i] = (int32_t)kept;
-		if (!d->drop_point[i]) from[kept++] = (int32_t)i;
-	}
-	for (uint32_t i = 0; i < d->n_new_points; i++)
-		from[kept + i] = d->points[i].parent < 0 ? -1 : -2 - d->points[i].parent;
-	const quern_status status = s->host->remap(s->run, "point", kept + d->n_new_points, from, 0, NULL);
+	if (!parent || !now) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < d->n_new_points; i++) parent[i] = d->points[i].parent;
+	renewal r = {
+		.set = "point", .drop = d->drop_point, .n_new = d->n_new_points, .parent = parent, .now = now
+	};
+	const quern_status status = quern_renew(s, &r);
 	if (status != QUERN_OK) return status;
 	const quern_column *u = d->u;
 	for (uint32_t i = 0; i < d->n_new_points; i++) {
 		const new_point *p = &d->points[i];
-		const uint32_t to = kept + i;
+		const uint32_t to = r.first + i;
 		for (uint32_t k = 0; k < dim; k++) {
 			u[U_POINT_POSITION].real[k][to] = p->position[k];
 			u[U_POINT_VELOCITY].real[k][to] = p->velocity[k];
