@@ -128,6 +128,12 @@ static quern_real host_sum_set(quern_run *run, const char *set, const quern_real
 	return i < 0 ? 0 : quern_store_sum(&run->plan->store, i, values);
 }
 
+static void host_give(
+	quern_run *run, const char *set, uint32_t from, int32_t to, quern_real part, quern_real share) {
+	const int i = quern_store_set(&run->plan->store, set);
+	if (i >= 0) quern_store_give(&run->plan->store, i, from, to, part, share);
+}
+
 const quern_host quern_host_table = {
 	.abi = QUERN_ABI,
 	.fail = quern_scene_fail,
@@ -150,4 +156,5 @@ const quern_host quern_host_table = {
 	.parts = host_parts,
 	.arrange = host_arrange,
 	.sum_set = host_sum_set,
+	.give = host_give,
 };

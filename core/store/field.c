@@ -135,8 +135,11 @@ typedef struct {
 	uint32_t n;
 } permutation;
 
-/* Where an entry comes from: another one, or -1. */
-static int32_t source(int32_t from) { return from < -1 ? -2 - from : from; }
+/* Where an entry's value comes from: another one, or -1; what a part gets only by give(), or never, from nowhere. */
+static int32_t source(const quern_field *field, int32_t from) {
+	if (from >= -1) return from;
+	return field->rule == QUERN_SUMS || field->rule == QUERN_OWN ? from : -2 - from;
+}
 
 static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 	const permutation *p = arg;
@@ -146,7 +149,7 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 		const int32_t *old = p->old;
 		int32_t *new = p->new;
 		for (uint32_t i = begin; i < end; i++) {
-			const int32_t from = source(p->from[i]);
+			const int32_t from = source(p->field, p->from[i]);
 			new[i] = from >= 0 ? old[from] : (int32_t)p->initial;
 		}
 	} else if (p->field->shape == QUERN_ID) {
@@ -157,8 +160,8 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 		const double *old = p->old;
 		double *new = p->new;
 		for (uint32_t i = begin; i < end; i++) {
-			const int32_t from = source(p->from[i]);
-			new[i] = from >= 0 ? old[from] : p->initial;
+			const int32_t from = source(p->field, p->from[i]);
+			new[i] = from >= 0 ? old[from] : from < -1 && p->field->rule == QUERN_SUMS ? 0 : p->initial;
 		}
 	}
 }
@@ -342,6 +345,21 @@ quern_status quern_store_remap(
 	}
 	free(inverse);
 	return status;
+}
+
+void quern_store_give(quern_store *store, int set, uint32_t from, int32_t to, double part, double share) {
+	for (size_t i = 0; i < store->n_fields; i++) {
+		quern_field *field = &store->fields[i];
+		if (!owns(field, set) || (field->rule != QUERN_SUMS && field->rule != QUERN_MEANS)) continue;
+		for (uint8_t k = 0; k < field->n_components; k++) {
+			double *x = field->data[field->now][k];
+			if (field->rule == QUERN_MEANS && to >= 0) x[to] += share * (x[from] - x[to]);
+			if (field->rule == QUERN_MEANS) continue;
+			const double given = part * x[from];
+			if (to >= 0) x[to] += given;
+			x[from] -= given;
+		}
+	}
 }
 
 quern_status quern_store_fill(quern_store *store, int set, uint32_t n) {

@@ -184,6 +184,15 @@ enum {
 		64 /* since 2.1: this READ only makes the field exist; its column is NULL, and nothing is gathered */
 };
 
+/* Since 2.1: what becomes of a field where an entry is parted into two, or two are joined to one, by quern_host.remap and give. An entry
+ * that is new has `initial`, and what an entry that goes has not given away goes with it. */
+typedef enum {
+	QUERN_KEEPS, /* a part has what the whole had; of joined ones that stays which the one that stays had */
+	QUERN_SUMS,  /* an amount, such as a heat in J: parts share it out, joined ones add up */
+	QUERN_MEANS, /* per mass, such as a strain or a temperature: a part has what the whole had, joined ones the mean by mass */
+	QUERN_OWN /* of the entry itself, such as its age: a part begins with `initial`, and of joined ones the one that stays keeps its own */
+} quern_rule;
+
 /* One use of one field by one plugin. A field exists if and only if a counting, non-optional use names
  * it or the scene writes it out. From the uses follow the order of stages, what is allocated, what is
  * checkpointed (a field that is read or updated before it is written in a step), and what conflicts. */
@@ -198,6 +207,7 @@ typedef struct quern_use {
 	quern_real initial; /* of a new entry; diagonal of SYMMETRIC and TENSOR */
 	uint8_t access, shape, flags;
 	uint8_t hook; /* which function of the kind touches it (0: the main one) */
+	uint8_t rule; /* since 2.1: quern_rule; one use must state it, and no two different ones */
 } quern_use;
 
 /* Pointers to the components of a field, by component; NULL where the field does not exist. */
@@ -285,7 +295,8 @@ typedef struct quern_host {
 		__attribute__((format(printf, 5, 6)));
 	quern_set_view (*set)(quern_run *, const char *name); /* [stage] n = 0 if there is none */
 	/* [stage] The one structural change: new entry i is old entry from[i]; fresh if from[i] == -1; and below that a
-	 * copy of old entry -2 - from[i], with an ID of its own. New IDs count on in the order of `from`: list what is new by
+	 * copy of old entry -2 - from[i], with an ID of its own; of what that has by QUERN_SUMS it gets nothing yet (give), of
+	 * QUERN_OWN its initial value. New IDs count on in the order of `from`: list what is new by
 	 * when and where it appears. Carries every field of the set, rewrites every INDEX
 	 * that points into it, drops entries whose target is gone, and refreshes every column pointer the host handed
 	 * out. `block` (n_blocks + 1 entries) is copied. */
@@ -308,6 +319,11 @@ typedef struct quern_host {
 	/* since 2.1 [stage] Sum of a number per entry of a set, of those that are owned: in a fixed tree over each block, and then
 	 * over blocks in the order of their places. */
 	quern_real (*sum_set)(quern_run *, const char *set, const quern_real *);
+	/* since 2.1 [stage] Entry `from` of a set gives to entry `to` what its fields' rules say: of amounts the share `part`, which
+	 * it loses; means become those of both, in which it counts for `share`, the mass given over that of both then. To
+	 * QUERN_NO_TARGET: what it gives leaves the set; with a `part` below zero it gets as much, as when it takes mass that is
+	 * like its own from elsewhere. What a solver itself knows of, such as mass and momentum, states no rule. */
+	void (*give)(quern_run *, const char *set, uint32_t from, int32_t to, quern_real part, quern_real share);
 } quern_host;
 
 typedef struct quern_setup {

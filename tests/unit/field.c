@@ -178,6 +178,30 @@ static void goes_by_places(void **state) {
 	assert_null(quern_store_parts(s, GRAIN)->by_place);
 }
 
+/* Parts and joined entries follow the rules of their fields. */
+static void parts_and_joins(void **state) {
+	static const int32_t from[] = { 0, 1, 2, 3, 4, -2 - 4, -1 };
+	static const uint8_t rules[] = { QUERN_SUMS, QUERN_MEANS, QUERN_KEEPS, QUERN_OWN };
+	quern_store *s = *state;
+	for (size_t r = 0; r < sizeof rules; r++) {
+		s->fields[POSITION].rule = rules[r];
+		fill(s);
+		double *x;
+		assert_int_equal(quern_store_remap(s, GRAIN, 7, from, 0, NULL),
+			QUERN_OK); /* the last two: a part of 4, and a new one */
+		x = column(s, POSITION).real[0];
+		assert_true(x[4] == 4 && x[6] == 0.5);
+		assert_true(x[5] == (rules[r] == QUERN_SUMS ? 0 : rules[r] == QUERN_OWN ? 0.5 : 4));
+		quern_store_give(s, GRAIN, 4, 5, 0.25, 1); /* a quarter goes to the part */
+		quern_store_give(s, GRAIN, 1, 3, 1, 0.25); /* 1 joins 3, and has a quarter of the mass of both */
+		quern_store_give(s, GRAIN, 2, QUERN_NO_TARGET, 0.5, 0);
+		assert_true(x[5] == (rules[r] == QUERN_SUMS ? 1 : rules[r] == QUERN_OWN ? 0.5 : 4));
+		assert_true(x[4] == (rules[r] == QUERN_SUMS ? 3 : 4));
+		assert_true(x[3] == (rules[r] == QUERN_SUMS ? 4 : rules[r] == QUERN_MEANS ? 2.5 : 3));
+		assert_true(x[2] == (rules[r] == QUERN_SUMS ? 1 : 2));
+	}
+}
+
 /* Contacts that lose a grain go; the places of the blocks of those that stay are what they were. */
 static void keeps_places(void **state) {
 	static const int32_t from[] = { 0, 1, 3, 4 };
@@ -244,7 +268,7 @@ static void copies(void **state) {
 int main(void) {
 #define STORE(test) cmocka_unit_test_setup_teardown(test, open_store, close_store)
 	const struct CMUnitTest tests[] = { STORE(starts_as_new), STORE(reorders), STORE(copies),
-		STORE(drops_orphans), STORE(goes_by_places), STORE(keeps_places), STORE(points_at_nothing),
-		STORE(keeps_two_copies), STORE(grows) };
+		STORE(drops_orphans), STORE(goes_by_places), STORE(keeps_places), STORE(parts_and_joins),
+		STORE(points_at_nothing), STORE(keeps_two_copies), STORE(grows) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
