@@ -14,9 +14,14 @@ OBSERVED = """[mass, momentum, energy, {runout: {axis: 0}}, coordination, granul
     {packing_fraction: {region: {box: {lower: [0, 0], upper: [0.1, 0.02]}}}}, {profile: {axis: 1, bins: 6}}, {flux: {axis: 0, at: 0.05}},
     {wall_torque: {body: 0}}, {wall_force: {body: 0}}"""
 COLUMN = lab.SMALL["column"]
+# so wide that grains of several blocks stand in one block of the grid, and meet continuum there
+WIDE = [*COLUMN, *lab.sets(
+    grains__fill__1__region__box="{lower: [0.001, 0.001], upper: [0.099, 0.07]}", bodies__2__plane__point="[0.1, 0]",
+    grains__settle__energy=1e-2, time__end="20 ms")]
 HYBRID = [*flow.HYBRID, f"--set=observe={OBSERVED}, ledger, outflow]"]
 SCENES = {
     "grains and continuum in two dimensions": ("column", [*COLUMN, f"--set=observe={OBSERVED}, ledger]"]),
+    "a wide column": ("column", WIDE),
     "in three dimensions": ("column_3d", lab.SMALL["column_3d"]),
     "a source and an open face, two threads": ("column", HYBRID),
     "a floor that moves": ("column", [*COLUMN, "--set=bodies.0.plane.motion={velocity: [0.2, 0]}", f"--set=observe={OBSERVED}, ledger]"]),
