@@ -164,7 +164,9 @@ typedef struct {
 	const quern_bound *bound;
 	const quern_observer_ops *ops;
 	quern_observer_batch batch;
-	uint32_t n, n_rows, n_outputs;
+	uint32_t n_rows, n_outputs, n_leaves;
+	uint32_t (*leaf)
+		[2]; /* its first entry, and how many: a leaf lies in one block, and blocks come in the order of places */
 	bool *along;         /* by use: its column runs along the set that `map` runs over */
 	uint32_t *count;     /* by use: entries of its set */
 	quern_column *shift; /* by worker, by use: the columns from the leaf's first entry on */
@@ -173,10 +175,10 @@ typedef struct {
 
 static void ask_leaf(void *arg, uint32_t leaf, uint32_t worker) {
 	const asking *a = arg;
-	const uint32_t begin = leaf * LEAF, n_uses = a->bound->n_uses;
+	const uint32_t begin = a->leaf[leaf][0], n_uses = a->bound->n_uses;
 	quern_column *own = a->shift + (size_t)worker * n_uses;
 	quern_observer_batch b = a->batch;
-	b.n = a->n - begin < LEAF ? a->n - begin : LEAF;
+	b.n = a->leaf[leaf][1];
 	for (uint32_t r = 0; r < n_uses; r++)
 		own[r] = a->along[r] ? quern_column_from(a->bound->column[r], a->bound->uses[r].shape, begin)
 							 : a->bound->column[r];
@@ -213,17 +215,38 @@ static void look_at_uses(asking *a, quern_run *run, size_t e) {
 	}
 }
 
+static void cut_block(asking *a, uint32_t begin, uint32_t end) {
+	for (; begin < end; begin += LEAF) {
+		a->leaf[a->n_leaves][0] = begin;
+		a->leaf[a->n_leaves++][1] = end - begin < LEAF ? end - begin : LEAF;
+	}
+}
+
+static bool cut_set(asking *a, const quern_parts *p) {
+	a->leaf = malloc(((size_t)p->owned / LEAF + p->n_blocks + 1) * sizeof *a->leaf);
+	if (!a->leaf) return false;
+	for (uint32_t q = 0; q < p->n_blocks; q++) {
+		const uint32_t b = quern_nth(p->by_place, q);
+		cut_block(a, p->block[b], p->block[b + 1]);
+	}
+	if (!p->n_blocks) cut_block(a, 0, p->owned);
+	return true;
+}
+
 static quern_status ask_all(asking *a, quern_run *run, double *out) {
 	a->batch.count = a->ops->set ? NULL : a->count;
 	if (!a->ops->set) return a->ops->whole(a->bound->self, &a->batch, out, &quern_host_table, run);
-	a->n = quern_host_table.set(run, a->ops->set).n;
-	const uint32_t leaves = a->n / LEAF + (a->n % LEAF > 0);
-	a->partial = malloc(((size_t)leaves * a->n_outputs + 1) * sizeof(double));
-	if (!a->partial) return QUERN_E_MEMORY;
-	quern_pool_each(run->pool, leaves, ask_leaf, a);
-	fold(a, leaves, out);
+	const quern_parts *p = quern_host_table.parts(run, a->ops->set);
+	const bool good = !p || cut_set(a, p);
+	if (good) a->partial = malloc(((size_t)a->n_leaves * a->n_outputs + 1) * sizeof(double));
+	if (a->partial) {
+		quern_pool_each(run->pool, a->n_leaves, ask_leaf, a);
+		fold(a, a->n_leaves, out);
+	}
+	const quern_status status = a->partial ? QUERN_OK : QUERN_E_MEMORY;
+	free(a->leaf);
 	free(a->partial);
-	return QUERN_OK;
+	return status;
 }
 
 static quern_status ask(quern_run *run, size_t e, uint32_t n_outputs, double *out) {

@@ -5,10 +5,12 @@
 import os
 import pathlib
 import sys
+import tempfile
 
 import flow
 import h5py
 import lab
+import workshop
 
 OBSERVED = """[mass, momentum, energy, {runout: {axis: 0}}, coordination, granular_temperature, {repose: {axis: 0}},
     {packing_fraction: {region: {box: {lower: [0, 0], upper: [0.1, 0.02]}}}}, {profile: {axis: 1, bins: 6}}, {flux: {axis: 0, at: 0.05}},
@@ -21,7 +23,7 @@ WIDE = [*COLUMN, *lab.sets(
 HYBRID = [*flow.HYBRID, f"--set=observe={OBSERVED}, ledger, outflow]"]
 SCENES = {
     "grains and continuum in two dimensions": ("column", [*COLUMN, f"--set=observe={OBSERVED}, ledger]"]),
-    "a wide column": ("column", WIDE),
+    "a wide column, seen by an observer that maps": ("column", [*WIDE, "--set=observe=[mine, mass]"]),
     "in three dimensions": ("column_3d", lab.SMALL["column_3d"]),
     "a source and an open face, two threads": ("column", HYBRID),
     "a floor that moves": ("column", [*COLUMN, "--set=bodies.0.plane.motion={velocity: [0.2, 0]}", f"--set=observe={OBSERVED}, ledger]"]),
@@ -52,11 +54,13 @@ def main():
         print("QUERN_PERMUTED names no program")
         sys.exit(77)
     permuted = 0
+    plugins = tempfile.TemporaryDirectory()
+    workshop.compile(workshop.source("observer"), "observer.mine", plugins.name)
     for what, (name, options) in SCENES.items():
         with lab.workplace() as place:
             here, there = pathlib.Path(place) / "here", pathlib.Path(place) / "there"
-            lab.run(name, here, *options)
-            lab.run(name, there, *options, program=other, threads=2)
+            lab.run(name, here, *options, QUERN_PLUGIN_PATH=plugins.name)
+            lab.run(name, there, *options, program=other, threads=2, QUERN_PLUGIN_PATH=plugins.name)
             lab.same(here, there, what, checkpoint=False)
             assert not is_permuted(here), f"{what}: the blocks of this program are not in order"
             permuted += is_permuted(there)
