@@ -192,13 +192,14 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 }
 
 static void find_sides(const update *d, surface *f, const quern_real *level) {
+	const bool floods = f->flags & QUERN_SURFACE_FLOOD && !(f->flags & QUERN_SURFACE_VOIDS);
 	int32_t cell[3];
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
 		f->solid[c] = d->open[c] == 0;
-		if (!(f->flags & QUERN_SURFACE_FLOOD)) f->outside[c] = !f->solid[c] && level[c] <= 0;
+		if (!floods) f->outside[c] = !f->solid[c] && level[c] <= 0;
 	}
-	if (f->flags & QUERN_SURFACE_FLOOD) flood(d, f, level);
+	if (floods) flood(d, f, level);
 	for (uint32_t c = 0; c < d->n_cells; c++) f->inside[c] = !f->outside[c] && !f->solid[c];
 }
 
@@ -247,10 +248,12 @@ static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern
 		.inside = s->host->memory(s->run, d->n_cells + 1u),
 		.queue = s->host->memory(s->run, ((size_t)d->n_cells + 1) * sizeof(uint32_t)) };
 	if (!f->outside || !f->solid || !f->inside || !f->queue || !meant != !ops->means) return false;
-	for (uint32_t b = 0; meant && b < bodies; b++) meant[b] = ops->means(oracle->self, b);
-	if (meant) f->gap = gap;
+	bool all = true;
+	for (uint32_t b = 0; meant && b < bodies; b++) all &= meant[b] = ops->means(oracle->self, b);
+	if (all) f->meant = NULL; /* as if nothing had been said */
+	if (f->meant) f->gap = gap;
 	else if (wants & QUERN_ORACLE_GAP) f->gap = d->wall;
-	return !meant || quern_hybrid_gaps(d, meant, gap) == QUERN_OK;
+	return !f->meant || quern_hybrid_gaps(d, f->meant, gap) == QUERN_OK;
 }
 
 /* Distance of a cell's centre to the nearest cell outside. */
