@@ -37,27 +37,6 @@ grains:
   file: grains.txt
 observe: [mass, {mass: {label: again}}, {runout: {quantile: 0.5}}]
 """
-# a hybrid in a drum that is closed all around: the surface is that of a void, and the scene says all that it may of surfaces
-VESSEL = """
-quern: 1
-dimension: 2
-gravity: [0, -9.81]
-domain: {lower: [-32 mm, -32 mm], upper: [32 mm, 32 mm]}
-time: {end: 10 ms}
-output: {every: 5 ms, fields: [cell.zone]}
-grains:
-  material: {density: 2500, radius: {mean: 1 mm, spread: 10 %}}
-  contact: {linear: {stiffness: 5e5, restitution: 0.5, friction: 0.5}}
-  fill: {region: {box: {lower: [-30 mm, -30 mm], upper: [30 mm, 10 mm]}}, settle: true}
-bodies:
-  - cylinder: {name: drum, centre: [0, 0], radius: 30 mm, inside: true, motion: {spin: -1, about: [0, 0]}}
-  - cylinder: {name: rod, centre: [0, 0], radius: 2 mm}
-continuum: {cell: 4 mm, material: {mu_i: {critical_density: 1950, bulk_modulus: 1e5}}}
-hybrid: {oracle: {packing_fraction: {depth: 10 mm, half_width: 5 mm, bodies: [rod], closed: [upper_y], voids: true}}}
-observe: [discrete_share, ledger]
-"""
-
-
 def quern(*words, cwd=None, status=0):
     done = subprocess.run([lab.QUERN, *map(str, words)], cwd=cwd, capture_output=True, text=True, timeout=300)
     assert done.returncode == status, f"{words}: exit status {done.returncode}, not {status}\n{done.stderr}"
@@ -120,20 +99,7 @@ def filed(place):
     assert "grains.file was 'a file with the hash" in said, said
 
 
-def vessel(place):
-    """Without `voids` all of it becomes continuum."""
-    (place / "vessel.yaml").write_text(VESSEL)
-    shares = []
-    for keys in ([], ["--set=hybrid.oracle.packing_fraction.voids=false", "--set=hybrid.oracle.packing_fraction.bodies=[]"]):
-        out = place / f"vessel_{len(keys)}"
-        quern("run", place / "vessel.yaml", "-o", out, "--quiet", *keys)
-        shares.append(lab.summary(out)["observers"]["discrete_share"]["share"]["last"])
-        again(out, f"a closed vessel, share of grains {shares[-1]:.3f}")
-    assert 0.3 < shares[0] < 0.9 and shares[1] == 0, shares
-
-
 if __name__ == "__main__":
     with lab.workplace() as name:
         filed(pathlib.Path(name))
-        vessel(pathlib.Path(name))
         configs(pathlib.Path(name))
