@@ -37,6 +37,8 @@ grains:
   file: grains.txt
 observe: [mass, {mass: {label: again}}, {runout: {quantile: 0.5}}]
 """
+
+
 def quern(*words, cwd=None, status=0):
     done = subprocess.run([lab.QUERN, *map(str, words)], cwd=cwd, capture_output=True, text=True, timeout=300)
     assert done.returncode == status, f"{words}: exit status {done.returncode}, not {status}\n{done.stderr}"
