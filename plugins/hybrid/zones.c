@@ -339,9 +339,8 @@ static void warn_of_closed(const update *d, const quern_bound *oracle, const sur
 	for (uint32_t c = 0; c < d->n_cells && !any; c++) any = f->inside[c] && d->mass[c] > 0;
 	if (!any || f->found || !(f->flags & QUERN_SURFACE_FLOOD) || d->u[U_UPDATES].index[0]) return;
 	d->s->host->log(d->s->run, 2,
-		"%s finds no surface, since no open space reaches the material, and wants continuum everywhere; in a "
-		"closed "
-		"vessel let voids count (oracle.packing_fraction: voids)",
+		"%s finds no surface: no open space reaches the material, so all becomes continuum; in a "
+		"closed vessel let voids count (oracle.packing_fraction: voids)",
 		oracle->id);
 }
 

@@ -27,7 +27,7 @@ continuum: {cell: 4 mm, material: {mu_i: {critical_density: 1950, bulk_modulus: 
 hybrid: {oracle: {packing_fraction: {depth: 14 mm, half_width: 5 mm, voids: true}}}
 observe: [discrete_share, {repose: {from: -30 mm, to: 30 mm}}, {wall_torque: {body: drum}}]
 """
-# all that a scene may say of surfaces, and a rod that is one
+# a drum at rest, and all that a scene may say of surfaces
 EVERYTHING = ["--set=bodies.0.cylinder.motion=null", "--set=time.end=10 ms", "--set=output.every=5 ms",
               "--set=hybrid.oracle.packing_fraction.closed=[upper_y]", "--set=hybrid.oracle.packing_fraction.bodies=[drum]"]
 
