@@ -4,25 +4,9 @@
 #include "h5.h"
 #include "identity.h"
 #include "sidecar.h"
+#include "state.h"
 #include <stdlib.h>
 #include <string.h>
-
-/* Vectors have three columns and tensors six or nine in both dimensions, so that every tool reads them. Returns how
- * many columns, and in `from` which component fills each; -1 is zero. */
-static int columns_of(uint8_t shape, uint32_t dim, int from[9]) {
-	static const int vector[2][3] = { { 0, 1, -1 }, { 0, 1, 2 } },
-					 axial[2][3] = { { -1, -1, 0 }, { 0, 1, 2 } };
-	static const int symmetric[2][6] = { { 0, 1, -1, 2, -1, -1 }, { 0, 1, 2, 3, 4, 5 } };
-	static const int tensor[2][9] = { { 0, 1, -1, 2, 3, -1, -1, -1, -1 }, { 0, 1, 2, 3, 4, 5, 6, 7, 8 } };
-	const uint32_t d = dim == 3;
-	switch (shape) {
-	case QUERN_VECTOR: memcpy(from, vector[d], sizeof vector[d]); return 3;
-	case QUERN_AXIAL: memcpy(from, axial[d], sizeof axial[d]); return 3;
-	case QUERN_SYMMETRIC: memcpy(from, symmetric[d], sizeof symmetric[d]); return 6;
-	case QUERN_TENSOR: memcpy(from, tensor[d], sizeof tensor[d]); return 9;
-	default: from[0] = 0; return 1;
-	}
-}
 
 static const char *maker(const quern_plan *p, int field) {
 	for (size_t i = 0; i < p->n_uses; i++)
@@ -77,7 +61,7 @@ static void write_field(quern_h5 *h, hid_t group, const quern_run *run, int k, s
 		free(id);
 	} else {
 		int from[9];
-		const int columns = columns_of(field->shape, (uint32_t)run->scene->general.dimension, from);
+		const int columns = quern_state_columns(field->shape, (uint32_t)run->scene->general.dimension, from);
 		double *table = quern_take(n * (size_t)columns, sizeof(double));
 		for (int c = 0; c < columns; c++) {
 			const double *column = from[c] < 0 ? NULL : field->data[field->now][from[c]];

@@ -256,6 +256,26 @@ static bool sections(quern_table_reader *r, const char *what, const char *const 
 	return true;
 }
 
+/* Words of a list: "grain", "grain.position". */
+static bool labels(quern_table_reader *r, const char *what, const char *const *list) {
+	for (size_t n = 0; list && list[n]; n++)
+		if (n >= QUERN_MOST_ROWS || !is_label(list[n]))
+			return quern_table_refuse(
+				r, "%s: '%.60s' is no plain text, or there is no NULL at the end", what, list[n]);
+	return true;
+}
+
+static bool starts(quern_table_reader *r, const quern_solver_ops *ops) {
+	if (!ops->from) return true;
+	const quern_param *row = is_label(ops->from) ? quern_param_find(r->table->params, ops->from) : NULL;
+	if (!row || row->type != QUERN_T_TEXT || !(row->flags & QUERN_FILE))
+		return quern_table_refuse(r, "from: '%.60s' is no parameter that names a file", ops->from);
+	if (!ops->takes || !ops->takes[0] || !ops->essential || !ops->essential[0])
+		return quern_table_refuse(r, "from is there, and takes or essential are not");
+	return labels(r, "takes", ops->takes) && labels(r, "essential", ops->essential) &&
+		   labels(r, "same", ops->same) && sections(r, "unlike", ops->unlike);
+}
+
 static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 	size_t n_sets, n_slots, n_stages, n_sums = 0;
 	if (ops->section && !is_short_name(ops->section))
@@ -290,7 +310,7 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 		if (!set(r, ops, &own_sets[i])) return false;
 	for (size_t i = 0; i < n_slots; i++)
 		if (!slot(r, ops, &own_slots[i])) return false;
-	return true;
+	return starts(r, ops);
 }
 
 /* ---- of any plugin ---- */

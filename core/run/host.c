@@ -2,6 +2,7 @@
 /* host - the table of services that plugins get */
 #include "random.h"
 #include "run.h"
+#include "start.h"
 #include "text.h"
 #include <stdlib.h>
 #include <string.h>
@@ -157,4 +158,5 @@ const quern_host quern_host_table = {
 	.arrange = host_arrange,
 	.sum_set = host_sum_set,
 	.give = host_give,
+	.taken = quern_start_took,
 };

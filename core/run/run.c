@@ -2,6 +2,7 @@
 #include "run.h"
 #include "identity.h"
 #include "run_episodes.h"
+#include "start.h"
 #include "text.h"
 #include "watch.h"
 #include "wishes.h"
@@ -129,6 +130,7 @@ void quern_run_destroy(quern_run *run) {
 	free(run->identity);
 	free(run->plugins);
 	free(run->replaced);
+	free(run->taken);
 	free(run);
 }
 
@@ -379,7 +381,11 @@ static quern_status run_phase(quern_run *run, quern_phase phase, double dt) {
 }
 
 quern_status quern_run_setup(quern_run *run) {
-	const quern_status status = run_phase(run, QUERN_SETUP, 0);
+	quern_status status = quern_start_read(run);
+	if (status == QUERN_OK) status = run_phase(run, QUERN_SETUP, 0);
+	if (status == QUERN_OK) status = quern_start_read_rest(run);
+	free(run->taken);
+	run->taken = NULL;
 	if (status == QUERN_OK) run->mass_initial = quern_run_carries(run, "mass");
 	return status;
 }

@@ -6,10 +6,25 @@
 
 enum { MOST_ENTRIES = 1 << 30 };
 
-static hid_t type_of(const quern_field *field) {
+hid_t quern_state_type(const quern_field *field) {
 	return field->shape == QUERN_INDEX ? H5T_NATIVE_INT32
 		   : field->shape == QUERN_ID  ? H5T_NATIVE_INT64
 									   : H5T_NATIVE_DOUBLE;
+}
+
+int quern_state_columns(uint8_t shape, uint32_t dim, int from[9]) {
+	static const int vector[2][3] = { { 0, 1, -1 }, { 0, 1, 2 } },
+					 axial[2][3] = { { -1, -1, 0 }, { 0, 1, 2 } };
+	static const int symmetric[2][6] = { { 0, 1, -1, 2, -1, -1 }, { 0, 1, 2, 3, 4, 5 } };
+	static const int tensor[2][9] = { { 0, 1, -1, 2, 3, -1, -1, -1, -1 }, { 0, 1, 2, 3, 4, 5, 6, 7, 8 } };
+	const uint32_t d = dim == 3;
+	switch (shape) {
+	case QUERN_VECTOR: memcpy(from, vector[d], sizeof vector[d]); return 3;
+	case QUERN_AXIAL: memcpy(from, axial[d], sizeof axial[d]); return 3;
+	case QUERN_SYMMETRIC: memcpy(from, symmetric[d], sizeof symmetric[d]); return 6;
+	case QUERN_TENSOR: memcpy(from, tensor[d], sizeof tensor[d]); return 9;
+	default: from[0] = 0; return 1;
+	}
 }
 
 static bool is_column(const quern_store *store, const quern_field *field, int set, quern_state_picks picks) {
@@ -93,7 +108,7 @@ void quern_state_write(quern_h5 *h, const quern_run *run, int s, quern_state_pic
 		if (!is_column(store, field, s, picks)) continue;
 		for (int c = 0; c < field->n_components; c++) {
 			component_name(field, c, name);
-			quern_h5_put(h, group, name, type_of(field), set->n, 1, field->data[field->now][c]);
+			quern_h5_put(h, group, name, quern_state_type(field), set->n, 1, field->data[field->now][c]);
 		}
 	}
 	if (group >= 0) H5Gclose(group);
@@ -148,7 +163,8 @@ static bool read_fields(quern_store *store, hid_t group, int s, quern_state_pick
 		if (!is_column(store, field, s, picks)) continue;
 		for (int c = 0; c < field->n_components; c++) {
 			component_name(field, c, name);
-			if (!quern_h5_read(group, name, type_of(field), store->sets[s].n, 1, field->data[field->now][c]))
+			if (!quern_h5_read(
+					group, name, quern_state_type(field), store->sets[s].n, 1, field->data[field->now][c]))
 				return fault(why, name, store->sets[s].name);
 		}
 	}

@@ -11,6 +11,12 @@ typedef bool (*quern_state_picks)(const quern_field *);
 /* NULL, or what is wrong with what a field holds: no run could go on from it. */
 const char *quern_state_fault(const quern_run *, const quern_field *);
 
+/* What a component is in a file. */
+hid_t quern_state_type(const quern_field *);
+/* Vectors have three columns and tensors six or nine in both dimensions, so that every tool reads them. Returns how
+ * many columns, and in `from` which component fills each; -1 is zero. */
+int quern_state_columns(uint8_t shape, uint32_t dim, int from[9]);
+
 /* Writes a set as a group: its size, its partition, and the fields that are picked. */
 void quern_state_write(quern_h5 *, const quern_run *, int set, quern_state_picks);
 

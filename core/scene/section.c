@@ -5,6 +5,7 @@
 #include "watch.h"
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 /* ---- instances ---- */
 
@@ -390,8 +391,35 @@ static quern_node *without_solver(quern_scene *s, quern_node *node) {
 	return keep->root;
 }
 
+static bool is_folder(const char *path) {
+	struct stat is;
+	return !stat(path, &is) && S_ISDIR(is.st_mode);
+}
+
+/* Where a run stands for its state: RUN for its checkpoint, RUN:FRAME for a frame. A file is taken as it is. */
+static void name_state(quern_node *node) {
+	char *path = quern_param_path(node), *colon = strrchr(node->text, ':'), *name = NULL;
+	const bool numbered = colon && colon[1] && strspn(colon + 1, "0123456789") == strlen(colon + 1);
+	if (is_folder(path)) name = quern_format("%s/checkpoint.h5", node->text);
+	else if (numbered && strlen(colon) < 18) {
+		const size_t behind = strlen(colon), length = strlen(path) - behind;
+		path[length] = 0;
+		if (is_folder(path))
+			name = quern_format(
+				"%.*s/frames/%06lld.h5", (int)(colon - node->text), node->text, strtoll(colon + 1, NULL, 10));
+	}
+	free(path);
+	if (!name) return;
+	free(node->text);
+	node->text = name;
+	node->quoted = true;
+}
+
 void quern_section_read(quern_scene *s, const quern_plugin_file *file, const quern_entry *entry) {
 	quern_node *node = entry->value;
+	const quern_solver_ops *starts = file->plugin.ops;
+	quern_node *from = starts->from ? quern_node_find(node, starts->from) : NULL;
+	if (from && from->kind == QUERN_NODE_SCALAR && *from->text) name_state(from);
 	const bool map = node->kind == QUERN_NODE_MAP;
 	quern_instance *solver = instance_create(s, file, map ? node : NULL, entry->mark, entry->key);
 	if (!solver) return;

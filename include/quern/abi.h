@@ -324,6 +324,9 @@ typedef struct quern_host {
 	 * QUERN_NO_TARGET: what it gives leaves the set; with a `part` below zero it gets as much, as when it takes mass that is
 	 * like its own from elsewhere. What a solver itself knows of, such as mass and momentum, states no rule. */
 	void (*give)(quern_run *, const char *set, uint32_t from, int32_t to, quern_real part, quern_real share);
+	/* since 2.1 [stage] In the set-up: whether a field holds what another run's state had of it, or whether that run had
+	 * a plugin of this ID; false where nobody can tell, as of a frame's plugins. See quern_solver_ops.from. */
+	bool (*taken)(quern_run *, const char *name);
 } quern_host;
 
 typedef struct quern_setup {

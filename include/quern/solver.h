@@ -156,6 +156,17 @@ typedef struct quern_solver_ops {
 	/* [stage] after all state has been read from a file, where anything may stand: whether the solver can go on from it, or
 	 * host->stop. Numbers are finite, and indices lead somewhere. May be NULL */
 	quern_status (*accept)(const void *self, const quern_step *);
+	/* since 2.1: how a scene starts from another run's state. `from`: a parameter of this solver, a T_TEXT with QUERN_FILE,
+	 * in which the scene names a run, RUN or RUN:FRAME; NULL: this solver does not start so. Before the set-up the host
+	 * gives the sets of `takes` what the file holds of their fields, with IDs, and of a plugin's own fields what the same
+	 * plugin has left; the first set is there, and has the fields of `essential`, or the run is refused. Another set that
+	 * cannot be read is empty. The stages of QUERN_SETUP go on from there, and answer for what the numbers mean here */
+	const char *from;
+	const char *const *takes, *const *essential; /* "grain"; "grain.position" */
+	/* since 2.1: parameters that must be as they were; of a list "materials.name", which may go on behind what was there */
+	const char *const *same;
+	const char *const
+		*unlike; /* since 2.1: sections that share entries with this one: a run that had one is refused */
 } quern_solver_ops;
 
 #define QUERN_SOLVER_SIZES                                                                                   \

@@ -24,7 +24,7 @@ typedef struct dem {
 	quern_real skin, rest, settle_step; /* from the scene */
 	dem_material alone;
 	quern_list materials, pairs, fill, place, source;
-	const char *file;
+	const char *file, *from;
 	quern_real overlap_most, overlap_start; /* over the smaller radius */
 	int32_t settle_most;
 	bool mixed;    /* there are several materials */
@@ -33,8 +33,9 @@ typedef struct dem {
 	bool moving;   /* some bodies do */
 	bool outlets, sources;
 	bool settles;
-	quern_real reach;  /* m, of the laws beyond touching */
-	quern_real height; /* m, of the fill, or of the domain where there is none */
+	quern_real reach;   /* m, of the laws beyond touching */
+	quern_real largest; /* m, radius of the largest grain that the scene itself brings */
+	quern_real height;  /* m, of the fill, or of the domain where there is none */
 	quern_real sinks,
 		stiffness;        /* overlap under the fill's weight over the diameter; N/m, of all laws there */
 	const char *stiffest; /* of the laws */
@@ -118,6 +119,8 @@ QUERN_INLINE int32_t dem_item_on(const dem *d, const int32_t *material, int32_t 
 QUERN_INLINE quern_real dem_diameter(const dem *d) { return 2 * d->material[0].radii.mean; }
 
 quern_status quern_dem_fill(const void *self, const quern_step *);
+/* Grains of another run's state, which are there before the fill: checks and adopts them. */
+quern_status quern_dem_begin(const dem *, const quern_step *);
 quern_status quern_dem_pour(const void *self, const quern_step *);
 quern_status quern_dem_outlets(const void *self, const quern_step *);
 quern_status quern_dem_open(const void *self, const quern_step *);

@@ -15,6 +15,7 @@ typedef struct {
 	const body_pose *pose; /* by body */
 	dem_place *grain;
 	uint32_t n, cap;
+	uint32_t before; /* grains of another run's state, the first of them */
 	uint64_t draws;
 	const dem_fill *item;
 	quern_real widest; /* mean radius of what it has */
@@ -177,11 +178,16 @@ static bool may_stand(const filling *f, const dem_place *grain, char why[WORDS])
 		&f->placer, &spot, (1 + 1e-9) * f->d->overlap_start, grain->fixed ? moves : NULL, f, &by);
 	if (other >= 0) {
 		const quern_real *x = f->grain[other].position;
-		const bool placed = (uint32_t)other < f->d->place.n;
+		const uint32_t given = (uint32_t)other - f->before, n_placed = f->d->place.n;
+		const char *of = (uint32_t)other < f->before ? "from, entry"
+						 : given < n_placed          ? "place"
+													 : "file, row";
 		snprintf(why, WORDS,
-			"overlaps that of %s %u, at (%g, %g, %g) m, by %.2g of a radius; overlap.start allows %g",
-			placed ? "place" : "file, row", placed ? (uint32_t)other : (uint32_t)other - f->d->place.n, x[0],
-			x[1], x[2], by, f->d->overlap_start);
+			"overlaps that of %s %u, at (%g, %g, %g) m, by %.2g of a radius; overlap.start allows %g", of,
+			(uint32_t)other < f->before ? (uint32_t)other
+			: given < n_placed          ? given
+										: given - n_placed,
+			x[0], x[1], x[2], by, f->d->overlap_start);
 		return false;
 	}
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES] && !grain->fixed; b++) {
@@ -238,13 +244,14 @@ static quern_status read_file(const dem *d, const quern_step *s, grain_table *ta
 static quern_status store(filling *f) {
 	const quern_step *s = f->step;
 	const uint32_t dim = f->d->dim;
+	if (f->before && f->n == f->before) return QUERN_OK;
 	int32_t *from = s->host->memory(s->run, ((size_t)f->n + 1) * sizeof(int32_t));
 	if (!from) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < f->n; i++) from[i] = -1;
+	for (uint32_t i = 0; i < f->n; i++) from[i] = i < f->before ? (int32_t)i : -1;
 	const quern_status status = s->host->remap(s->run, "grain", f->n, from, 0, NULL);
 	if (status != QUERN_OK) return status;
 	const quern_column *use = s->use;
-	for (uint32_t i = 0; i < f->n; i++) {
+	for (uint32_t i = f->before; i < f->n; i++) {
 		const dem_place *g = &f->grain[i];
 		for (uint32_t k = 0; k < dim; k++) {
 			use[FILL_POSITION].real[k][i] = g->position[k];
@@ -273,6 +280,7 @@ static quern_status open_placer(filling *f, const grain_table *table) {
 	quern_real most = most_of(f->d, NULL);
 	most = widest_of(f->d->place.items, f->d->place.n, most);
 	most = widest_of(table->grain, table->n, most);
+	for (uint32_t i = 0; i < f->before; i++) most = fmax(most, s->use[FILL_RADIUS].real[0][i]);
 	for (uint32_t k = 0; k < s->dim; k++)
 		if (!((s->upper[k] - s->lower[k]) / most < 0x1p30))
 			return s->host->stop(s->run, QUERN_E_PARAM, "material", -1,
@@ -303,10 +311,23 @@ static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 		0x1p30);
 }
 
+/* What comes next must find them. */
+static void add_before(filling *f) {
+	const quern_column *u = f->step->use;
+	for (uint32_t i = 0; i < f->before && !f->failed; i++) {
+		dem_place grain = { .radius = u[FILL_RADIUS].real[0][i],
+			.fixed = u[FILL_FIXED].index && u[FILL_FIXED].index[i],
+			.kind = u[FILL_MATERIAL].index ? u[FILL_MATERIAL].index[i] : 0 };
+		for (uint32_t k = 0; k < f->d->dim; k++) grain.position[k] = u[FILL_POSITION].real[k][i];
+		add(f, &grain);
+	}
+}
+
 static quern_status fill_all(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
 	const dem *d = f->d;
 	const dem_fill *item = d->fill.items;
+	add_before(f);
 	quern_status status = add_all(f, d->place.items, d->place.n, "place");
 	if (status == QUERN_OK) status = add_all(f, table->grain, table->n, "file");
 	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = check_fill(d, s, i);
@@ -319,7 +340,7 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 	if (!f->n && !d->source.n)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"no grain has room: is the region too small, or a body in it?");
-	s->host->log(s->run, 0, "%u grains placed", f->n);
+	if (f->n > f->before || !f->before) s->host->log(s->run, 0, "%u grains placed", f->n - f->before);
 	return store(f);
 }
 
@@ -352,9 +373,10 @@ static quern_status open_books(const dem *d, const quern_step *s) {
 
 quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	if (refuse_two_steps(s) != QUERN_OK) return QUERN_E_PARAM;
-	filling f = { .d = self, .step = s };
+	filling f = { .d = self, .step = s, .before = s->host->set(s->run, "grain").n };
 	grain_table table = { 0 };
 	quern_status status = open_books(f.d, s);
+	if (status == QUERN_OK) status = quern_dem_begin(f.d, s);
 	if (status == QUERN_OK) status = read_file(f.d, s, &table);
 	if (status == QUERN_OK) status = open_placer(&f, &table);
 	if (status == QUERN_OK) status = fill_all(&f, &table);

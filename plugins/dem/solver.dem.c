@@ -76,6 +76,10 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 	QUERN_PARAM(dem, file, NULL,
 		"Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed] [material].",
 		.flags = QUERN_FILE | QUERN_ONCE),
+	QUERN_PARAM(dem, from, NULL,
+		"A run whose grains this one starts from, before all others: RUN for its last state, with the history of "
+		"contacts, or RUN:FRAME for what a frame shows.",
+		.flags = QUERN_FILE | QUERN_ONCE),
 	QUERN_PARAM(dem, source, NULL, "Regions that pour grains, of the first material where there are several.",
 		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(dem, skin, "1",
@@ -269,13 +273,14 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	}
 	const dem_place *place = d->place.items;
 	for (uint32_t i = 0; i < d->place.n; i++) d->fixed = d->fixed || place[i].fixed;
-	if (!d->fill.n && !d->place.n && !d->file && !d->source.n)
-		return setup->host->fail(err, QUERN_E_PARAM, NULL, "no grains: give fill, place, file or source");
+	if (!d->fill.n && !d->place.n && !d->file && !d->from && !d->source.n)
+		return setup->host->fail(
+			err, QUERN_E_PARAM, NULL, "no grains: give fill, place, file, from or source");
 	if (quern_sources_check(&d->source, true, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	d->outlets = d->outlets || outlets_any(setup->open);
 	d->sources = d->sources || d->source.n;
 	setup->host->publish(setup, "grain.sources", "1", d->source.n);
-	if (d->file) d->fixed = true; /* its header may say so */
+	if (d->file || d->from) d->fixed = true; /* its header, or the other run, may say so */
 	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity), diameter = dem_diameter(d);
 	if (d->settles && !(gravity > 0) && !setup->later)
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
@@ -411,9 +416,11 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	d->moving = n_slot[SLOT_BODIES] && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
 		d->features = d->features || ((const quern_body_ops *)slot[SLOT_BODIES][b].ops)->features;
-	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++)
-		if (((const quern_contact_ops *)law[l].ops)->reach)
-			find_reach(d, &law[l], widest(d), n_slot[SLOT_BODIES]);
+	for (uint32_t l = 0; l < n_slot[SLOT_CONTACT]; l++) {
+		if (!((const quern_contact_ops *)law[l].ops)->reach) continue;
+		if (!(d->largest > 0)) d->largest = widest(d);
+		find_reach(d, &law[l], d->largest, n_slot[SLOT_BODIES]);
+	}
 	find_sinking(d, setup, law, n_slot[SLOT_CONTACT]);
 	publish_packing(d, setup, law, n_slot[SLOT_CONTACT]);
 	return QUERN_OK;
@@ -468,10 +475,15 @@ static quern_status accept(const void *self, const quern_step *s) {
 }
 
 static const char *const with[] = { "bodies", NULL };
+static const char *const takes[] = { "grain", "contact", "touch", NULL },
+						 *const essential[] = { "grain.position", "grain.velocity", "grain.radius",
+							 "grain.id", NULL },
+						 *const same[] = { "materials.name", NULL }, *const unlike[] = { "hybrid", NULL };
 
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .with = with, .after = with,
 	.sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready, .limit = quern_dem_limit,
-	.settled = quern_dem_settled, .account = account, .settling = quern_dem_settling, .accept = accept };
+	.settled = quern_dem_settled, .account = account, .settling = quern_dem_settling, .accept = accept,
+	.from = "from", .takes = takes, .essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

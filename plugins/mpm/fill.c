@@ -126,7 +126,7 @@ static quern_status count_points(const mpm *p, const quern_step *s, uint32_t *to
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"asks for about %.2g points, more than %d: make cells larger", wanted, MOST_POINTS);
 	if (*total || p->source.n) return QUERN_OK;
-	return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill or source");
+	return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill, from or source");
 }
 
 static quern_status open_books(const mpm *p, const quern_step *s) {
@@ -146,6 +146,7 @@ quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 			"send their gradient: take affine, or hybrid.coupling: lumped");
 	quern_status status = open_books(p, s);
 	if (s->host->has(s->run, "hybrid") || status != QUERN_OK) return status;
+	if (p->from) return quern_mpm_begin(p, s, s->host->set(s->run, "point").n);
 	status = count_points(p, s, &total);
 	if (status != QUERN_OK) return status;
 	int32_t *from = s->host->memory(s->run, ((size_t)total + 1) * sizeof(int32_t));

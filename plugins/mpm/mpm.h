@@ -15,6 +15,7 @@ typedef struct mpm {
 	quern_real cell, cut; /* from the scene */
 	int32_t points, rasterise;
 	quern_list fill, source;
+	const char *from;
 	bool outlets, sources;
 	uint64_t stream;                            /* of random numbers */
 	bool affine;                                /* points send their gradient, hybrid or not */
@@ -40,6 +41,8 @@ QUERN_INLINE uint32_t motion_change(uint32_t dim) { return dim; }
 QUERN_INLINE uint32_t motion_density(uint32_t dim) { return 2 * dim; }
 
 quern_status quern_mpm_fill(const void *self, const quern_step *);
+/* The n points of another run's state, which are there before the fill: checks and adopts them. */
+quern_status quern_mpm_begin(const mpm *, const quern_step *, uint32_t n);
 quern_status quern_mpm_pour(const void *self, const quern_step *);
 quern_status quern_mpm_outlets(const void *self, const quern_step *);
 quern_status quern_mpm_sort(const void *self, const quern_step *);

@@ -26,6 +26,10 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.flags = QUERN_ONCE),
 	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill), .flags = QUERN_ONCE),
+	QUERN_PARAM(mpm, from, NULL,
+		"A run whose points this one starts from: RUN for its last state, or RUN:FRAME for what a frame shows; its cell "
+		"and points must be the same.",
+		.flags = QUERN_FILE | QUERN_ONCE, .unless = "fill"),
 	QUERN_PARAM(mpm, source, NULL, "Regions that pour material; in a hybrid its grains are poured alone.",
 		.rows = source_rows, .item_size = sizeof(source)),
 	QUERN_PARAM(mpm, rasterise, "1",
@@ -185,6 +189,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		fill_height_add(&loose, fill[i].lower, fill[i].upper);
 	}
 	if (check_sources(p, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	if (p->from && setup->host->keeps(setup, "hybrid"))
+		return setup->host->fail(err, QUERN_E_PARAM, "from",
+			"a hybrid starts from its grains alone: give grains.from a run of grains");
 	/* where nothing lies at first, what is poured piles up from the domain's end */
 	const source *pours = p->source.items;
 	for (uint32_t i = 0; i < p->source.n && !p->fill.n; i++)
@@ -278,11 +285,16 @@ static quern_status accept(const void *self, const quern_step *s) {
 		s->run, QUERN_E_NUMERIC, NULL, -1, "point.position holds a position far outside of the domain");
 }
 
+static const char *const takes[] = { "point", NULL },
+						 *const essential[] = { "point.position", "point.velocity", "point.mass",
+							 "point.volume", "point.stress", NULL },
+						 *const same[] = { "cell", "points", NULL }, *const unlike[] = { "hybrid", NULL };
 static const char *const with[] = { "bodies", NULL }, *const after[] = { "bodies", "grains", NULL };
 
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum", .with = with,
 	.after = after, .sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready,
-	.limit = limit, .account = account, .cell = cell, .accept = accept };
+	.limit = limit, .account = account, .cell = cell, .accept = accept, .from = "from", .takes = takes,
+	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: MIT */
+/* start - a scene that starts from another run's state: sections whose solver says so take their sets from its file.
+ * docs/decisions/0029 */
+#pragma once
+#include "run.h"
+
+/* Before the set-up: what the scene's sections name. A fault is the scene's, QUERN_E_PARAM. */
+quern_status quern_start_read(quern_run *);
+/* Behind the set-up: sets whose entries point at what the set-up has made. */
+quern_status quern_start_read_rest(quern_run *);
+/* quern_host.taken */
+bool quern_start_took(quern_run *, const char *field);

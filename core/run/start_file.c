@@ -1,0 +1,228 @@
+/* SPDX-License-Identifier: MIT */
+#include "start_file.h"
+#include "child.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MOST_ENTRIES = 1 << 30, MOST_TEXT = 1 << 26, SECONDS = 600 };
+static const int64_t most_id = (int64_t)1 << 53;
+
+/* ---- frames ---- */
+
+/* A checkpoint has its checksum in front. */
+static bool is_plain_hdf5(const char *path) {
+	static const char sign[8] = { '\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n' };
+	char is[8] = "";
+	const int fd = quern_open_file(path);
+	const bool plain =
+		fd >= 0 && read(fd, is, sizeof is) == (ssize_t)sizeof is && !memcmp(is, sign, sizeof is);
+	if (fd >= 0) close(fd);
+	return plain;
+}
+
+typedef struct {
+	const char *path, *const *sets;
+} trial;
+
+static herr_t try_field(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
+	size_t rows, columns;
+	(void)info;
+	(void)arg;
+	if (!quern_h5_read_size(group, name, &rows, &columns)) return 0;
+	const hid_t set = H5Dopen2(group, name, H5P_DEFAULT), is = H5Dget_type(set);
+	char source[64];
+	quern_h5_read_text(set, "source", source, sizeof source);
+	void *data = malloc(rows * columns * H5Tget_size(is) + 1);
+	if (data) H5Dread(set, is, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
+	free(data);
+	H5Tclose(is);
+	H5Dclose(set);
+	return 0;
+}
+
+/* What the library prints as it crashes is nobody's sentence. */
+static void try_reading(void *arg) {
+	const trial *t = arg;
+	if (!freopen("/dev/null", "w", stderr)) return;
+	const hid_t file = H5Fopen(t->path, H5F_ACC_RDONLY, H5P_DEFAULT);
+	for (const char *const *set = t->sets; file >= 0 && *set; set++) {
+		const hid_t group = quern_h5_find(file, *set);
+		if (group < 0) continue;
+		H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, NULL, try_field, NULL);
+		H5Gclose(group);
+	}
+	if (file >= 0) H5Fclose(file);
+}
+
+static bool can_be_read(const char *path, const char *const *sets, quern_text *why) {
+	trial t = { path, sets };
+	if (quern_child_is_one()) return true;
+	const quern_child how = quern_child_run(try_reading, &t, SECONDS);
+	if (how.end != QUERN_CHILD_CRASHED && how.end != QUERN_CHILD_LATE) return true;
+	quern_text_add(why, "it is damaged: the library that reads it does not come to an end");
+	return false;
+}
+
+/* A frame of a run lies in RUN/frames. */
+static quern_tree *scene_beside(const char *path, quern_report *report) {
+	const char *slash = strrchr(path, '/');
+	char *name = quern_format("%.*s/../scene.yaml", slash ? (int)(slash - path) : 1, slash ? path : ".");
+	quern_tree *tree = access(name, R_OK) ? NULL : quern_tree_read(name, report);
+	free(name);
+	return tree;
+}
+
+static bool open_frame(quern_start_file *f, const char *path, const char *const *sets, quern_text *why) {
+	char is[32];
+	f->frame = true;
+	if (!can_be_read(path, sets, why)) return false;
+	f->h5.file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+	const bool good = f->h5.file >= 0 && quern_h5_read_text(f->h5.file, "format", is, sizeof is) &&
+					  !strcmp(is, "quern-frame 1") &&
+					  quern_h5_read_integer(f->h5.file, "dimension", &f->dimension) &&
+					  quern_h5_read_number(f->h5.file, "time", &f->time);
+	if (!good) return quern_text_add(why, "it is no frame of this program, or it is damaged"), false;
+	quern_report *report = quern_report_create();
+	f->scene = scene_beside(path, report);
+	quern_report_destroy(report);
+	return true;
+}
+
+/* ---- checkpoints ---- */
+
+static quern_tree *read_scene(hid_t file) {
+	size_t n = 0, columns = 0;
+	if (!quern_h5_read_size(file, "scene", &n, &columns) || n > MOST_TEXT) return NULL;
+	char *text = quern_take(n + 1, 1);
+	quern_report *report = quern_report_create();
+	quern_tree *tree = quern_h5_read(file, "scene", H5T_NATIVE_UINT8, n, 1, text)
+						   ? quern_tree_parse("scene", text, n, report)
+						   : NULL;
+	quern_report_destroy(report);
+	free(text);
+	return tree;
+}
+
+static bool read_time(quern_start_file *f) {
+	double begin, end, dt;
+	int64_t at, steps_in;
+	const hid_t file = f->h5.file;
+	if (!quern_h5_read_number(file, "begin", &begin) || !quern_h5_read_number(file, "end", &end) ||
+		!quern_h5_read_number(file, "dt", &dt) || !quern_h5_read_integer(file, "at", &at) ||
+		!quern_h5_read_integer(file, "steps_in", &steps_in))
+		return false;
+	f->time = at == steps_in ? end : begin + (double)at * dt;
+	return true;
+}
+
+static bool open_checkpoint(quern_start_file *f, const char *path, quern_text *why) {
+	char is[32], broken[256];
+	if (!quern_h5_open(&f->h5, path, broken)) return quern_text_add(why, "%s", broken), false;
+	const hid_t file = f->h5.file;
+	bool good = quern_h5_read_text(file, "format", is, sizeof is) && !strcmp(is, "quern-checkpoint 3");
+	f->scene = good ? read_scene(file) : NULL;
+	const quern_node *dimension =
+		f->scene && f->scene->root ? quern_node_find(f->scene->root, "dimension") : NULL;
+	good = good && read_time(f) && dimension && dimension->kind == QUERN_NODE_SCALAR;
+	if (good) f->dimension = strtoll(dimension->text, NULL, 10);
+	else quern_text_add(why, "it is no checkpoint of this program");
+	return good;
+}
+
+/* ---- both ---- */
+
+bool quern_start_file_open(quern_start_file *f, const char *path, const char *const *sets, quern_text *why) {
+	*f = (quern_start_file) { .h5 = { .file = -1 } };
+	const bool good = is_plain_hdf5(path) ? open_frame(f, path, sets, why) : open_checkpoint(f, path, why);
+	if (!f->scene) f->scene = quern_take(1, sizeof *f->scene);
+	return good;
+}
+
+void quern_start_file_finish(quern_start_file *f) {
+	quern_h5_close(&f->h5);
+	quern_tree_destroy(f->scene);
+	f->scene = NULL;
+}
+
+static const char *name_of(const quern_field *field) { return strchr(field->name, '.') + 1; }
+
+/* Every set that is shown shows where its entries are or what they point at: any of its fields says how many there are. */
+static herr_t note_rows(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
+	size_t columns;
+	(void)info;
+	return quern_h5_read_size(group, name, arg, &columns);
+}
+
+hid_t quern_start_file_set(
+	const quern_start_file *f, const quern_set_store *set, uint32_t *n, int64_t *next_id) {
+	const hid_t group = quern_h5_find(f->h5.file, f->frame ? quern_set_plural(set) : set->name);
+	int64_t entries = -1;
+	size_t rows = SIZE_MAX;
+	*next_id = 0;
+	if (group < 0) return -1;
+	if (f->frame) {
+		H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, NULL, note_rows, &rows);
+		entries = rows <= MOST_ENTRIES ? (int64_t)rows : -1;
+	} else if (!quern_h5_read_integer(group, "n", &entries) ||
+			   !quern_h5_read_integer(group, "next_id", next_id) || *next_id < 0 || *next_id > most_id)
+		entries = -1;
+	*n = (uint32_t)entries;
+	if (entries >= 0 && entries <= MOST_ENTRIES) return group;
+	H5Gclose(group);
+	return -1;
+}
+
+static const char *dataset(const quern_start_file *f, const quern_field *field, int component, char out[64]) {
+	if (f->frame) snprintf(out, 64, "%s", name_of(field));
+	else snprintf(out, 64, "%s.%d", name_of(field), component);
+	return out;
+}
+
+bool quern_start_file_has(const quern_start_file *f, hid_t group, const quern_field *field) {
+	char name[64];
+	return H5Lexists(group, dataset(f, field, 0, name), H5P_DEFAULT) > 0;
+}
+
+/* Vectors have three columns in a frame. */
+static bool read_table(const quern_start_file *f, hid_t group, const quern_field *field, uint32_t n) {
+	int from[9];
+	const size_t columns = (size_t)quern_state_columns(field->shape, (uint32_t)f->dimension, from);
+	size_t rows = 0, is = 0;
+	if (!quern_h5_read_size(group, name_of(field), &rows, &is) || rows != n || is != columns) return false;
+	double *table = quern_take((size_t)n * columns, sizeof *table);
+	const bool good = quern_h5_read(group, name_of(field), H5T_NATIVE_DOUBLE, n, columns, table);
+	for (size_t c = 0; good && c < columns; c++)
+		for (size_t i = 0; from[c] >= 0 && i < n; i++)
+			((double *)field->data[field->now][from[c]])[i] = table[i * columns + c];
+	free(table);
+	return good;
+}
+
+bool quern_start_file_read(const quern_start_file *f, hid_t group, const quern_field *field, uint32_t n) {
+	const bool whole = field->shape == QUERN_INDEX || field->shape == QUERN_ID;
+	char name[64];
+	if (f->frame && !whole) return read_table(f, group, field, n);
+	for (int c = 0; c < field->n_components; c++)
+		if (!quern_h5_read(
+				group, dataset(f, field, c, name), quern_state_type(field), n, 1, field->data[field->now][c]))
+			return false;
+	return true;
+}
+
+bool quern_start_file_knows(
+	const quern_start_file *f, hid_t group, const quern_field *field, const char *plugin) {
+	char source[64] = "";
+	if (!f->frame) {
+		const hid_t all = quern_h5_find(f->h5.file, "plugins");
+		const bool there = all >= 0 && H5Lexists(all, plugin, H5P_DEFAULT) > 0;
+		if (all >= 0) H5Gclose(all);
+		return there;
+	}
+	const hid_t set = H5Dopen2(group, name_of(field), H5P_DEFAULT);
+	const bool same =
+		set >= 0 && quern_h5_read_text(set, "source", source, sizeof source) && !strcmp(source, plugin);
+	if (set >= 0) H5Dclose(set);
+	return same;
+}

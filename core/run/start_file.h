@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/* start_file - another run's state as a file holds it: a checkpoint, or a frame, which has what its scene showed */
+#pragma once
+#include "h5.h"
+#include "state.h"
+
+typedef struct quern_start_file {
+	quern_h5 h5;
+	bool frame;
+	int64_t dimension;
+	double time; /* s */
+	quern_tree
+		*scene; /* of the run, resolved; of a frame the one beside it: without a root where there is none */
+} quern_start_file;
+
+/* False with a reason; finish it in any case. `sets`: of a frame those that a child reads first, since it has no
+ * checksum; NULL-terminated, as the file calls them. */
+bool quern_start_file_open(quern_start_file *, const char *path, const char *const *sets, quern_text *why);
+void quern_start_file_finish(quern_start_file *);
+
+/* The group of a set and how many entries it has; below 0 if there is none, or none that makes sense. */
+hid_t quern_start_file_set(const quern_start_file *, const quern_set_store *, uint32_t *n, int64_t *next_id);
+/* Whether a field stands in its set's group. */
+bool quern_start_file_has(const quern_start_file *, hid_t group, const quern_field *);
+/* Reads n entries of it into its columns; false if it is of another type or size. */
+bool quern_start_file_read(const quern_start_file *, hid_t group, const quern_field *, uint32_t n);
+/* Whether a plugin took part in the run, or made the field of the frame. */
+bool quern_start_file_knows(const quern_start_file *, hid_t group, const quern_field *, const char *plugin);
