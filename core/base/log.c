@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -12,8 +13,7 @@ struct quern_log {
 	FILE *file;
 	quern_text kept; /* lines from before there was a file */
 	int fault, warnings;
-	bool quiet, terminal, dirty;
-	double shown;
+	bool quiet, verbose, terminal, dirty;
 };
 
 double quern_wall(void) {
@@ -22,9 +22,10 @@ double quern_wall(void) {
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-quern_log *quern_log_create(bool quiet) {
+quern_log *quern_log_create(bool quiet, bool verbose) {
 	quern_log *log = quern_take(1, sizeof *log);
 	log->quiet = quiet;
+	log->verbose = verbose;
 	log->terminal = !quiet && isatty(STDERR_FILENO);
 	return log;
 }
@@ -62,6 +63,7 @@ void quern_log_destroy(quern_log *log) {
 }
 
 void quern_log_addv(quern_log *log, int level, const char *fmt, va_list list) {
+	if (level < 0 && !log->verbose) return;
 	quern_text text = { 0 };
 	const char *mark = level > 1 ? "warning: " : "";
 	log->warnings += level > 1;
@@ -83,16 +85,21 @@ void quern_log_add(quern_log *log, int level, const char *fmt, ...) {
 	va_end(list);
 }
 
-bool quern_log_due(const quern_log *log) { return log->terminal && quern_wall() - log->shown > 0.5; }
+/* Columns of the terminal, which a line that is written anew must not pass. */
+static int width(void) {
+	struct winsize size = { 0 };
+	return !ioctl(STDERR_FILENO, TIOCGWINSZ, &size) && size.ws_col > 1 ? size.ws_col - 1 : 159;
+}
 
-void quern_log_progress(quern_log *log, bool now, const char *fmt, ...) {
-	if (!log->terminal || (!now && !quern_log_due(log))) return;
+void quern_log_progress(quern_log *log, const char *fmt, ...) {
+	if (!log->terminal) return;
+	quern_text line = { 0 };
 	va_list list;
 	va_start(list, fmt);
-	fputs("\r\033[K", stderr);
-	vfprintf(stderr, fmt, list);
+	quern_text_addv(&line, fmt, list);
 	va_end(list);
+	fprintf(stderr, "\r\033[K%.*s", width(), quern_text_string(&line));
 	fflush(stderr);
-	log->shown = quern_wall();
+	quern_text_finish(&line);
 	log->dirty = true;
 }

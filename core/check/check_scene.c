@@ -85,7 +85,7 @@ static quern_run *create_run(const check *c, uint32_t threads, const char *more,
 	quern_run *run = quern_report_errors(scene->report) ? NULL : quern_run_create(scene, threads);
 	if (run && !quern_report_errors(scene->report)) {
 		run->folder = quern_copy(c->task->folder);
-		run->log = quern_log_create(true);
+		run->log = quern_log_create(true, false);
 		return run;
 	}
 	const size_t faults = quern_report_print(scene->report, stderr);

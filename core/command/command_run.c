@@ -6,6 +6,7 @@
 #include "estimate.h"
 #include "frame.h"
 #include "options.h"
+#include "progress.h"
 #include "run_folder.h"
 #include "settled.h"
 #include "sidecar.h"
@@ -23,7 +24,7 @@ typedef struct {
 	const char *scene, *out, *until;
 	quern_texts sets;
 	int64_t threads;
-	bool resume, force, quiet, no_cache;
+	bool resume, force, quiet, verbose, no_cache;
 } options;
 
 typedef struct {
@@ -34,7 +35,8 @@ typedef struct {
 	double until;        /* s; negative: to the end */
 	bool begun;          /* the folder is this run's: what happens is noted there */
 	char *alike;         /* runs of this key settle to the same state; NULL: it is neither taken nor kept */
-	int64_t saved_step;  /* of the last checkpoint; -1: none */
+	quern_progress progress;
+	int64_t saved_step; /* of the last checkpoint; -1: none */
 } session;
 
 /* ---- signals ---- */
@@ -71,7 +73,9 @@ static int parse(options *o, int argc, char **argv) {
 		QUERN_FLAG(&o->force, "force", "replace the run in the folder; with --resume, take other plugins"),
 		QUERN_TEXT(&o->until, 0, "until", "TIME", "stop at the first step at or after this time"),
 		QUERN_FLAG(&o->no_cache, "no-cache", "settle even if a state of the same beginning is kept"),
-		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"), QUERN_END_OPTIONS };
+		QUERN_FLAG(&o->quiet, "quiet", "only warnings and errors"),
+		QUERN_FLAG(&o->verbose, "verbose", "log.txt also says what happens again and again"),
+		QUERN_END_OPTIONS };
 	const int status = quern_options_read(&quern_command_run, known, &words, argc, argv);
 	o->scene = words.at[0];
 	return status;
@@ -95,18 +99,8 @@ static char *folder_of(const options *o) {
 /* s on the clock, of all that has led here: the start moves on with each checkpoint. */
 static double wall_of(const session *s) { return s->run->wall_before + quern_wall() - s->start; }
 
-static void progress(session *s, bool settling) {
-	quern_run *run = s->run;
-	if (!quern_log_due(run->log)) return;
-	const double wall = wall_of(s), t = quern_run_time(run), end = run->scene->general.end;
-	if (settling)
-		quern_log_progress(
-			run->log, false, "settling: %lld steps, %.0f s", (long long)run->clock.settle_step, wall);
-	else {
-		const double left = t > 0 ? (wall - run->settle_wall) * (end - t) / t : 0;
-		quern_log_progress(run->log, false, "t = %.4g of %.4g s (%.0f %%), step %lld, %.0f s left", t, end,
-			100 * t / end, (long long)run->clock.step, left);
-	}
+static void progress(session *s) {
+	if (quern_progress_due(&s->progress)) quern_progress_tell(&s->progress, s->run, wall_of(s));
 }
 
 /* For the sentence about a plugin that ends the program between here and the next frame or checkpoint. */
@@ -145,7 +139,7 @@ static quern_status settle(session *s) {
 	const int warnings = quern_log_warnings(run->log); /* what was cut off would be taken for settled */
 	const bool settles = !run->clock.settled;
 	while (!run->clock.settled && !interrupted && quern_run_next(run) == QUERN_SETTLING) {
-		progress(s, true);
+		progress(s);
 		if (due(s)) checkpoint(s);
 	}
 	const bool rests = settles && run->clock.settled && run->status == QUERN_OK;
@@ -190,7 +184,7 @@ static quern_status step_on(session *s) {
 			if (output(s) != QUERN_OK) break;
 			if (run->clock.frame == 0) checkpoint(s); /* what settling has cost is not lost again */
 		} else if (event == QUERN_STEPPED) {
-			progress(s, false);
+			progress(s);
 			if (!quern_run_awaits_frame(run) && due(s)) checkpoint(s);
 		} else break;
 	}
@@ -214,6 +208,7 @@ static void report_end(session *s, const char *status) {
 		quern_log_add(
 			run->log, 1, "to go on: quern run %s/scene.yaml -o %s --resume", run->folder, run->folder);
 	char why[256];
+	quern_progress_end(&s->progress, run, status, wall);
 	if (!quern_summary_write(run, &s->series, status, wall, why)) quern_run_stop(run, QUERN_E_IO, "%s", why);
 }
 
@@ -374,7 +369,7 @@ static int run_scene(int argc, char **argv) {
 	} else if (!parse_until(&o, run, &s.until)) status = QUERN_EXIT_USAGE;
 	else {
 		run->folder = folder_of(&o);
-		run->log = quern_log_create(o.quiet);
+		run->log = quern_log_create(o.quiet, o.verbose);
 		log_command(run->log, argc, argv);
 		status = drive(&s, &o);
 	}

@@ -13,7 +13,7 @@
 
 /* What a run leaves, in the order in which a message names it; files/ alone is no sign of a run. */
 static const char *const names[] = { "scene.yaml", "input.yaml", "checkpoint.h5", "summary.json",
-	"series.csv", "log.txt", "run.xdmf", "frames", "views", "files", NULL };
+	"series.csv", "log.txt", "run.xdmf", "frames", "views", "files", "progress.json", NULL };
 enum { SIGNS = 9 };
 
 /* ---- who holds it ---- */

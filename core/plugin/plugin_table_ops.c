@@ -277,7 +277,7 @@ static bool starts(quern_table_reader *r, const quern_solver_ops *ops) {
 }
 
 static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
-	size_t n_sets, n_slots, n_stages, n_sums = 0;
+	size_t n_sets, n_slots, n_stages, n_sums = 0, n_looks = 0;
 	if (ops->section && !is_short_name(ops->section))
 		return quern_table_refuse(r, "the section '%.60s' is no word", ops->section);
 	if (ops->bound_size < offsetof(quern_bound, path) + sizeof(char *) || ops->bound_size > LARGEST_ENTRY ||
@@ -290,10 +290,12 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 	if (!count(r, "sets", ops->sets, ops->set_size, MOST_SETS, &n_sets) ||
 		!count(r, "slots", ops->slots, ops->slot_size, MOST_SLOTS, &n_slots) ||
 		!count(r, "stages", ops->stages, ops->stage_size, MOST_STAGES, &n_stages) ||
-		!outputs(r, "sums", &ops->sums, ops->output_size, QUERN_MOST_SUMS, &n_sums))
+		!outputs(r, "sums", &ops->sums, ops->output_size, QUERN_MOST_SUMS, &n_sums) ||
+		!outputs(r, "looks", &ops->looks, ops->output_size, QUERN_MOST_SUMS, &n_looks))
 		return false;
 	if (!n_stages) return quern_table_refuse(r, "a solver without stages");
 	if (!n_sums != !ops->account) return quern_table_refuse(r, "sums and account go together");
+	if (!n_looks != !ops->look) return quern_table_refuse(r, "looks and look go together");
 	quern_set *own_sets = copy(r, ops->sets, ops->set_size, sizeof *own_sets, n_sets);
 	quern_slot *own_slots = copy(r, ops->slots, ops->slot_size, sizeof *own_slots, n_slots);
 	quern_stage *own_stages = copy(r, ops->stages, ops->stage_size, sizeof *own_stages, n_stages);

@@ -137,7 +137,9 @@ static void note_lost(starting *s, size_t k) {
 		s->run->plan->stages[maker->stage].section != s->section)
 		return;
 	const bool plugin = is_plugin(s->run->scene, maker->owner);
-	if (!plugin && (!s->file.frame || maker->row->flags & QUERN_SHOWN)) return;
+	const bool asked = s->file.frame && s->run->plan->stages[maker->stage].phase == QUERN_SETUP &&
+					   maker->row->flags & QUERN_OPTIONAL && !(maker->row->flags & QUERN_SHOWN);
+	if (!plugin && !asked) return;
 	quern_text_add(&s->lost, "%s%s", s->lost.length ? ", " : "", field->name);
 	if (plugin) quern_text_add(&s->lost, " of %s", maker->owner);
 }

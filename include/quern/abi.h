@@ -275,7 +275,8 @@ typedef struct quern_host {
 	void (*publish)(const struct quern_setup *, const char *name, const char *unit, quern_real value);
 	/* [any] Philox 4x32-10: two uniforms in [0, 1) from (seed, stream, key, counter), whatever the thread or order. */
 	void (*random)(uint64_t stream, uint64_t key, uint64_t counter, quern_real out[2]);
-	/* [stage] level 0: log file only, 1: terminal too, 2: a warning */
+	/* [stage] level 0: log file only, 1: terminal too, 2: a warning; since 2.1, -1: log file only, and only with
+	 * `run --verbose`, for what is said again and again */
 	void (*log)(quern_run *, int level, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 	/* [stage] Calls body(arg, i, worker) once for every i < n, on all workers; returns when all are done. A body that
 	 * calls it again ends the program. */

@@ -167,6 +167,11 @@ typedef struct quern_solver_ops {
 	const char *const *same;
 	const char *const
 		*unlike; /* since 2.1: sections that share entries with this one: a run that had one is refused */
+	const quern_output
+		*looks; /* since 2.1: numbers that are worth a look while the run goes; NULL: there are none */
+	/* [stage] since 2.1: one number for each of `looks`, now and then between two steps, for a line on the terminal and
+	 * progress.json; a number that means nothing now is NaN. Nothing depends on them. Uses are those of the first stage */
+	void (*look)(const void *self, const quern_step *, quern_real *out);
 } quern_solver_ops;
 
 #define QUERN_SOLVER_SIZES                                                                                   \
@@ -178,7 +183,8 @@ QUERN_KIND(solver, quern_solver_ops, "Sets of entities, and stages that move the
 	QUERN_OPTIONALLY(quern_solver_ops, ready), QUERN_OPTIONALLY(quern_solver_ops, limit),
 	QUERN_OPTIONALLY(quern_solver_ops, substeps), QUERN_OPTIONALLY(quern_solver_ops, settled),
 	QUERN_OPTIONALLY(quern_solver_ops, account), QUERN_OPTIONALLY(quern_solver_ops, settling),
-	QUERN_OPTIONALLY(quern_solver_ops, cell), QUERN_OPTIONALLY(quern_solver_ops, accept));
+	QUERN_OPTIONALLY(quern_solver_ops, cell), QUERN_OPTIONALLY(quern_solver_ops, accept),
+	QUERN_OPTIONALLY(quern_solver_ops, look));
 
 #ifdef __cplusplus
 }

@@ -130,6 +130,9 @@ quern_status quern_dem_forces(const void *self, const quern_step *);
 quern_status quern_dem_left(const quern_step *, int64_t id, uint32_t axis, quern_real x);
 quern_status quern_dem_list(const void *self, const quern_step *);
 quern_status quern_dem_observe(const void *self, const quern_step *);
+/* What is worth a look while a run goes: look.c. */
+extern const quern_output quern_dem_looks[];
+void quern_dem_look_at_run(const void *self, const quern_step *, quern_real *out);
 bool quern_dem_settled(const void *self, const quern_step *);
 quern_real quern_dem_settling(const void *self, const quern_step *);
 quern_real quern_dem_limit(const void *self, const quern_step *, quern_real *hard, char reason[160]);

@@ -34,7 +34,9 @@
 		.doc = "Number of the grain, for ever.") \
 	X(FILL_DISPLACEMENT, DISPLACEMENT_USE) \
 	X(FILL_LEFT, "grain_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
-	X(FILL_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "sources")
+	X(FILL_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "sources") \
+	X(FILL_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL) \
+	X(FILL_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL)
 QUERN_USE_ENUM(FILL_USES);
 
 #define OPEN_USES(X) \

@@ -294,7 +294,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	const quern_real height = fill_height_all(&loose);
 	d->height = height > 0 ? height : setup->upper[loose.axis] - setup->lower[loose.axis];
 	setup->host->publish(setup, "fill.height", "m", d->height);
-	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
+	setup->host->publish(setup, "fill.rate", "1/s", height > 0 || d->from ? sqrt(gravity / d->height) : 0);
 	return QUERN_OK;
 }
 
@@ -483,7 +483,8 @@ static const char *const takes[] = { "grain", "contact", "touch", NULL },
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .with = with, .after = with,
 	.sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready, .limit = quern_dem_limit,
 	.settled = quern_dem_settled, .account = account, .settling = quern_dem_settling, .accept = accept,
-	.from = "from", .takes = takes, .essential = essential, .same = same, .unlike = unlike };
+	.looks = quern_dem_looks, .look = quern_dem_look_at_run, .from = "from", .takes = takes,
+	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -37,6 +37,8 @@ enum { SLOT_ORACLE, SLOT_PACKER, SLOT_COUPLING, SLOT_MATERIAL, SLOT_SHAPE, SLOT_
 QUERN_INLINE uint32_t mixture_change(uint32_t dim) { return 1 + dim; }
 
 quern_status quern_hybrid_update(const void *self, const quern_step *);
+/* The share of the mass that grains carry, for who watches a run. */
+void quern_hybrid_look(const void *self, const quern_step *, quern_real *out);
 quern_status quern_hybrid_sample(const void *self, const quern_step *);
 quern_status quern_hybrid_raster(const void *self, const quern_step *);
 quern_status quern_hybrid_couple(const void *self, const quern_step *);

@@ -184,6 +184,10 @@ static const quern_output sums[] = {
 	{ .name = "left", .unit = "kg", .doc = "Of entries, taken along by what left." }, { .name = NULL }
 };
 
+static const quern_output looks[] = {
+	{ .name = "discrete", .unit = "%", .doc = "Share of the mass that grains carry." }, { .name = NULL }
+};
+
 static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
 	(void)self;
@@ -201,7 +205,7 @@ static const char *const needs[] = { "grains", "continuum", NULL }, *const with[
 
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "hybrid", .needs = needs, .with = with,
 	.after = with, .sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready,
-	.substeps = substeps, .account = account };
+	.substeps = substeps, .account = account, .looks = looks, .look = quern_hybrid_look };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -67,6 +67,15 @@ static quern_real carried_mass(const quern_step *s) {
 	return sum;
 }
 
+void quern_hybrid_look(const void *self, const quern_step *s, quern_real *out) {
+	const cloud grains = moving_grains(s);
+	const quern_real all = carried_mass(s);
+	quern_real sum = 0;
+	(void)self;
+	for (uint32_t i = 0; i < grains.n; i++) sum += cloud_mass(&grains, i);
+	out[0] = all > 0 ? 100 * sum / all : NAN;
+}
+
 static void say(const quern_step *s, uint32_t changed) {
 	const quern_column *u = s->use;
 	const quern_real passed = u[U_PASSED].real[0] ? u[U_PASSED].real[0][0] : 0;
@@ -77,7 +86,7 @@ static void say(const quern_step *s, uint32_t changed) {
 		const uint32_t c = quern_nth(cells->entry, q);
 		entries += fabs(u[U_GRAIN_OWED].real[0][c]) + fabs(u[U_POINT_OWED].real[0][c]);
 	}
-	s->host->log(s->run, 0,
+	s->host->log(s->run, -1,
 		"update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",
 		u[U_UPDATES].index[0], (long long)s->step, changed, entries / whole,
 		all > 0 ? carried_mass(s) / whole - 1 : 0);

@@ -196,6 +196,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	const source *pours = p->source.items;
 	for (uint32_t i = 0; i < p->source.n && !p->fill.n; i++)
 		fill_height_add(&loose, setup->lower, pours[i].upper);
+	if (p->from) fill_height_add(&loose, setup->lower, setup->upper);
 	const quern_real height = fill_height_all(&loose);
 	setup->host->publish(setup, "fill.height", "m", height);
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
