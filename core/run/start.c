@@ -219,8 +219,9 @@ static bool take_set(starting *s, int set, bool first) {
 	const char *slot = store->sets[set].table ? store->sets[set].table->slot : NULL;
 	uint32_t n = 0;
 	int64_t next_id = 0;
-	const hid_t group =
-		slot && !slot_holds(s, slot) ? -1 : quern_start_file_set(&s->file, &store->sets[set], &n, &next_id);
+	/* a frame that was copied does not know its scene any more: what lies on bodies begins anew in any case */
+	const bool strange = slot && (s->file.frame || !slot_holds(s, slot));
+	const hid_t group = strange ? -1 : quern_start_file_set(&s->file, &store->sets[set], &n, &next_id);
 	bool there = group >= 0 && all_essential(s, group, set);
 	if (first && group < 0) quern_text_add(&s->why, "it holds no %s", quern_set_plural(&store->sets[set]));
 	if (!first && !there) {
@@ -244,9 +245,8 @@ static void tell(const starting *s, bool rest) {
 		quern_log_add(run->log, 1, "%s: %u %s from %s, at its t = %.6g s", s->section->name, set->n,
 			quern_set_plural(set), s->path, s->file.time);
 	if (s->lost.length)
-		quern_log_add(run->log, 1,
-			"%s: begins anew, since %s does not have it or not of the same plugins: %s", s->section->name,
-			s->path, s->lost.data);
+		quern_log_add(run->log, 1, "%s: not in %s, or of other plugins or bodies, so that it begins anew: %s",
+			s->section->name, s->path, s->lost.data);
 }
 
 static bool take_sets(starting *s, bool rest) {

@@ -42,11 +42,12 @@ void kit_close(quern_run *run) {
 	quern_run_destroy(run);
 }
 
-quern_run *kit_run(const char *name, int n) {
+quern_run *kit_run(const char *name, int n) { return kit_run_of(name, kit_open(), n); }
+
+quern_run *kit_run_of(const char *name, quern_run *run, int n) {
 	const char *folder = getenv("TMPDIR");
 	char why[256] = "";
 	quern_h5_quiet();
-	quern_run *run = kit_open();
 	if (quern_run_setup(run) != QUERN_OK) abort();
 	kit_steps(run, n);
 	run->folder = quern_format("%s/%s", folder ? folder : "/tmp", name);

@@ -9,4 +9,6 @@ quern_run *kit_open(void);
 void kit_steps(quern_run *, int n);
 /* One that has done its set-up and some steps, in a folder of its own that is kept in memory if that can be. */
 quern_run *kit_run(const char *name, int n);
+/* The same of another run. */
+quern_run *kit_run_of(const char *name, quern_run *, int n);
 void kit_close(quern_run *);

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+"""What a run says while it goes: a line on a terminal, progress.json for programs, no control characters elsewhere; and that saying it
+changes nothing and costs next to nothing."""
+import contextlib
+import fcntl
+import json
+import os
+import pathlib
+import pty
+import re
+import struct
+import subprocess
+import termios
+
+import h5py
+import numpy
+
+import lab
+
+BED = """
+quern: 1
+dimension: 2
+seed: 3
+gravity: [0, -10]
+domain: {lower: [0, -0.05], upper: [0.25, 0.5]}
+time: {end: 1.5}
+grains:
+  material: {density: 2500, radius: {mean: 4 mm, spread: 10 %}}
+  contact: {linear: {stiffness: 1e5, restitution: 0.5, friction: 0.5}}
+  overlap: {most: 0}
+  settle: {energy: 1e-14}
+  fill: {region: {box: {lower: [0.01, 0.01], upper: [0.24, 0.4]}}, settle: true}
+bodies:
+  - {plane: {point: [0, 0], normal: [0, 1]}}
+  - {plane: {point: [0, 0], normal: [1, 0]}}
+  - {plane: {point: [0.25, 0], normal: [-1, 0]}}
+output: {every: 0.5, fields: [grain.velocity]}
+observe: [coordination]
+"""
+
+
+def on_terminal(scene, out, *options, columns=200):
+    """What a run writes to a terminal of that width; None where none can be had."""
+    try:
+        master, slave = pty.openpty()
+    except OSError:
+        return None
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
+    words = [word for word in lab.command(scene, out, *options) if word != "--quiet"]
+    process, said, looked = subprocess.Popen(words, stderr=slave), b"", []
+    os.close(slave)
+    with contextlib.suppress(OSError):
+        while part := os.read(master, 4096):
+            said += part
+            with contextlib.suppress(FileNotFoundError):
+                looked.append(json.loads((out / "progress.json").read_text()))  # never half of one
+    assert process.wait() == 0, said
+    return said.decode(), looked
+
+
+def a_line(place):
+    scene = place / "bed.yaml"
+    scene.write_text(BED)
+    both = on_terminal(scene, place / "terminal")
+    if not both:
+        print("no terminal can be had here")
+        return
+    said, looked = both
+    lines = [line for line in re.findall(r"\r\x1b\[K([^\r\n]*)", said)]
+    settling = [line for line in lines if line.startswith("settling: ")]
+    running = [line for line in lines if line.startswith("t = ")]
+    print(*settling[-1:], *running[-1:], sep="\n")
+    number = r"[-+.e\d]+"
+    assert settling and running
+    assert re.search(rf"settling: \d+ steps, \d+ s(, {number} steps/s)?, kinetic {number} J/grain, residual {number}, overlap {number} %$", settling[0])
+    assert re.search(rf"t = {number} of 1.5 s \(\d+ %\), step \d+, \d+ s left, {number} steps/s, kinetic {number} J/grain, overlap {number} %$", running[-1])
+    residual = [float(re.search(r"residual ([^ ,]+)", line)[1]) for line in settling]
+    assert residual[0] > 1 and "residual" not in running[-1], residual
+    status = [one["status"] for one in looked]
+    assert "running" in status and json.loads((place / "terminal/progress.json").read_text())["status"] == "done"
+    narrow, _ = on_terminal(scene, place / "narrow", "--set=time.end=0.5", columns=40)
+    assert max(len(line) for line in re.findall(r"\r\x1b\[K([^\r\n]*)", narrow)) <= 39
+
+
+def numbers(place):
+    """progress.json says what the last frame says."""
+    out = place / "numbers"
+    done = subprocess.run([lab.QUERN, "run", str(place / "bed.yaml"), "-o", str(out), "--threads", "1", "--set=time.end=0.5"],
+                          capture_output=True, text=True, check=True)
+    assert "\r" not in done.stderr and "\x1b" not in done.stderr, "control characters without a terminal"
+    found = json.loads((out / "progress.json").read_text())
+    assert (found["status"], found["time"], found["time_end"], found["seconds_left"], found["frame"]) == ("done", 0.5, 0.5, 0, 1)
+    with h5py.File(lab.frames(out)[-1]) as file:
+        x, v, r = (file["grains"][name][:] for name in ("position", "velocity", "radius"))
+    mass = 2500 * numpy.pi * r ** 2
+    kinetic = 0.5 * (mass * (v ** 2).sum(1)).mean()
+    gap = numpy.sqrt(((x[:, None] - x[None]) ** 2).sum(-1)) - r[:, None] - r[None]
+    deep = (-gap / numpy.minimum(r[:, None], r[None]))[~numpy.eye(len(r), dtype=bool)].max()
+    looks = found["looks"]["grains"]
+    print(f"kinetic {looks['kinetic']['value']:.6g}, by the frame {kinetic:.6g}; overlap {looks['overlap']['value']:.6g} %, by the frame {100 * deep:.6g}")
+    assert abs(looks["kinetic"]["value"] / kinetic - 1) < 1e-6 and looks["kinetic"]["unit"] == "J/grain"
+    assert abs(looks["overlap"]["value"] / (100 * deep) - 1) < 1e-6 and looks["overlap"]["unit"] == "%"
+
+
+def share_and_updates(place):
+    """A hybrid says what its grains carry; its log has a line per update only where it is asked for."""
+    options = [*lab.SMALL["column"], "--set=observe=[discrete_share]", "--set=time.end=20 ms"]
+    lab.run("column", place / "short", *options)
+    lab.run("column", place / "long", *options, "--verbose")
+    lab.same(place / "short", place / "long", "with --verbose")
+    logs = [(place / name / "log.txt").read_text() for name in ("short", "long")]
+    updates = [len(re.findall(r"^update \d+ at step", log, re.M)) for log in logs]
+    found = json.loads((place / "short/progress.json").read_text())["looks"]["hybrid"]["discrete"]
+    share = lab.summary(place / "short")["observers"]["discrete_share"]["share"]["last"]
+    print(f"lines of updates: {updates[0]}, with --verbose {updates[1]}; grains carry {found['value']:.6g} %, observed {100 * share:.6g}")
+    assert updates[0] == 0 and updates[1] > 0
+    assert abs(found["value"] - 100 * share) < 1e-6
+
+
+if __name__ == "__main__":
+    with lab.workplace() as name:
+        for test in (a_line, numbers, share_and_updates):
+            test(pathlib.Path(name))
