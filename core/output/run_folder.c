@@ -13,8 +13,8 @@
 
 /* What a run leaves, in the order in which a message names it; files/ alone is no sign of a run. */
 static const char *const names[] = { "scene.yaml", "input.yaml", "checkpoint.h5", "summary.json",
-	"series.csv", "log.txt", "run.xdmf", "frames", "views", "files", "progress.json", NULL };
-enum { SIGNS = 9 };
+	"series.csv", "log.txt", "progress.json", "run.xdmf", "frames", "views", "files", NULL };
+enum { SIGNS = 10 };
 
 /* ---- who holds it ---- */
 

@@ -256,7 +256,7 @@ static bool sections(quern_table_reader *r, const char *what, const char *const 
 	return true;
 }
 
-/* Words of a list: "grain", "grain.position". */
+/* Names of sets, of fields, of parameters. */
 static bool labels(quern_table_reader *r, const char *what, const char *const *list) {
 	for (size_t n = 0; list && list[n]; n++)
 		if (n >= QUERN_MOST_ROWS || !is_label(list[n]))

@@ -219,7 +219,7 @@ static bool take_set(starting *s, int set, bool first) {
 	const char *slot = store->sets[set].table ? store->sets[set].table->slot : NULL;
 	uint32_t n = 0;
 	int64_t next_id = 0;
-	/* a frame that was copied does not know its scene any more: what lies on bodies begins anew in any case */
+	/* a frame that was copied does not know its scene any more: what hangs on a slot begins anew in any case */
 	const bool strange = slot && (s->file.frame || !slot_holds(s, slot));
 	const hid_t group = strange ? -1 : quern_start_file_set(&s->file, &store->sets[set], &n, &next_id);
 	bool there = group >= 0 && all_essential(s, group, set);
@@ -245,7 +245,7 @@ static void tell(const starting *s, bool rest) {
 		quern_log_add(run->log, 1, "%s: %u %s from %s, at its t = %.6g s", s->section->name, set->n,
 			quern_set_plural(set), s->path, s->file.time);
 	if (s->lost.length)
-		quern_log_add(run->log, 1, "%s: not in %s, or of other plugins or bodies, so that it begins anew: %s",
+		quern_log_add(run->log, 1, "%s: not in %s, or of others than here, so that it begins anew: %s",
 			s->section->name, s->path, s->lost.data);
 }
 

@@ -10,7 +10,7 @@ import subprocess
 import lab
 
 SCENE = pathlib.Path(lab.scene("two_grains"))
-LEFT = {"scene.yaml", "input.yaml", "checkpoint.h5", "summary.json", "series.csv", "log.txt", "run.xdmf", "frames", "views"}
+LEFT = {"progress.json", "scene.yaml", "input.yaml", "checkpoint.h5", "summary.json", "series.csv", "log.txt", "run.xdmf", "frames", "views"}
 
 
 def run(scene, folder, *options, status=0, cwd=None):
