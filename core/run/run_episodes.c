@@ -57,25 +57,47 @@ static const char *other_plugins(const quern_scene *a, const quern_scene *b) {
 	return a->n_sections == b->n_sections ? NULL : "one of the sections";
 }
 
+/* Whether a parameter has the same value in both. */
+static bool same_value(const quern_param *row, const void *one, const void *two, uint32_t dim) {
+	const quern_param alone[] = { *row, { .name = NULL } };
+	const void *self[2] = { one, two };
+	quern_text text[2] = { { 0 }, { 0 } };
+	for (int k = 0; k < 2; k++) {
+		quern_node *map = quern_node_create(QUERN_NODE_MAP);
+		quern_params_write(alone, self[k], dim, NULL, map);
+		quern_node_print(map, 0, &text[k]);
+		quern_node_destroy(map);
+	}
+	const bool same = !strcmp(quern_text_string(&text[0]), quern_text_string(&text[1]));
+	for (int k = 0; k < 2; k++) quern_text_finish(&text[k]);
+	return same;
+}
+
+/* Plugins in the items of a list that counts before the first step alone, such as the regions of fills, count no longer. */
+static bool stands_in_the_past(const quern_scene *s, const quern_instance *it) {
+	for (size_t i = 0; i < s->n_sections; i++) {
+		const quern_param *params = s->sections[i].solver->file->params;
+		for (size_t k = 0; k < s->sections[i].n_slots; k++) {
+			const quern_slot_use *use = &s->sections[i].slots[k];
+			const size_t n = strcspn(use->slot->name, ".");
+			if (!use->slot->name[n] || strcmp(use->path, it->path) != 0) continue;
+			for (const quern_param *row = params; row && row->name; row++)
+				if (strlen(row->name) == n && !strncmp(row->name, use->slot->name, n))
+					return row->flags & QUERN_ONCE;
+		}
+	}
+	return false;
+}
+
 /* A parameter that counts before the first step alone, and has another value; NULL: there is none. */
 static const char *other_start(const quern_scene *a, const quern_scene *b, const char **of) {
 	for (size_t i = 0; i < a->n_instances && i < b->n_instances; i++) {
 		const quern_instance *one = a->instances[i], *two = b->instances[i];
+		const bool past = stands_in_the_past(a, one);
 		for (const quern_param *row = one->file->params; row && row->name; row++) {
-			if (!(row->flags & QUERN_ONCE)) continue;
-			const quern_param alone[] = { *row, { .name = NULL } };
-			quern_text text[2] = { { 0 }, { 0 } };
-			const void *self[2] = { one->self, two->self };
-			for (int k = 0; k < 2; k++) {
-				quern_node *map = quern_node_create(QUERN_NODE_MAP);
-				quern_params_write(alone, self[k], (uint32_t)a->general.dimension, NULL, map);
-				quern_node_print(map, 0, &text[k]);
-				quern_node_destroy(map);
-			}
-			const bool same = !strcmp(quern_text_string(&text[0]), quern_text_string(&text[1]));
-			for (int k = 0; k < 2; k++) quern_text_finish(&text[k]);
+			if (!(row->flags & QUERN_ONCE) && !past) continue;
 			*of = one->path;
-			if (!same) return row->name;
+			if (!same_value(row, one->self, two->self, (uint32_t)a->general.dimension)) return row->name;
 		}
 	}
 	return NULL;
