@@ -62,7 +62,9 @@ typedef struct dem_share {
 } dem_share;
 
 typedef struct dem_fill {
-	quern_real lower[3], upper[3], velocity[3];
+	quern_real lower[3], upper[3]; /* m, of the box around its region */
+	quern_real velocity[3];
+	quern_list above;
 	bool settle, fixed;
 	const char *material;
 	quern_list mix;
@@ -78,6 +80,8 @@ typedef struct dem_place {
 
 /* slots, in the order of the solver's table */
 enum {
+	SLOT_REGION,
+	SLOT_SOURCE_REGION,
 	SLOT_CONTACT,
 	SLOT_NEIGHBOURS,
 	SLOT_INTEGRATOR,

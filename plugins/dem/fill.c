@@ -17,6 +17,8 @@ typedef struct {
 	uint32_t n, cap;
 	uint64_t draws;
 	const dem_fill *item;
+	region region; /* its own */
+	region_side side;
 	quern_real widest; /* mean radius of what it has */
 	quern_real
 		reach; /* m around a cell, of seeds: twice the widest radii of a new grain and of one that is there */
@@ -72,7 +74,7 @@ static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
 	const filling *f = job->scene;
 	for (uint32_t k = 0; k < f->d->dim; k++)
 		if (x[k] < f->lower[k] || (f->last[k] ? x[k] > f->upper[k] : x[k] >= f->upper[k])) return false;
-	return true;
+	return f->side == REGION_AROUND || quern_region_holds(&f->region, x);
 }
 
 static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
@@ -116,20 +118,25 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 	free(seed);
 }
 
-/* Cells of about two diameters, along gravity last, so that the packing grows upwards as it would by pouring. */
-static void fill_region(filling *f, const dem_fill *item, const quern_bound *packer, uint64_t key) {
+/* Cells of about two diameters, along gravity last, so that the packing grows upwards as it would by pouring. Returns how many of
+ * them hold some of the region. */
+static uint32_t fill_region(filling *f, uint32_t i) {
 	const uint32_t dim = f->d->dim;
-	uint32_t count[3] = { 1, 1, 1 };
+	const quern_step *s = f->step;
+	const dem_fill *item = (const dem_fill *)f->d->fill.items + i;
+	const uint64_t key = (uint64_t)(i + 1) << 40;
+	uint32_t count[3] = { 1, 1, 1 }, held = 0;
 	f->item = item;
+	f->region = quern_region_of(s, &s->slot[SLOT_REGION][i], item->lower, item->upper);
+	quern_region_put_above(&f->region, s, &item->above, SLOT_BODIES, f->pose);
 	const dem_fill *fill = f->d->fill.items;
 	quern_real others = 0;
-	for (uint32_t i = 0; i < f->d->fill.n; i++) others = fmax(others, most_of(f->d, fill[i].share));
+	for (uint32_t k = 0; k < f->d->fill.n; k++) others = fmax(others, most_of(f->d, fill[k].share));
 	f->widest = quern_dem_widest(f->d, item->share);
 	f->reach = 2 * most_of(f->d, item->share) + 2 * others;
 	memset(f->placed, 0, sizeof f->placed);
 	choose_material(f);
-	f->placer.n_bodies =
-		item->fixed ? 0 : f->step->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
+	f->placer.n_bodies = item->fixed ? 0 : s->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
 	for (uint32_t k = 0; k < dim; k++) {
 		const quern_real cells = (item->upper[k] - item->lower[k]) / (4 * f->widest);
 		count[k] = cells > 1 ? (uint32_t)cells : 1;
@@ -144,8 +151,12 @@ static void fill_region(filling *f, const dem_fill *item, const quern_bound *pac
 					f->last[k] = at[k] + 1 == count[k];
 					f->upper[k] = f->last[k] ? item->upper[k] : item->lower[k] + (at[k] + 1) * width;
 				}
-				fill_cell(f, packer, key + ((uint64_t)z * count[1] + y) * count[0] + x);
+				f->side = quern_region_side(&f->region, f->lower, f->upper);
+				if (f->side == REGION_APART) continue;
+				fill_cell(f, &s->slot[SLOT_PACKER][i], key + ((uint64_t)z * count[1] + y) * count[0] + x);
+				held++;
 			}
+	return held;
 }
 
 /* True if the grain lies in the domain. A fixed one may lie beyond it by the domain's own width, any grain along
@@ -303,6 +314,12 @@ static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 		0x1p30);
 }
 
+static quern_status refuse_empty(const quern_step *s, uint32_t i) {
+	char param[40];
+	snprintf(param, sizeof param, "fill.%u.region", i);
+	return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "no place of the domain lies in the region");
+}
+
 static quern_status fill_all(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
 	const dem *d = f->d;
@@ -313,8 +330,7 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 	if (status != QUERN_OK) return status;
 	for (int fixed = 1; fixed >= 0; fixed--) /* floors first: what falls must find them */
 		for (uint32_t i = 0; i < d->fill.n; i++)
-			if (item[i].fixed == fixed)
-				fill_region(f, &item[i], &s->slot[SLOT_PACKER][i], (uint64_t)(i + 1) << 40);
+			if (item[i].fixed == fixed && !f->failed && !fill_region(f, i)) return refuse_empty(s, i);
 	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
 	if (!f->n && !d->source.n)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,

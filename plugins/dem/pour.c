@@ -11,6 +11,7 @@ typedef struct {
 	const dem *d;
 	const quern_step *s;
 	const source *item;
+	region region;
 	uint32_t i;      /* number of the source */
 	radius_law law;  /* a stream of draws of its own */
 	placer placer;   /* what is near the region */
@@ -38,10 +39,7 @@ static bool is_due(const pouring *p) { return p->rest >= mass_of(p, waiting(p));
 static quern_real job_radius(quern_pack_job *job) { return waiting(job->scene); }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
-	const source *item = ((const pouring *)job->scene)->item;
-	for (uint32_t k = 0; k < job->dim; k++)
-		if (!(x[k] >= item->lower[k] && x[k] <= item->upper[k])) return false;
-	return true;
+	return quern_region_holds(&((const pouring *)job->scene)->region, x);
 }
 
 static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
@@ -215,7 +213,8 @@ quern_status quern_dem_pour(const void *self, const quern_step *s) {
 	quern_status status = QUERN_OK;
 	p.law.stream += 2; /* after those of the fill and of its packers */
 	for (p.i = 0; p.i < p.d->source.n && p.i < n && status == QUERN_OK; p.i++) {
-		p.item = (const source *)p.d->source.items + p.i;
+		p.item = quern_source_at(&p.d->source, p.i);
+		p.region = quern_region_of(s, &s->slot[SLOT_SOURCE_REGION][p.i], p.item->lower, p.item->upper);
 		p.n = 0;
 		if (quern_source_acts(p.item, s)) status = pour_one(&p);
 	}
