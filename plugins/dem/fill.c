@@ -33,14 +33,6 @@ static quern_real mass_of(const dem *d, const dem_place *grain) {
 	return quern_radius_mass(grain->radius, d->material[grain->kind].density, d->dim);
 }
 
-/* m, the widest grain that these shares may bring; NULL: that any material may. */
-static quern_real most_of(const dem *d, const quern_real *share) {
-	quern_real most = 0;
-	for (uint32_t k = 0; k < d->n_materials; k++)
-		if (!share || share[k] > 0) most = fmax(most, quern_radius_most(&d->material[k].radii));
-	return most;
-}
-
 static void add(filling *f, const dem_place *grain) {
 	if (f->n == f->cap) {
 		f->cap = f->cap ? 2 * f->cap : 1024;
@@ -58,16 +50,17 @@ static void add(filling *f, const dem_place *grain) {
 }
 
 static void choose_material(filling *f) {
-	const quern_real *share = f->item->share;
+	const quern_real *share = f->item->of.share;
 	f->kind = 0;
-	if (f->item->mix.n) f->kind = quern_dem_mix(f->d, share, f->placed, f->step->host, f->draws);
+	if (f->item->of.mix.n)
+		f->kind = quern_dem_mix(f->d, share, f->placed, f->step->host, STREAM_FILLS, f->draws);
 	else
 		while (!(share[f->kind] > 0)) f->kind++;
 }
 
 static quern_real job_radius(quern_pack_job *job) {
 	const filling *f = job->scene;
-	return quern_radius_draw(&f->d->material[f->kind].radii, job->host, f->draws);
+	return quern_dem_radius(f->d, (uint32_t)f->kind, job->host, STREAM_FILLS, f->draws);
 }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
@@ -131,9 +124,9 @@ static uint32_t fill_region(filling *f, uint32_t i) {
 	quern_region_put_above(&f->region, s, &item->above, SLOT_BODIES, f->pose);
 	const dem_fill *fill = f->d->fill.items;
 	quern_real others = 0;
-	for (uint32_t k = 0; k < f->d->fill.n; k++) others = fmax(others, most_of(f->d, fill[k].share));
-	f->widest = quern_dem_widest(f->d, item->share);
-	f->reach = 2 * most_of(f->d, item->share) + 2 * others;
+	for (uint32_t k = 0; k < f->d->fill.n; k++) others = fmax(others, quern_dem_most(f->d, fill[k].of.share));
+	f->widest = quern_dem_widest(f->d, item->of.share);
+	f->reach = 2 * quern_dem_most(f->d, item->of.share) + 2 * others;
 	memset(f->placed, 0, sizeof f->placed);
 	choose_material(f);
 	f->placer.n_bodies = item->fixed ? 0 : s->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
@@ -281,7 +274,7 @@ static quern_real widest_of(const dem_place *grain, uint32_t n, quern_real most)
 /* The placer's cells hold the widest grain that any source may bring. */
 static quern_status open_placer(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
-	quern_real most = most_of(f->d, NULL);
+	quern_real most = quern_dem_most(f->d, NULL);
 	most = widest_of(f->d->place.items, f->d->place.n, most);
 	most = widest_of(table->grain, table->n, most);
 	for (uint32_t k = 0; k < s->dim; k++)
@@ -302,7 +295,7 @@ static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 	char param[40];
 	quern_real grains = 1, least = INFINITY;
 	for (uint32_t k = 0; k < d->n_materials; k++)
-		if (item->share[k] > 0) least = fmin(least, d->material[k].radii.mean);
+		if (item->of.share[k] > 0) least = fmin(least, d->material[k].radii.mean);
 	for (uint32_t k = 0; k < d->dim; k++) {
 		const quern_real across = (item->upper[k] - item->lower[k]) / (2 * least);
 		grains *= across > 1 ? across : 1;
@@ -363,7 +356,10 @@ static void warn_of_softness(const dem *d, const quern_step *s) {
 
 static quern_status open_books(const dem *d, const quern_step *s) {
 	const quern_status status = d->outlets ? book_open(s, "grain_face", outlet_faces(s)) : QUERN_OK;
-	return status == QUERN_OK && d->sources ? book_open(s, "grain_source", d->source.n) : status;
+	if (status != QUERN_OK || !d->sources) return status;
+	if (d->blends && book_open(s, "grain_share", d->source.n * d->n_materials) != QUERN_OK)
+		return QUERN_E_MEMORY;
+	return book_open(s, "grain_source", d->source.n);
 }
 
 quern_status quern_dem_fill(const void *self, const quern_step *s) {

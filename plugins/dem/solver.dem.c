@@ -12,15 +12,16 @@ static const quern_param mix_rows[] = { QUERN_PARAM_AS(dem_share, name, "materia
 											.flags = QUERN_REQUIRED),
 	QUERN_PARAM(dem_share, share, "1", "Of the mass.", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1),
 	QUERN_END_PARAMS };
+#define BLEND_ROWS(T)                                                                                        \
+	QUERN_PARAM_AS(T, of.material, "material", NULL, "Of which material they are; default: the first.",      \
+		.flags = QUERN_MAYBE, .unless = "mix"),                                                              \
+		QUERN_PARAM_AS(T, of.mix, "mix", NULL,                                                               \
+			"Of which materials they are, by share of the mass: {sand: 70 %, steel: 30 %}.",                 \
+			.rows = mix_rows, .item_size = sizeof(dem_share), .text = "material", .max = MOST_MATERIALS)
 static const quern_param fill_rows[] = { REGION_ABOVE(dem_fill),
 	QUERN_PARAM(dem_fill, velocity, "m/s", "Velocity at the start."),
 	QUERN_PARAM(dem_fill, settle, NULL, "Let the grains come to rest before time starts."),
-	QUERN_PARAM(dem_fill, fixed, NULL, "These grains never move: a rough floor."),
-	QUERN_PARAM(dem_fill, material, NULL, "Of which material they are; default: the first.",
-		.flags = QUERN_MAYBE, .unless = "mix"),
-	QUERN_PARAM(dem_fill, mix, NULL,
-		"Of which materials they are, by share of the mass: {sand: 70 %, steel: 30 %}.", .rows = mix_rows,
-		.item_size = sizeof(dem_share), .text = "material", .max = MOST_MATERIALS),
+	QUERN_PARAM(dem_fill, fixed, NULL, "These grains never move: a rough floor."), BLEND_ROWS(dem_fill),
 	QUERN_END_PARAMS };
 static const quern_param place_rows[] = { QUERN_PARAM(
 											  dem_place, position, "m", "Centre.", .flags = QUERN_REQUIRED),
@@ -53,7 +54,7 @@ static const quern_param pair_rows[] = {
 		.rows = word_rows, .item_size = sizeof(dem_word), .flags = QUERN_REQUIRED),
 	QUERN_END_PARAMS
 };
-static const quern_param source_rows[] = { SOURCE_KEYS(100), QUERN_END_PARAMS };
+static const quern_param source_rows[] = { SOURCE_KEYS(100), BLEND_ROWS(dem_source), QUERN_END_PARAMS };
 static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .unless = "materials"),
 	QUERN_PARAM(dem, materials, NULL,
 		"Several materials, by name: {sand: {density: ..., radius: ...}, ...}. The first stands for all "
@@ -72,8 +73,8 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 	QUERN_PARAM(dem, file, NULL,
 		"Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed] [material].",
 		.flags = QUERN_FILE | QUERN_ONCE),
-	QUERN_PARAM(dem, source, NULL, "Regions that pour grains, of the first material where there are several.",
-		.rows = source_rows, .item_size = sizeof(source)),
+	QUERN_PARAM(
+		dem, source, NULL, "Regions that pour grains.", .rows = source_rows, .item_size = sizeof(dem_source)),
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
@@ -107,6 +108,9 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(dem, sources, NULL, "Keep books of sources; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, blends, NULL,
+		"Keep what sources have poured of each material; set by itself where one pours a mix.",
+		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -130,6 +134,10 @@ static const quern_set sets[] = { { .name = "grain",
 		.plural = "grain_sources",
 		.doc = "What each source has poured.",
 		.when = "sources" },
+	{ .name = "grain_share",
+		.plural = "grain_shares",
+		.doc = "What each source has poured of each material, source by source.",
+		.when = "blends" },
 	{ .name = NULL } };
 
 static quern_status place_fills(
@@ -384,8 +392,8 @@ static quern_real force_under(
 static bool is_in_bed(const dem *d, uint32_t k) {
 	const dem_fill *fill = d->fill.items;
 	for (uint32_t i = 0; i < d->fill.n; i++)
-		if (!fill[i].fixed && fill[i].share[k] > 0) return true;
-	return k == 0 && (d->source.n || d->n_materials == 1);
+		if (!fill[i].fixed && fill[i].of.share[k] > 0) return true;
+	return quern_dem_pours(d, k) || d->n_materials == 1;
 }
 
 /* How far the softest pair of materials gives way under the fill, were it all of the densest. */
