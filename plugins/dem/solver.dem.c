@@ -319,6 +319,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
+	setup->host->publish(setup, "grain.widest", "m", 2 * quern_dem_most(d, NULL));
 	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
 	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->material[0].density);
