@@ -307,10 +307,19 @@ static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 		0x1p30);
 }
 
-static quern_status refuse_empty(const quern_step *s, uint32_t i) {
+/* Where others stand in the way an item may bring nothing; where there is no place for it, it cannot be meant. */
+static quern_status fill_item(filling *f, uint32_t i) {
+	const quern_step *s = f->step;
+	const bool above = ((const dem_fill *)f->d->fill.items)[i].above.n;
+	const uint32_t before = f->n, held = fill_region(f, i);
 	char param[40];
-	snprintf(param, sizeof param, "fill.%u.region", i);
-	return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "no place of the domain lies in the region");
+	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
+	snprintf(param, sizeof param, "fill.%u.%s", i, held ? "above" : "region");
+	if (!held)
+		return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "no place of the domain lies in the region");
+	if (above && f->n == before)
+		return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "no grain of the region has room above that");
+	return QUERN_OK;
 }
 
 static quern_status fill_all(filling *f, const grain_table *table) {
@@ -322,9 +331,9 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = check_fill(d, s, i);
 	if (status != QUERN_OK) return status;
 	for (int fixed = 1; fixed >= 0; fixed--) /* floors first: what falls must find them */
-		for (uint32_t i = 0; i < d->fill.n; i++)
-			if (item[i].fixed == fixed && !f->failed && !fill_region(f, i)) return refuse_empty(s, i);
-	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
+		for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++)
+			if (item[i].fixed == fixed) status = fill_item(f, i);
+	if (status != QUERN_OK) return status;
 	if (!f->n && !d->source.n)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"no grain has room: is the region too small, or a body in it?");

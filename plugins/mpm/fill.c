@@ -84,7 +84,8 @@ static quern_status find_places(
 	if (f->n) return QUERN_OK;
 	snprintf(param, sizeof param, "fill.%u.region", i);
 	return s->host->stop(s->run, QUERN_E_PARAM, param, -1,
-		"no point lies in the region: is it thinner than the points are apart, %.2g m?", p->cell / p->points);
+		"no point lies in the region%s: is it thinner than the points are apart, %.2g m?",
+		item->above.n ? " and above that body" : "", p->cell / p->points);
 }
 
 static void place(const mpm *p, const quern_step *s, const filling *f, uint32_t i) {
