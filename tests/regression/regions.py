@@ -106,7 +106,7 @@ def no_body(base):
     plan = lab.plan(base / "scene.yaml")
     said = json.loads(subprocess.run([lab.QUERN, "describe", "grains", "--json"], check=True, capture_output=True, text=True).stdout)
     slots = {slot["name"]: slot["kind"] for slot in said["slots"]}
-    assert slots["fill.region"] == slots["source.region"] == "body" and slots["bodies"] == "body", slots
+    assert slots["fill.region"] == slots["source.region"] == "body", slots
     counted = {entry["name"] for entry in plan["sets"]}
     assert "grain_share" in counted and {"grain_share.mass", "grain_share.share"} <= {
         field["name"] for entry in plan["sets"] for field in entry["fields"]}, counted
