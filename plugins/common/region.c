@@ -73,29 +73,37 @@ void quern_region_put_above(
 	r->pose = pose;
 }
 
-/* Down from the place, each time as far as the body surely is not (Hart 1996, Vis. Comput. 12:527). What passes nearer than a
- * hundred thousandth of the domain has met it. */
-static bool is_over(const region *r, int32_t b, const quern_real x[3]) {
+static quern_real gap_to(const region *r, int32_t b, const quern_real x[3]) {
+	return quern_body_gap(&r->body[b], &r->pose[b], r->dim, x, 0, NULL);
+}
+
+/* Down from a place outside of it, each time as far as the body surely is not (Hart 1996, Vis. Comput. 12:527). What passes nearer
+ * than a hundred thousandth of the domain has met it. */
+static bool falls_on(const region *r, int32_t b, const quern_real x[3]) {
 	const quern_real near = 1e-5 * r->deep;
-	quern_real at[3] = { x[0], x[1], x[2] }, way = 0;
-	quern_real gap = quern_body_gap(&r->body[b], &r->pose[b], r->dim, at, 0, NULL);
-	if (gap < 0) return false;
+	quern_real at[3] = { x[0], x[1], x[2] }, way = 0, gap = gap_to(r, b, at);
 	while (gap > near && way < r->deep) {
 		way += gap;
 		for (uint32_t k = 0; k < r->dim; k++) at[k] = x[k] + way * r->down[k];
-		gap = quern_body_gap(&r->body[b], &r->pose[b], r->dim, at, 0, NULL);
+		gap = gap_to(r, b, at);
 	}
 	return gap <= near;
+}
+
+/* Above one of them, and in none. */
+static bool is_above(const region *r, const quern_real x[3]) {
+	const region_floor *floor = r->above->items;
+	bool on = false;
+	for (uint32_t i = 0; i < r->above->n; i++)
+		if (gap_to(r, floor[i].body, x) < 0) return false;
+	for (uint32_t i = 0; i < r->above->n && !on; i++) on = falls_on(r, floor[i].body, x);
+	return on;
 }
 
 bool quern_region_holds(const region *r, const quern_real x[3]) {
 	for (uint32_t k = 0; k < r->dim; k++)
 		if (!(x[k] >= r->lower[k] && x[k] <= r->upper[k])) return false;
-	if (!(gap_of(r, x) <= r->slack)) return false;
-	const region_floor *floor = r->above ? r->above->items : NULL;
-	bool over = !floor;
-	for (uint32_t i = 0; floor && i < r->above->n && !over; i++) over = is_over(r, floor[i].body, x);
-	return over;
+	return gap_of(r, x) <= r->slack && (!r->above || is_above(r, x));
 }
 
 region_side quern_region_side(const region *r, const quern_real lower[3], const quern_real upper[3]) {

@@ -10,7 +10,7 @@ typedef struct region {
 	quern_real lower[3], upper[3]; /* m, of a box around it */
 	quern_real slack;              /* m: a place so far outside is on the surface, but for rounding */
 	/* ---- where it is above bodies ---- */
-	const quern_list *above;  /* of region_floor; NULL or empty: wherever it is */
+	const quern_list *above;  /* of region_floor; NULL: wherever it is */
 	const quern_bound *body;  /* all bodies, */
 	const body_pose *pose;    /* and where they are */
 	quern_real down[3], deep; /* the direction of gravity; m, no way through the domain is longer */

@@ -312,7 +312,8 @@ static void above(void **unused) {
 		lowest = fmin(lowest, x[1]), least = fmin(least, x[0]), most = fmax(most, x[0]);
 	}
 	good &= table_row("shelf: lowest centre, m", lowest, 0.405, 0.001);
-	good &= table_row("  leftmost", least, 0.2, 0.002) & table_row("  rightmost", most, 0.6, 0.002);
+	good &= table_row("  leftmost", least, 0.2, 0.002);
+	good &= table_row("  rightmost", most, 0.6, 0.002);
 	good &= table_row("  grains, over those of a box as large", n * pi * 25e-6 / (0.4 * 0.4), 0.78, 0.03);
 	harness_close(run);
 	assert_true(good);

@@ -82,16 +82,21 @@ def poured(base):
 
 
 def stage(place, scene, base):
-    """New shares count from then on; before, nothing changes."""
+    """New shares, and a narrower region, count from then on; before, nothing changes."""
     one, other = "mix: {sand: 60 %, steel: 30 %, cork: 10 %}", "{sand: 10 %, steel: 80 %, cork: 10 %}"
     assert one in SCENE
-    change = f"--set=stages=[{{for: 93 ms}}, {{set: {{grains.source.0.mix: {other}}}}}]"
+    change = f"--set=stages=[{{for: 93 ms}}, {{set: {{grains.source.0.mix: {other}, grains.source.0.region.cylinder.radius: 0.01}}}}]"
     lab.run(scene, place / "two", change)
     lab.run(scene, place / "two_stopped", change, "--until=0.1", threads=2)
     lab.run(scene, place / "two_stopped", change, resume=True)
     lab.same(place / "two", place / "two_stopped", "two mixes, stopped")
     a, b = lab.frames(base), lab.frames(place / "two")
     assert (shares(a[9]) == shares(b[9])).all() and (shares(a[-1]) != shares(b[-1])).any()
+    highest = []
+    for path in (a[-1], b[-1]):
+        with h5py.File(path) as file:
+            highest.append(file["grains/position"][:, 1].max())
+    assert highest[0] > 0.215 > highest[1], highest
     mass = shares(b[-1])
     print(f"after the stage {mass.sum():.4g} kg, {mass / mass.sum()}")
     assert abs(mass / mass.sum() - SHARE[1]).max() * mass.sum() < 0.03 and mass.sum() > 2, mass
