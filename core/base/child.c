@@ -105,7 +105,7 @@ typedef struct {
 	sigset_t mask;
 } errand;
 
-static bool is_one; /* set once, when such a child begins */
+static bool is_one; /* of this process, set once, when such a child begins: see docs/decisions/0013 */
 
 bool quern_child_is_one(void) { return is_one; }
 

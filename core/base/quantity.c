@@ -40,7 +40,7 @@ static ut_unit *parse(ut_system *system, const char *unit) {
 	return ut_parse(system, unit, UT_UTF8);
 }
 
-/* To UDUNITS-2 an angle is a pure number; a friction of "30 deg" is none. */
+/* To UDUNITS-2 an angle is a pure number; a share of "30 deg" is none. */
 static bool is_angle(const ut_unit *unit) {
 	char text[64];
 	return ut_format(unit, text, sizeof text, UT_ASCII | UT_DEFINITION) > 0 && strstr(text, "rad");

@@ -120,3 +120,8 @@ bool quern_is_name(const char *name) {
 		if (!isalnum((unsigned char)*name) && *name != '_') return false;
 	return true;
 }
+
+bool quern_same_head(const char *a, const char *b) {
+	const size_t n = strcspn(a, ".");
+	return n == strcspn(b, ".") && !strncmp(a, b, n);
+}

@@ -37,3 +37,6 @@ void quern_number(double value, char out[32]);
 
 /* true if `name` is letters, digits and underscores, starting with a letter */
 bool quern_is_name(const char *name);
+
+/* true if the first parts of two dotted names are one: "time.end", "time" */
+bool quern_same_head(const char *a, const char *b);

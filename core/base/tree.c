@@ -400,7 +400,8 @@ const char *quern_node_say(const quern_node *node, char buffer[64]) {
 	return buffer;
 }
 
-/* The one thing in a list's item, {plane: {name: gate, ...}}, by its name, "gate", or by what it is if no other is: "plane". */
+/* The one thing in a list's item, {kind: {name: one, ...}}, by its name, "one", or by what it is if no other is:
+ * "kind". */
 static quern_entry *called(quern_node *list, const char *name) {
 	quern_entry *found = NULL;
 	size_t n = 0;
@@ -420,7 +421,7 @@ static quern_entry *descend(quern_node *node, const char *key, quern_mark mark) 
 		const quern_entry *item = quern_node_item(node, key);
 		return item ? &node->entries[item - node->entries] : called(node, key);
 	}
-	if (node->kind == QUERN_NODE_SCALAR) { /* a plugin's bare name is opened: affine -> {affine: {}} */
+	if (node->kind == QUERN_NODE_SCALAR) { /* a plugin's bare name is opened: word -> {word: {}} */
 		const bool bare = !strcmp(node->text, key);
 		if (!bare && !quern_node_is_null(node)) return NULL;
 		free(node->text);

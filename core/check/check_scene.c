@@ -110,8 +110,7 @@ static void look_at_sums(const short_run *s) {
 	if (begun > 0)
 		quern_check_measure(s->mass, fabs(quern_run_mass_defect(s->run, &a)), 1e-9,
 			"mass and what is owed are %.12g kg at t = %.6g s, %.12g kg have left beyond what was poured, "
-			"and it "
-			"was %.12g kg after the set-up",
+			"and it was %.12g kg after the set-up",
 			now, time, passed, begun);
 }
 

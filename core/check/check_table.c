@@ -53,7 +53,7 @@ void quern_check_parameter_rows(const check *c, quern_check_tally *t, const quer
 			t, row->type != QUERN_T_REAL || row->unit, "%s: a number has a unit; \"1\" if it is pure", name);
 		check_default(t, row);
 		for (const quern_param *other = rows; other != row; other++) {
-			/* "boundary" beside "boundary.frictional" is a choice or a map */
+			/* "law" beside "law.key" is a choice or a map */
 			const bool both = !strcmp(other->name, name) ||
 							  (!row->choices && !other->choices &&
 								  (same_name(other->name, name) || same_name(name, other->name)));

@@ -92,6 +92,7 @@ static json_t *param_json(const quern_param *row) {
 	if (row->unit) json_object_set_new(one, "unit", json_string(row->unit));
 	json_object_set_new(one, "required", json_boolean(row->flags & QUERN_REQUIRED));
 	json_object_set_new(one, "advanced", json_boolean(row->flags & QUERN_ADVANCED));
+	json_object_set_new(one, "once", json_boolean(row->flags & QUERN_ONCE));
 	quern_param_range(row, range);
 	if (*range) json_object_set_new(one, "range", json_string(range));
 	if (row->from) json_object_set_new(one, "from", json_string(row->from));
@@ -145,6 +146,7 @@ static void print_param(const quern_param *row, int indent) {
 			if (row->flags & QUERN_PLANAR) quern_number(row->planar, number), printf(" (2-D: %s)", number);
 		}
 	}
+	if (row->flags & QUERN_ONCE) printf("; no stage changes it");
 	printf("\n%*s    %s\n", indent, "", row->doc ? row->doc : "");
 	for (const quern_param *r = row->rows; r && r->name; r++) print_param(r, indent + 4);
 }
@@ -232,7 +234,7 @@ static void print_scene(quern_loader *loader) {
 	puts("scene - the keys of a scene that belong to no section\n\nkeys");
 	for (const quern_param *row = quern_general_rows; row->name; row++) print_param(row, 2);
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
-		printf("  %-24s  list of %s\n      %s\n", l->name, l->item, l->doc);
+		printf("  %-24s  list of %s; no stage changes it\n      %s\n", l->name, l->item, l->doc);
 	puts("\nsections");
 	for (size_t i = 0; i < known->n_solvers; i++)
 		if (quern_section_is_claimed(&known->solvers[i]))
@@ -297,8 +299,9 @@ static json_t *scene_json(quern_loader *loader) {
 	const quern_catalogue *known = quern_loader_catalogue(loader);
 	json_t *keys = params_json(quern_general_rows), *sections = json_object();
 	for (const quern_general_list *l = quern_general_lists; l->name; l++)
-		json_array_append_new(keys, json_pack("{s:s, s:s+, s:s, s:b, s:b}", "name", l->name, "type",
-										"list of ", l->item, "doc", l->doc, "required", 0, "advanced", 0));
+		json_array_append_new(
+			keys, json_pack("{s:s, s:s+, s:s, s:b, s:b, s:b}", "name", l->name, "type", "list of ", l->item,
+					  "doc", l->doc, "required", 0, "advanced", 0, "once", 1));
 	for (size_t i = 0; i < known->n_solvers; i++)
 		if (quern_section_is_claimed(&known->solvers[i]))
 			json_object_set_new(

@@ -32,7 +32,7 @@ static void require(json_t *object, const char *name) {
 	json_array_append_new(list, json_string(name));
 }
 
-/* The map that stands under a name, made if there is none; beside it may stand a word: "boundary", "boundary.frictional". */
+/* The map that stands under a name, made if there is none; beside it may stand a word: "law", "law.key". */
 static json_t *map_in(json_t *object, const char *name) {
 	json_t *properties = json_object_get(object, "properties"), *there = json_object_get(properties, name),
 		   *one;
@@ -179,13 +179,23 @@ static void require_all(json_t *object, const char *name) {
 	if (name[n]) require_all(map_in(object, part), name + n + 1);
 }
 
-/* Of a key that is required unless there is another, and that other one, one must be given. */
+static void append_once(json_t *list, json_t *value) {
+	json_t *one;
+	size_t i;
+	json_array_foreach(list, i, one) if (json_equal(one, value)) return;
+	json_array_append(list, value);
+}
+
+/* Of a key that is required unless there is another, and that other one, one must be given; so of each such pair. */
 static void require_either(json_t *object, const quern_param *row) {
 	const size_t n = strcspn(row->name, ".");
 	char part[64];
 	snprintf(part, sizeof part, "%.*s", (int)n, row->name);
-	json_object_set_new(
-		object, "anyOf", json_pack("[{s:[s]}, {s:[s]}]", "required", part, "required", row->unless));
+	json_t *all = json_object_get(object, "allOf");
+	if (!all) json_object_set_new(object, "allOf", all = json_array());
+	json_t *either = json_pack("{s:[{s:[s]}, {s:[s]}]}", "anyOf", "required", part, "required", row->unless);
+	append_once(all, either);
+	json_decref(either);
 	if (row->name[n]) require_all(map_in(object, part), row->name + n + 1);
 }
 
@@ -233,21 +243,52 @@ static json_t *slot_schema(const context *c, const char *kind, bool list, const 
 		"items", kind_schema(c, kind, false, slot));
 }
 
-static json_t *item_of(json_t *section, const char *list) {
-	return json_array_get(
-		json_object_get(json_object_get(json_object_get(section, "properties"), list), "anyOf"), 0);
+/* The objects that items of a list may be, each once: alone, in the list, or in a map by name. */
+static void gather_items(json_t *items, json_t *schema) {
+	json_t *one, *each = json_object_get(schema, "additionalProperties");
+	size_t i;
+	if (json_object_get(schema, "properties")) {
+		json_array_foreach(items, i, one) if (one == schema) return;
+		json_array_append(items, schema);
+		return;
+	}
+	json_array_foreach(json_object_get(schema, "anyOf"), i, one) gather_items(items, one);
+	if (json_object_get(schema, "items")) gather_items(items, json_object_get(schema, "items"));
+	if (json_is_object(each)) gather_items(items, each);
+}
+
+/* An array to decref. */
+static json_t *items_of(json_t *section, const char *list) {
+	json_t *items = json_array();
+	gather_items(items, json_object_get(json_object_get(section, "properties"), list));
+	return items;
 }
 
 /* "fill.packer" stands in the items of the list "fill". */
-static json_t *home_of(json_t *section, const char *name, const char **key) {
-	const char *dot = strchr(name, '.');
-	*key = dot ? dot + 1 : name;
-	if (!dot) return section;
-	char *list = quern_copy(name);
-	list[dot - name] = 0;
-	json_t *item = item_of(section, list);
+static void put_slot(json_t *section, const quern_slot *s, json_t *value) {
+	const bool required = !s->def && (!s->list || s->required);
+	const char *dot = strchr(s->name, '.');
+	json_t *one;
+	size_t i;
+	if (!dot) {
+		put(section, s->name, value, required);
+		return;
+	}
+	char *list = quern_copy(s->name);
+	list[dot - s->name] = 0;
+	json_t *items = items_of(section, list);
+	json_array_foreach(items, i, one) put(one, dot + 1, json_incref(value), required);
+	json_decref(items);
+	json_decref(value);
 	free(list);
-	return item;
+}
+
+/* Items take keys of whatever plugins there are. */
+static void open_items(json_t *section, const char *list) {
+	json_t *items = items_of(section, list), *one;
+	size_t i;
+	json_array_foreach(items, i, one) json_object_set_new(one, "additionalProperties", json_true());
+	json_decref(items);
 }
 
 static json_t *section_schema(const context *c, const char *solver) {
@@ -261,18 +302,13 @@ static json_t *section_schema(const context *c, const char *solver) {
 	put(section, "solver", json_pack("{s:s}", "const", solver), false);
 	json_object_set_new(section, "description", json_string(f->plugin.brief ? f->plugin.brief : ""));
 	for (const quern_slot *s = ops->slots; s && s->name; s++) {
-		const char *key;
 		if (s->same_as) continue;
 		if (!*s->name) {
 			json_decref(section);
 			return slot_schema(c, s->kind->name, true, s);
 		}
-		if (s->refine) /* keys of whatever plugins there are */
-			json_object_set_new(item_of(section, s->refine), "additionalProperties", json_true());
-		json_t *home = home_of(section, s->name, &key);
-		if (home)
-			put(home, key, slot_schema(c, s->kind->name, s->list != 0, s),
-				!s->def && (!s->list || s->required));
+		if (s->refine) open_items(section, s->refine);
+		put_slot(section, s, slot_schema(c, s->kind->name, s->list != 0, s));
 	}
 	/* of another solver's keys nothing is known here */
 	json_t *other = json_pack("{s:s, s:[s], s:{s:{s:{s:s}}}}", "type", "object", "required", "solver",
@@ -282,29 +318,27 @@ static json_t *section_schema(const context *c, const char *solver) {
 
 /* ---- the whole ---- */
 
+/* One of the core's own lists, with what is said of it there. */
+static void put_list(json_t *scene, const char *name, json_t *value) {
+	for (const quern_general_list *l = quern_general_lists; l->name; l++)
+		if (!strcmp(l->name, name)) json_object_set_new(value, "description", json_string(l->doc));
+	put(scene, name, value, false);
+}
+
 static json_t *scene_schema(const context *c) {
 	json_t *scene = map_schema(quern_general_rows);
-	put(scene, "domain.periodic",
-		json_pack("{s:s, s:s, s:o, s:i, s:i}", "description",
-			"Directions in which the domain repeats itself.", "type", "array", "items", defined("switch"),
-			"minItems", 2, "maxItems", 3),
-		false);
+	put_list(scene, "domain.periodic",
+		json_pack("{s:s, s:o, s:i, s:i}", "type", "array", "items", defined("switch"), "minItems", 2,
+			"maxItems", 3));
 	json_t *faces = json_array();
 	for (int k = 0; k < 6; k++) json_array_append_new(faces, json_string(quern_face_name(k % 2, k / 2)));
-	put(scene, "domain.open",
-		json_pack("{s:s, s:s, s:{s:o}, s:i}", "description", "Faces of the domain that let material out.",
-			"type", "array", "items", "enum", faces, "maxItems", 6),
-		false);
-	put(scene, "output.fields",
-		json_pack("{s:s, s:s, s:{s:s}}", "description", "Fields to write out: SET.NAME.", "type", "array",
-			"items", "type", "string"),
-		false);
-	put(scene, "stages",
-		json_pack("{s:s, s:s, s:i, s:{s:s, s:b, s:{s:{s:[{s:s, s:f}, o]}, s:{s:s}}}}", "description",
-			"Intervals of time, one after the other, in which keys have other values.", "type", "array",
-			"minItems", 1, "items", "type", "object", "additionalProperties", false, "properties", "for",
-			"anyOf", "type", "number", "exclusiveMinimum", 0.0, defined("quantity"), "set", "type", "object"),
-		false);
+	put_list(scene, "domain.open",
+		json_pack("{s:s, s:{s:o}, s:i}", "type", "array", "items", "enum", faces, "maxItems", 6));
+	put_list(scene, "output.fields", json_pack("{s:s, s:{s:s}}", "type", "array", "items", "type", "string"));
+	put_list(scene, "stages",
+		json_pack("{s:s, s:i, s:{s:s, s:b, s:{s:{s:[{s:s, s:f}, o]}, s:{s:s}}}}", "type", "array", "minItems",
+			1, "items", "type", "object", "additionalProperties", false, "properties", "for", "anyOf", "type",
+			"number", "exclusiveMinimum", 0.0, defined("quantity"), "set", "type", "object"));
 	const quern_catalogue *known = quern_loader_catalogue(c->loader);
 	for (size_t i = 0; i < known->n_solvers; i++)
 		if (quern_section_is_claimed(&known->solvers[i]))

@@ -26,8 +26,8 @@ static int help(FILE *out) {
 			free(words[i]);
 	free(words);
 	fputs("\nquern COMMAND --help says what a command takes.\n"
-		  "Exit status: 0 done, 1 usage, 2 a bad scene, plugin or file, 3 the run failed, 4 files could "
-		  "not be written,\n"
+		  "Exit status: 0 done, 1 usage, 2 a bad scene, plugin or file, 3 the run failed, 4 files could not "
+		  "be written,\n"
 		  "130 interrupted with a checkpoint saved.\n",
 		out);
 	return QUERN_EXIT_DONE;

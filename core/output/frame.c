@@ -38,21 +38,51 @@ static void describe(quern_h5 *h, hid_t set, const char *unit, const char *doc, 
 	H5Dclose(set);
 }
 
+/* Indices into a set, counted as its entries come in the file; `entry` and `of`: the orders of the set and of that one. */
+static int32_t *indices_of(
+	const quern_field *field, const uint32_t *entry, size_t n, const quern_set_store *of) {
+	const int32_t *index = field->data[field->now][0];
+	int32_t *out = quern_take(n, sizeof *out);
+	uint32_t *place = of && of->entry ? quern_take(of->n, sizeof *place) : NULL;
+	for (uint32_t q = 0; place && q < of->n; q++) place[of->entry[q]] = q;
+	for (size_t q = 0; q < n; q++) {
+		const int32_t i = index[quern_nth(entry, q)];
+		out[q] = place && i >= 0 && (uint32_t)i < of->n ? (int32_t)place[i] : i;
+	}
+	free(place);
+	return out;
+}
+
+static int64_t *ids_of(const quern_field *field, const uint32_t *entry, size_t n) {
+	const int64_t *id = field->data[field->now][0];
+	int64_t *out = quern_take(n, sizeof *out);
+	for (size_t q = 0; q < n; q++) out[q] = id[quern_nth(entry, q)];
+	return out;
+}
+
+/* Entries come in the order of their blocks' places, however the set is cut. */
 static void write_field(quern_h5 *h, hid_t group, const quern_run *run, int k, size_t n) {
-	const quern_field *field = &run->plan->store.fields[k];
+	const quern_store *store = &run->plan->store;
+	const quern_field *field = &store->fields[k];
+	const uint32_t *entry = store->sets[field->set].entry;
 	const char *name = strchr(field->name, '.') + 1;
 	hid_t set;
-	if (field->shape == QUERN_INDEX)
-		set = quern_h5_write(h, group, name, H5T_NATIVE_INT32, n, 1, field->data[field->now][0]);
-	else if (field->shape == QUERN_ID)
-		set = quern_h5_write(h, group, name, H5T_NATIVE_INT64, n, 1, field->data[field->now][0]);
-	else {
+	if (field->shape == QUERN_INDEX) {
+		int32_t *index = indices_of(field, entry, n, field->target < 0 ? NULL : &store->sets[field->target]);
+		set = quern_h5_write(h, group, name, H5T_NATIVE_INT32, n, 1, index);
+		free(index);
+	} else if (field->shape == QUERN_ID) {
+		int64_t *id = ids_of(field, entry, n);
+		set = quern_h5_write(h, group, name, H5T_NATIVE_INT64, n, 1, id);
+		free(id);
+	} else {
 		int from[9];
 		const int columns = columns_of(field->shape, (uint32_t)run->scene->general.dimension, from);
 		double *table = quern_take(n * (size_t)columns, sizeof(double));
 		for (int c = 0; c < columns; c++) {
 			const double *column = from[c] < 0 ? NULL : field->data[field->now][from[c]];
-			for (size_t i = 0; i < n; i++) table[i * (size_t)columns + (size_t)c] = column ? column[i] : 0;
+			for (size_t i = 0; i < n; i++)
+				table[i * (size_t)columns + (size_t)c] = column ? column[quern_nth(entry, i)] : 0;
 		}
 		set = quern_h5_write(h, group, name, H5T_NATIVE_DOUBLE, n, (size_t)columns, table);
 		free(table);
@@ -64,12 +94,12 @@ static void write_centres(quern_h5 *h, hid_t group, const quern_run *run, size_t
 	const quern_grid_view *v = &run->grid.view;
 	double *table = quern_take(n * 3, sizeof(double));
 	for (size_t i = 0; i < n; i++) {
-		const uint32_t place = (uint32_t)(i % 64);
+		const uint32_t place = (uint32_t)(i % 64), b = quern_nth(v->by_place, (uint32_t)(i / 64));
 		const uint32_t at[3] = { place % v->edge, place / v->edge % v->edge,
 			v->dim == 3 ? place / (v->edge * v->edge) : 0 };
 		for (uint32_t k = 0; k < v->dim; k++)
 			table[3 * i + k] =
-				v->lower[k] + v->cell * (v->at[i / 64][k] * (int32_t)v->edge + (int32_t)at[k] + 0.5);
+				v->lower[k] + v->cell * (v->at[b][k] * (int32_t)v->edge + (int32_t)at[k] + 0.5);
 	}
 	describe(h, quern_h5_write(h, group, "position", H5T_NATIVE_DOUBLE, n, 3, table), "m",
 		"Centre of the cell.", "quern");

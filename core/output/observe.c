@@ -2,6 +2,7 @@
 #include "observe.h"
 #include "text.h"
 #include "watch.h"
+#include "wishes.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -20,22 +21,6 @@ static uint32_t rows_of(const quern_observer_ops *ops) {
 	uint32_t n = 0;
 	while (ops->outputs[n].name) n++;
 	return n;
-}
-
-/* How often they come. */
-static uint32_t repeats(const quern_run *run, size_t e) {
-	enum { MOST = 1000 };
-	const quern_bound *bound = &run->plan->observers[e]->bound;
-	const quern_observer_ops *ops = bound->ops;
-	if (!ops->repeat) return 1;
-	quern_watch_enter(bound->id, "repeat");
-	const uint32_t n = ops->repeat(bound->self);
-	quern_watch_leave();
-	return n < 1 ? 1 : n < MOST ? n : MOST;
-}
-
-static uint32_t outputs_of(const quern_run *run, size_t e) {
-	return rows_of(ops_of(run, e)) * repeats(run, e);
 }
 
 const char *quern_observer_label(const quern_run *run, size_t e) {
@@ -129,10 +114,13 @@ static void add_columns(quern_series *s, const quern_run *run) {
 	for (size_t k = 0; k < run->plan->store.n_sets; k++)
 		if (quern_set_is_counted(&run->plan->store.sets[k]))
 			add_column(s, quern_copy(quern_set_plural(&run->plan->store.sets[k])), "1");
+	s->n_outputs = quern_take(run->scene->observe.n, sizeof *s->n_outputs);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
 		const quern_observer_ops *ops = ops_of(run, e);
 		const char *label = quern_observer_label(run, e);
-		for (uint32_t k = 0, n = rows_of(ops); k < outputs_of(run, e); k++) {
+		const uint32_t n = rows_of(ops);
+		s->n_outputs[e] = n * quern_wish_repeats(&run->plan->observers[e]->bound);
+		for (uint32_t k = 0; k < s->n_outputs[e]; k++) {
 			const quern_output *out = &ops->outputs[k % n];
 			char *name = ops->repeat ? quern_format("%s.%s_%u", label, out->name, k / n)
 									 : quern_format("%s.%s", label, out->name);
@@ -165,6 +153,7 @@ void quern_series_finish(quern_series *s) {
 		free(s->column[c].unit);
 	}
 	free(s->column);
+	free(s->n_outputs);
 	free(s->path);
 	*s = (quern_series) { 0 };
 }
@@ -175,7 +164,9 @@ typedef struct {
 	const quern_bound *bound;
 	const quern_observer_ops *ops;
 	quern_observer_batch batch;
-	uint32_t n, n_rows, n_outputs;
+	uint32_t n_rows, n_outputs, n_leaves;
+	uint32_t (*leaf)
+		[2]; /* its first entry, and how many: a leaf lies in one block, and blocks come in the order of places */
 	bool *along;         /* by use: its column runs along the set that `map` runs over */
 	uint32_t *count;     /* by use: entries of its set */
 	quern_column *shift; /* by worker, by use: the columns from the leaf's first entry on */
@@ -184,10 +175,10 @@ typedef struct {
 
 static void ask_leaf(void *arg, uint32_t leaf, uint32_t worker) {
 	const asking *a = arg;
-	const uint32_t begin = leaf * LEAF, n_uses = a->bound->n_uses;
+	const uint32_t begin = a->leaf[leaf][0], n_uses = a->bound->n_uses;
 	quern_column *own = a->shift + (size_t)worker * n_uses;
 	quern_observer_batch b = a->batch;
-	b.n = a->n - begin < LEAF ? a->n - begin : LEAF;
+	b.n = a->leaf[leaf][1];
 	for (uint32_t r = 0; r < n_uses; r++)
 		own[r] = a->along[r] ? quern_column_from(a->bound->column[r], a->bound->uses[r].shape, begin)
 							 : a->bound->column[r];
@@ -224,26 +215,45 @@ static void look_at_uses(asking *a, quern_run *run, size_t e) {
 	}
 }
 
+static void cut_block(asking *a, uint32_t begin, uint32_t end) {
+	for (; begin < end; begin += LEAF) {
+		a->leaf[a->n_leaves][0] = begin;
+		a->leaf[a->n_leaves++][1] = end - begin < LEAF ? end - begin : LEAF;
+	}
+}
+
+static bool cut_set(asking *a, const quern_parts *p) {
+	a->leaf = malloc(((size_t)p->owned / LEAF + p->n_blocks + 1) * sizeof *a->leaf);
+	if (!a->leaf) return false;
+	for (uint32_t q = 0; q < p->n_blocks; q++) {
+		const uint32_t b = quern_nth(p->by_place, q);
+		cut_block(a, p->block[b], p->block[b + 1]);
+	}
+	if (!p->n_blocks) cut_block(a, 0, p->owned);
+	return true;
+}
+
 static quern_status ask_all(asking *a, quern_run *run, double *out) {
 	a->batch.count = a->ops->set ? NULL : a->count;
 	if (!a->ops->set) return a->ops->whole(a->bound->self, &a->batch, out, &quern_host_table, run);
-	a->n = quern_host_table.set(run, a->ops->set).n;
-	const uint32_t leaves = a->n / LEAF + (a->n % LEAF > 0);
-	a->partial = malloc(((size_t)leaves * a->n_outputs + 1) * sizeof(double));
-	if (!a->partial) return QUERN_E_MEMORY;
-	quern_pool_each(run->pool, leaves, ask_leaf, a);
-	fold(a, leaves, out);
+	const quern_parts *p = quern_host_table.parts(run, a->ops->set);
+	const bool good = !p || cut_set(a, p);
+	if (good) a->partial = malloc(((size_t)a->n_leaves * a->n_outputs + 1) * sizeof(double));
+	if (a->partial) {
+		quern_pool_each(run->pool, a->n_leaves, ask_leaf, a);
+		fold(a, a->n_leaves, out);
+	}
+	const quern_status status = a->partial ? QUERN_OK : QUERN_E_MEMORY;
+	free(a->leaf);
 	free(a->partial);
-	return QUERN_OK;
+	return status;
 }
 
-static quern_status ask(quern_run *run, size_t e, double *out) {
+static quern_status ask(quern_run *run, size_t e, uint32_t n_outputs, double *out) {
 	const quern_bound *bound = &run->plan->observers[e]->bound;
 	const quern_general *g = &run->plan->scene->general;
 	const size_t n_uses = (size_t)bound->n_uses + 1;
-	asking a = {
-		.bound = bound, .ops = bound->ops, .n_rows = rows_of(bound->ops), .n_outputs = outputs_of(run, e)
-	};
+	asking a = { .bound = bound, .ops = bound->ops, .n_rows = rows_of(bound->ops), .n_outputs = n_outputs };
 	a.batch = (quern_observer_batch) {
 		.dim = (uint32_t)g->dimension, .time = quern_run_time(run), .use = bound->column
 	};
@@ -266,7 +276,7 @@ static quern_status ask(quern_run *run, size_t e, double *out) {
 
 /* Numbers that are not finite come out nowhere: they end the run, which says whose they are. */
 static quern_status take_answers(quern_series *s, quern_run *run, size_t e, size_t first, const double *out) {
-	for (uint32_t k = 0; k < outputs_of(run, e); k++) {
+	for (uint32_t k = 0; k < s->n_outputs[e]; k++) {
 		if (!isfinite(out[k]))
 			return quern_run_stop(run, QUERN_E_NUMERIC,
 				"observer %s: column %s is %s at t = %.6g s (step %lld)", quern_observer_label(run, e),
@@ -299,10 +309,10 @@ quern_status quern_series_add(quern_series *s, quern_run *run) {
 		if (quern_set_is_counted(&run->plan->store.sets[k]))
 			note(&s->column[c++], run->plan->store.sets[k].n);
 	for (size_t e = 0; e < run->scene->observe.n; e++) {
-		const uint32_t n = outputs_of(run, e);
+		const uint32_t n = s->n_outputs[e];
 		double *out = calloc(n + 1u, sizeof *out);
 		quern_watch_enter(run->plan->observers[e]->bound.id, ops_of(run, e)->map ? "map" : "whole");
-		quern_status status = out ? ask(run, e, out) : QUERN_E_MEMORY;
+		quern_status status = out ? ask(run, e, n, out) : QUERN_E_MEMORY;
 		quern_watch_leave();
 		if (status == QUERN_OK) status = take_answers(s, run, e, c, out);
 		free(out);

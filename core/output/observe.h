@@ -14,6 +14,7 @@ typedef struct quern_observed {
 typedef struct quern_series {
 	quern_observed *column;
 	size_t n, capacity;
+	uint32_t *n_outputs; /* by observer: columns that are its own */
 	int64_t rows;
 	char *path; /* NULL: nothing is written */
 } quern_series;

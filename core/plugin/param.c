@@ -529,7 +529,7 @@ void quern_params_read(const quern_reading *r, const char *owner, const quern_pa
 		void *member = (char *)instance + row->offset;
 		const quern_entry *entry = walk(map, row->name, NULL);
 		const quern_node *node = entry ? entry->value : NULL;
-		bool opens = false; /* "boundary" beside "boundary.frictional": a map is for the others */
+		bool opens = false; /* "law" beside "law.key": a map is for the others */
 		for (const quern_param *other = rows; other->name; other++)
 			opens = opens || is_prefix(row->name, other->name);
 		if (node && opens && node->kind == QUERN_NODE_MAP) node = NULL;

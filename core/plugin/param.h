@@ -52,5 +52,5 @@ double quern_param_default(const quern_param *, uint32_t dim);
 /* "between 0 and 1", "above 0", "" */
 void quern_param_range(const quern_param *, char out[96]);
 
-/* Where a dotted name stands ("fill.0.region"), or as much of it as there is; else `fallback`. */
+/* Where a dotted name stands ("list.0.key"), or as much of it as there is; else `fallback`. */
 quern_mark quern_param_mark(const quern_node *map, const char *name, quern_mark fallback);

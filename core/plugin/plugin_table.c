@@ -190,6 +190,10 @@ static bool use(quern_table_reader *r, const char *of, const quern_use *row, con
 		row->shape > QUERN_ID || row->hook > 2 || row->flags > 2 * QUERN_EXISTS - 1 ||
 		(row->flags & QUERN_EXISTS && row->access != QUERN_READ))
 		return quern_table_refuse(r, "%s: access, shape, hook or flags of %s are unknown", of, row->field);
+	const bool number = row->shape != QUERN_INDEX && row->shape != QUERN_ID;
+	if (row->rule > QUERN_OWN || ((row->rule == QUERN_SUMS || row->rule == QUERN_MEANS) && !number))
+		return quern_table_refuse(
+			r, "%s: the rule of %s is unknown, or asks for sums of what is no number", of, row->field);
 	if (!is_unit(row->unit) || !is_doc(row->doc))
 		return quern_table_refuse(r, "%s: unit or doc of %s is no plain text", of, row->field);
 	if (row->when && (!is_dotted(row->when, 0) || !quern_param_find(params, row->when)))

@@ -43,8 +43,7 @@ void *quern_table_ops_for(const quern_table *t, const quern_kind *kind, quern_te
 	if (size > kind->ops_size) {
 		quern_text_add(why,
 			"has %u bytes of functions, where whoever calls it knows %u of a %s: it is built with a newer "
-			"header "
-			"of its kind; rebuild both with one",
+			"header of its kind; rebuild both with one",
 			size, kind->ops_size, kind->name);
 		return NULL;
 	}
@@ -274,14 +273,6 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 		!outputs(r, "sums", &ops->sums, ops->output_size, QUERN_MOST_SUMS, &n_sums))
 		return false;
 	if (!n_stages) return quern_table_refuse(r, "a solver without stages");
-	bool settles = !ops->settled;
-	for (size_t i = 0; i < n_stages; i++) {
-		quern_stage s = { .name = NULL };
-		memcpy(&s, (const char *)ops->stages + i * ops->stage_size,
-			ops->stage_size < sizeof s ? ops->stage_size : sizeof s);
-		settles = settles || s.flags & QUERN_SETTLES;
-	}
-	if (!settles) return quern_table_refuse(r, "settled is there, and no stage has QUERN_SETTLES");
 	if (!n_sums != !ops->account) return quern_table_refuse(r, "sums and account go together");
 	quern_set *own_sets = copy(r, ops->sets, ops->set_size, sizeof *own_sets, n_sets);
 	quern_slot *own_slots = copy(r, ops->slots, ops->slot_size, sizeof *own_slots, n_slots);
@@ -289,8 +280,12 @@ static bool solver(quern_table_reader *r, quern_solver_ops *ops) {
 	ops->sets = own_sets, ops->slots = own_slots, ops->stages = own_stages;
 	if (own_stages[0].when)
 		return quern_table_refuse(r, "stage %.60s: the first one hangs on no parameter", own_stages[0].name);
-	for (size_t i = 0; i < n_stages; i++)
+	bool settles = !ops->settled;
+	for (size_t i = 0; i < n_stages; i++) {
 		if (!stage(r, &own_stages[i])) return false;
+		settles = settles || own_stages[i].flags & QUERN_SETTLES;
+	}
+	if (!settles) return quern_table_refuse(r, "settled is there, and no stage has QUERN_SETTLES");
 	for (size_t i = 0; i < n_sets; i++)
 		if (!set(r, ops, &own_sets[i])) return false;
 	for (size_t i = 0; i < n_slots; i++)

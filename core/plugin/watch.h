@@ -2,7 +2,8 @@
 /* watch - which plugin is being called, so that a crash in it, or its end of the program, is a sentence and status 3
  *
  * Calls are marked from the main thread alone; of a crash in a worker the address tells the plugin. What a signal
- * handler needs is the one thing here that lives outside of a run: see docs/decisions/0013. */
+ * handler needs lives outside of a run, as nothing else does but what base/child.c notes of its process: see
+ * docs/decisions/0013. */
 #pragma once
 #include "loader.h"
 

@@ -17,6 +17,19 @@ static double *sum_named(quern_account *a, const quern_output *row) {
 	return &a->sum[a->n++].value;
 }
 
+void quern_account_check(const quern_scene *scene) {
+	quern_account all = { .n = 0 };
+	for (size_t i = 0; i < scene->n_sections; i++) {
+		const quern_section *s = &scene->sections[i];
+		for (const quern_output *row = s->ops->sums; row && row->name; row++) {
+			if (sum_named(&all, row)) continue;
+			quern_report_add(scene->report, s->mark, "%s and the sections before it give more than %d sums",
+				s->name, QUERN_MOST_SUMS);
+			return;
+		}
+	}
+}
+
 static void add_section(quern_account *a, const quern_section *s, const quern_step *step) {
 	double value[QUERN_MOST_SUMS] = { 0 };
 	quern_watch_enter(s->solver->file->plugin.id, "account");

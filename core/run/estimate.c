@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "estimate.h"
+#include "wishes.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -24,7 +25,7 @@ static double price(const quern_run *run, bool substeps) {
 quern_estimate quern_estimate_of(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	const double substep = price(run, true), step = price(run, false);
-	quern_estimate e = { .substeps = quern_run_substeps(run) };
+	quern_estimate e = { .substeps = quern_wish_substeps(run->plan->scene) };
 	const double limit = quern_run_limit(run, &e.hard, e.reason, e.hard_reason);
 	e.step = g->step > 0 ? g->step : limit;
 	if (g->step > 0) snprintf(e.reason, sizeof e.reason, "the scene's time.step");
@@ -59,9 +60,8 @@ bool quern_estimate_is_long(const quern_estimate *e, uint32_t cores, char say[60
 	quern_estimate_time(e->settling / cores, settling);
 	quern_estimate_time(e->running / cores, running);
 	snprintf(say, 600,
-		"this will take long on %u core%s: %s of settling, %.2g steps of %.2g s, and %s of running, "
-		"%.2g steps of "
-		"%.2g s, set by %s",
+		"this will take long on %u core%s: %s of settling, %.2g steps of %.2g s, and %s of running, %.2g "
+		"steps of %.2g s, set by %s",
 		cores, cores > 1 ? "s" : "", settling, e->settle_steps, e->settle_step, running, e->steps, e->step,
 		e->reason);
 	return true;

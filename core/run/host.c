@@ -110,6 +110,30 @@ static bool host_has(quern_run *run, const char *section) {
 	return quern_scene_section(run->scene, section) != NULL;
 }
 
+static const quern_parts *host_parts(quern_run *run, const char *name) {
+	const int i = quern_store_set(&run->plan->store, name);
+	return i < 0 ? NULL : quern_store_parts(&run->plan->store, i);
+}
+
+static quern_status host_arrange(quern_run *run, const char *set, const uint32_t *by_place) {
+	const int i = quern_store_set(&run->plan->store, set);
+	if (i < 0) return quern_run_stop(run, QUERN_E_FIELD, "%s: no set of that name", set);
+	const quern_status status = quern_store_arrange(&run->plan->store, i, by_place);
+	return status == QUERN_E_MEMORY ? quern_run_stop(run, status, "out of memory for the blocks of %s", set)
+									: status;
+}
+
+static quern_real host_sum_set(quern_run *run, const char *set, const quern_real *values) {
+	const int i = quern_store_set(&run->plan->store, set);
+	return i < 0 ? 0 : quern_store_sum(&run->plan->store, i, values);
+}
+
+static void host_give(
+	quern_run *run, const char *set, uint32_t from, int32_t to, quern_real part, quern_real share) {
+	const int i = quern_store_set(&run->plan->store, set);
+	if (i >= 0) quern_store_give(&run->plan->store, i, from, to, part, share);
+}
+
 const quern_host quern_host_table = {
 	.abi = QUERN_ABI,
 	.fail = quern_scene_fail,
@@ -129,4 +153,8 @@ const quern_host quern_host_table = {
 	.extension = host_extension,
 	.has = host_has,
 	.keeps = quern_scene_keeps,
+	.parts = host_parts,
+	.arrange = host_arrange,
+	.sum_set = host_sum_set,
+	.give = host_give,
 };

@@ -4,6 +4,7 @@
 #include "run_episodes.h"
 #include "text.h"
 #include "watch.h"
+#include "wishes.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,66 +66,20 @@ static void arena_reset(quern_arena *a) {
 	a->used = a->n_extra = a->extra_bytes = 0;
 }
 
-/* The one cell that all solvers wish for; 0 after one sentence. */
-static double grid_cell(const quern_scene *scene) {
-	const quern_section *first = NULL;
-	double cell = 0;
-	for (size_t i = 0; i < scene->n_sections; i++) {
-		const quern_section *s = &scene->sections[i];
-		if (!s->ops->cell) continue;
-		quern_watch_enter(s->solver->file->plugin.id, "cell");
-		const double wish = s->ops->cell(s->solver->self);
-		quern_watch_leave();
-		if (!(wish > 0)) continue;
-		if (first && wish != cell) {
-			quern_report_add(scene->report, s->mark,
-				"%s wants a grid with cells of %.6g m, and %s one of %.6g m", s->name, wish, first->name,
-				cell);
-			return 0;
-		}
-		first = s, cell = wish;
-	}
-	if (!first) quern_report_add(scene->report, (quern_mark) { 0 }, "the grid has no cell size");
-	return cell;
-}
-
-static uint32_t substeps_of(const quern_section *);
-
-static void check_substeps(const quern_scene *scene) {
-	const quern_section *first = NULL;
-	uint32_t n = 0;
-	for (size_t i = 0; i < scene->n_sections; i++) {
-		const uint32_t wish = substeps_of(&scene->sections[i]);
-		if (first && wish && wish != n)
-			quern_report_add(scene->report, scene->sections[i].mark,
-				"%s wants %u substeps in a step, and %s %u", scene->sections[i].name, wish, first->name, n);
-		if (wish && !first) first = &scene->sections[i], n = wish;
-	}
-}
-
-/* By name: a sum that several give is one. */
-static void check_sums(const quern_scene *scene) {
-	const char *names[QUERN_MOST_SUMS];
-	size_t n = 0;
-	for (size_t i = 0; i < scene->n_sections; i++)
-		for (const quern_output *row = scene->sections[i].ops->sums; row && row->name; row++) {
-			size_t k = 0;
-			while (k < n && strcmp(names[k], row->name) != 0) k++;
-			if (k < n) continue;
-			if (n == QUERN_MOST_SUMS) {
-				quern_report_add(scene->report, scene->sections[i].mark,
-					"%s and the sections before it give more than %d sums", scene->sections[i].name,
-					QUERN_MOST_SUMS);
-				return;
-			}
-			names[n++] = row->name;
-		}
-}
-
 static bool needs_grid(const quern_store *store) {
 	for (size_t i = 0; i < store->n_fields; i++)
 		if (store->sets[store->fields[i].set].grid) return true;
 	return false;
+}
+
+static void init_grid(quern_run *run) {
+	const quern_general *g = &run->scene->general;
+	if (quern_grid_init(&run->grid, (uint32_t)g->dimension, quern_wish_cell(run->scene), g->lower, g->upper,
+			g->periodic) != QUERN_OK)
+		quern_report_add(run->scene->report,
+			quern_param_mark(run->scene->tree->root, "domain.upper", (quern_mark) { 0 }),
+			"the domain has more than 2^22 cells along an axis, or 2^31 in all: make it smaller or the cells "
+			"larger");
 }
 
 /* What could not be made whole goes; the scene stays the caller's. */
@@ -142,22 +97,12 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	run->plugins = quern_plugin_hashes(scene->loader);
 	run->pool = quern_pool_create(workers);
 	if (!run->pool) return give_up(run);
-	check_substeps(scene);
-	check_sums(scene);
+	quern_account_check(scene);
 	run->plan = quern_plan_create(scene, run->pool);
-	quern_run_plan_episodes(run);
 	run->has_grid = needs_grid(&run->plan->store);
-	if (run->has_grid && !quern_report_errors(scene->report)) {
-		const quern_general *g = &scene->general;
-		const double cell = grid_cell(scene);
-		if (cell > 0 && quern_grid_init(&run->grid, (uint32_t)g->dimension, cell, g->lower, g->upper,
-							g->periodic) != QUERN_OK)
-			quern_report_add(scene->report,
-				quern_param_mark(scene->tree->root, "domain.upper", (quern_mark) { 0 }),
-				"the domain has more than 2^22 cells along an axis, or 2^31 in all: make it smaller or the "
-				"cells "
-				"larger");
-	}
+	if (!quern_report_errors(scene->report)) quern_wishes_check(scene, run->has_grid);
+	quern_run_plan_episodes(run);
+	if (run->has_grid && !quern_report_errors(scene->report)) init_grid(run);
 	const int total = quern_store_set(&run->plan->store, "total");
 	bool reserved = quern_store_fill(&run->plan->store, total, 1) == QUERN_OK;
 	for (int i = 0; i < (int)run->plan->store.n_sets;
@@ -245,22 +190,6 @@ void quern_run_frame(quern_run *run) {
 	run->clock.frame++;
 }
 
-static uint32_t substeps_of(const quern_section *s) {
-	if (!s->ops->substeps) return 0;
-	quern_watch_enter(s->solver->file->plugin.id, "substeps");
-	const uint32_t n = s->ops->substeps(s->solver->self);
-	quern_watch_leave();
-	return n;
-}
-
-/* Wishes are one, see check_substeps. */
-uint32_t quern_run_substeps(const quern_run *run) {
-	uint32_t n = 0;
-	for (size_t i = 0; i < run->plan->scene->n_sections && !n; i++)
-		n = substeps_of(&run->plan->scene->sections[i]);
-	return n ? n : 1;
-}
-
 static size_t section_index(const quern_run *run, const quern_section *section) {
 	return section ? (size_t)(section - run->plan->scene->sections) : 0;
 }
@@ -271,7 +200,7 @@ quern_step quern_run_record(quern_run *run, const quern_section *section) {
 	quern_step step = { .step = run->clock.step,
 		.substep = run->clock.settled ? run->clock.substep : run->clock.settle_step,
 		.dim = (uint32_t)g->dimension,
-		.n_substeps = quern_run_substeps(run),
+		.n_substeps = quern_wish_substeps(run->plan->scene),
 		.settling = !run->clock.settled,
 		.batch = (uint32_t)g->batch,
 		.time = quern_run_time(run),
@@ -316,7 +245,7 @@ static double limit_of(const quern_section *s, const quern_step *step, double *h
 
 double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard_reason[200]) {
 	double least = INFINITY, least_hard = INFINITY;
-	const uint32_t n = quern_run_substeps(run);
+	const uint32_t n = quern_wish_substeps(run->plan->scene);
 	snprintf(reason, 200, "nothing");
 	snprintf(hard_reason, 200, "nothing");
 	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
@@ -342,12 +271,13 @@ quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_
 	const quern_general *g = &run->plan->scene->general;
 	if (g->force || !(g->step > hard)) return QUERN_OK;
 	return quern_run_refuse(run, "time.step",
-		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it "
-		"all the same)",
+		"%.4g s is beyond the limit of %.4g s set by %s; recommended %.4g s (time.force: true takes it all "
+		"the same)",
 		g->step, hard, hard_reason, recommended);
 }
 
-/* Begins the interval to the next frame that is due, and chooses its steps from the state as it is. */
+/* Begins the interval up to the next frame that is due, or to the end of the scene's stage if that comes first, with
+ * the values that hold from here on; and chooses its steps from the state as it is. */
 static quern_status begin_interval(quern_run *run) {
 	quern_clock *c = &run->clock;
 	const quern_general *g = &run->scene->general;
@@ -524,7 +454,7 @@ static void count_steps(quern_run *run, bool substeps, uint32_t times) {
 
 static quern_status do_step(quern_run *run) {
 	quern_clock *c = &run->clock;
-	const uint32_t substeps = quern_run_substeps(run);
+	const uint32_t substeps = quern_wish_substeps(run->plan->scene);
 	quern_status status = run_phase(run, QUERN_BEGIN, c->dt);
 	for (uint32_t k = 0; k < substeps && status == QUERN_OK; k++) {
 		run->within = k;

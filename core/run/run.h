@@ -102,6 +102,8 @@ typedef struct quern_account {
 	size_t n;
 } quern_account;
 quern_account quern_run_account(quern_run *);
+/* A fault of the scene if its solvers give more sums than there is room for. */
+void quern_account_check(const quern_scene *);
 double quern_account_of(const quern_account *, const char *name); /* 0 if nobody gives it */
 double quern_run_carries(quern_run *, const char *name);
 /* What is carried, owed and has left, over what there was and was poured, less 1; 0 where there never was any mass. */
@@ -112,7 +114,6 @@ bool quern_run_accept(quern_run *, quern_text *why);
 quern_status quern_run_check_account(quern_run *);
 /* The smallest recommended long step, the smallest hard limit and what sets the first. */
 double quern_run_limit(quern_run *, double *hard, char reason[200], char hard_reason[200]);
-uint32_t quern_run_substeps(const quern_run *);
 bool quern_section_takes_substeps(const quern_section *);
 /* Ends the run: keeps the first message. */
 quern_status quern_run_stop(quern_run *, quern_status, const char *fmt, ...)

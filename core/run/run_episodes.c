@@ -1,33 +1,49 @@
 /* SPDX-License-Identifier: MIT */
 #include "run_episodes.h"
 #include "episodes.h"
+#include "wishes.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* ---- plans ---- */
 
-/* A field of one that the other has not, or in another form; NULL: there is none. */
+/* A field that is there in one alone, or in another form or place; NULL: there is none. */
 static const char *other_field(const quern_store *a, const quern_store *b) {
+	for (size_t k = 0; k < a->n_fields; k++)
+		if (quern_store_field(b, a->fields[k].name) < 0) return a->fields[k].name;
+	for (size_t k = 0; k < b->n_fields; k++)
+		if (quern_store_field(a, b->fields[k].name) < 0) return b->fields[k].name;
 	for (size_t k = 0; k < a->n_fields; k++) {
-		const quern_field *f = &a->fields[k], *g = k < b->n_fields ? &b->fields[k] : NULL;
-		if (quern_store_field(b, f->name) < 0) return f->name;
-		if (!g || strcmp(f->name, g->name) != 0 || f->shape != g->shape || f->twice != g->twice ||
+		const quern_field *f = &a->fields[k], *g = &b->fields[k];
+		if (strcmp(f->name, g->name) != 0 || f->shape != g->shape || f->twice != g->twice ||
 			f->kept != g->kept || f->local != g->local || f->lane != g->lane)
 			return f->name;
 	}
 	return NULL;
 }
 
-/* The first of two lists of fields is told from both ends, so that what is missing is named and not what stands in its
- * place. */
-static const char *missing_field(const quern_store *a, const quern_store *b) {
-	for (size_t k = 0; k < a->n_fields; k++)
-		if (quern_store_field(b, a->fields[k].name) < 0) return a->fields[k].name;
-	for (size_t k = 0; k < b->n_fields; k++)
-		if (quern_store_field(a, b->fields[k].name) < 0) return b->fields[k].name;
-	const char *other = other_field(a, b);
-	return other ? other : other_field(b, a);
+static bool has_stage(const quern_plan *p, const char *name) {
+	for (size_t k = 0; k < p->n_stages; k++)
+		if (!strcmp(p->stages[k].name, name)) return true;
+	return false;
+}
+
+/* A stage of a solver that runs in one alone; NULL: there is none. */
+static const char *other_stage(const quern_plan *a, const quern_plan *b) {
+	for (size_t k = 0; k < a->n_stages; k++)
+		if (!has_stage(b, a->stages[k].name)) return a->stages[k].name;
+	for (size_t k = 0; k < b->n_stages; k++)
+		if (!has_stage(a, b->stages[k].name)) return b->stages[k].name;
+	return NULL;
+}
+
+/* An observer whose outputs come more often in one, so that there would be other columns; NULL: there is none. */
+static const char *other_columns(const quern_plan *a, const quern_plan *b) {
+	for (size_t e = 0; e < a->scene->observe.n; e++)
+		if (quern_wish_repeats(&a->observers[e]->bound) != quern_wish_repeats(&b->observers[e]->bound))
+			return a->observers[e]->bound.id;
+	return NULL;
 }
 
 static const char *name_of(const quern_filling *f) {
@@ -57,10 +73,9 @@ static const char *other_plugins(const quern_scene *a, const quern_scene *b) {
 	return a->n_sections == b->n_sections ? NULL : "one of the sections";
 }
 
-/* Whether a parameter has the same value in both. */
-static bool same_value(const quern_param *row, const void *one, const void *two, uint32_t dim) {
+static bool same_value(const quern_param *row, const void *a, const void *b, uint32_t dim) {
 	const quern_param alone[] = { *row, { .name = NULL } };
-	const void *self[2] = { one, two };
+	const void *self[2] = { a, b };
 	quern_text text[2] = { { 0 }, { 0 } };
 	for (int k = 0; k < 2; k++) {
 		quern_node *map = quern_node_create(QUERN_NODE_MAP);
@@ -73,47 +88,45 @@ static bool same_value(const quern_param *row, const void *one, const void *two,
 	return same;
 }
 
-/* Plugins in the items of a list that counts before the first step alone, such as the regions of fills, count no longer. */
-static bool stands_in_the_past(const quern_scene *s, const quern_instance *it) {
-	for (size_t i = 0; i < s->n_sections; i++) {
-		const quern_param *params = s->sections[i].solver->file->params;
-		for (size_t k = 0; k < s->sections[i].n_slots; k++) {
-			const quern_slot_use *use = &s->sections[i].slots[k];
-			const size_t n = strcspn(use->slot->name, ".");
-			if (!use->slot->name[n] || strcmp(use->path, it->path) != 0) continue;
-			for (const quern_param *row = params; row && row->name; row++)
-				if (strlen(row->name) == n && !strncmp(row->name, use->slot->name, n))
-					return row->flags & QUERN_ONCE;
-		}
-	}
+/* A parameter that counts before the first step alone, as all of them may, and has another value; NULL: there is
+ * none. */
+static const char *other_value(const quern_instance *a, const quern_instance *b, uint32_t dim, bool all) {
+	for (const quern_param *row = a->file->params; row && row->name; row++)
+		if ((all || row->flags & QUERN_ONCE) && !same_value(row, a->self, b->self, dim)) return row->name;
+	return NULL;
+}
+
+/* A slot in the items of a list that counts once. */
+static bool is_once(const quern_section *section, const quern_slot *slot) {
+	for (const quern_param *row = section->solver->file->params; row && row->name; row++)
+		if (strchr(slot->name, '.') && row->flags & QUERN_ONCE && quern_same_head(row->name, slot->name))
+			return true;
 	return false;
 }
 
-/* A parameter that counts before the first step alone, and has another value; NULL: there is none. */
+/* The same of solvers and of plugins in slots, of which there are as many in both; what overrides a plugin makes
+ * instances that one scene alone may have, so that their running numbers tell nothing. */
 static const char *other_start(const quern_scene *a, const quern_scene *b, const char **of) {
-	for (size_t i = 0; i < a->n_instances && i < b->n_instances; i++) {
-		const quern_instance *one = a->instances[i], *two = b->instances[i];
-		const bool past = stands_in_the_past(a, one);
-		for (const quern_param *row = one->file->params; row && row->name; row++) {
-			if (!(row->flags & QUERN_ONCE) && !past) continue;
-			*of = one->path;
-			if (!same_value(row, one->self, two->self, (uint32_t)a->general.dimension)) return row->name;
+	const uint32_t dim = (uint32_t)a->general.dimension;
+	for (size_t i = 0; i < a->n_sections; i++) {
+		const quern_section *one = &a->sections[i], *two = &b->sections[i];
+		const char *name = other_value(one->solver, two->solver, dim, false);
+		*of = one->name;
+		for (size_t k = 0; k < one->n_slots && !name; k++) {
+			const quern_slot_use *use = &one->slots[k];
+			*of = use->path;
+			for (size_t j = 0; j < use->n && !name; j++)
+				name = other_value(use->filling[j].instance, two->slots[k].filling[j].instance, dim,
+					is_once(one, use->slot));
 		}
+		if (name) return name;
 	}
 	return NULL;
 }
 
-static double cell_of(const quern_scene *s) {
-	for (size_t i = 0; i < s->n_sections; i++) {
-		const double wish =
-			s->sections[i].ops->cell ? s->sections[i].ops->cell(s->sections[i].solver->self) : 0;
-		if (wish > 0) return wish;
-	}
-	return 0;
-}
-
 /* The state goes from plan to plan as it is. */
 static void check(quern_run *run, size_t episode, const quern_scene *other, const quern_plan *plan) {
+	static const char mended[] = "what a stage switches on must be on in the scene, be it by a tiny value";
 	quern_report *report = run->scene->report;
 	const quern_node *list = quern_node_find(run->scene->tree->root, "stages");
 	const quern_mark mark = list->entries[episode].value->mark;
@@ -127,13 +140,17 @@ static void check(quern_run *run, size_t episode, const quern_scene *other, cons
 		quern_report_add(report, mark,
 			"stages: %s.%s cannot change in the course of a run: it counts before the first step alone", of,
 			which);
-	else if ((which = missing_field(&run->plan->store, &plan->store)))
+	else if ((which = other_field(&run->plan->store, &plan->store)))
 		quern_report_add(report, mark,
-			"stages: the field %s is there in one and not in another, or otherwise: what a stage switches "
-			"on, such as "
-			"friction or a motion, must be on in the scene, be it by a tiny value",
+			"stages: the field %s is there in one and not in another, or otherwise: %s", which, mended);
+	else if ((which = other_stage(run->plan, plan)))
+		quern_report_add(report, mark, "stages: %s runs in one and not in another: %s", which, mended);
+	else if ((which = other_columns(run->plan, plan)))
+		quern_report_add(report, mark,
+			"stages: %s would have other columns in one than in another, which cannot change in the course "
+			"of a run",
 			which);
-	else if (cell_of(run->scene) != cell_of(other))
+	else if (quern_wish_cell(run->scene) != quern_wish_cell(other))
 		quern_report_add(report, mark, "stages: the grid's cell cannot change in the course of a run");
 }
 
@@ -148,6 +165,7 @@ void quern_run_plan_episodes(quern_run *run) {
 		quern_scene *other = scene->episodes[k].scene;
 		if (!other) continue;
 		run->plans[k] = quern_plan_create(other, run->pool);
+		quern_wishes_check(other, run->has_grid);
 		quern_report_take(scene->report, other->report);
 		if (!quern_report_errors(scene->report)) check(run, k, other, run->plans[k]);
 	}

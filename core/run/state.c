@@ -82,9 +82,12 @@ void quern_state_write(quern_h5 *h, const quern_run *run, int s, quern_state_pic
 	const hid_t group = quern_h5_group(h, h->file, set->name);
 	quern_h5_integer(h, group, "n", set->n);
 	quern_h5_integer(h, group, "next_id", set->next_id);
-	quern_h5_integer(h, group, "n_blocks", set->n_blocks);
+	const uint32_t n_blocks = set->grid ? 0 : set->n_blocks; /* cells are cut as the grid is */
+	quern_h5_integer(h, group, "n_blocks", n_blocks);
 	if (set->rows) quern_h5_put(h, group, "row", H5T_NATIVE_DOUBLE, set->n, 8, set->row);
-	if (set->n_blocks) quern_h5_put(h, group, "block", H5T_NATIVE_UINT32, set->n_blocks + 1u, 1, set->block);
+	if (n_blocks) quern_h5_put(h, group, "block", H5T_NATIVE_UINT32, n_blocks + 1u, 1, set->block);
+	if (n_blocks && set->by_place)
+		quern_h5_put(h, group, "by_place", H5T_NATIVE_UINT32, set->n_blocks, 1, set->by_place);
 	for (size_t k = 0; k < store->n_fields; k++) {
 		const quern_field *field = &store->fields[k];
 		if (!is_column(store, field, s, picks)) continue;
@@ -103,17 +106,37 @@ static bool fault(quern_text *why, const char *what, const char *name) {
 	return false;
 }
 
-static bool read_partition(quern_store *store, hid_t group, int s, quern_text *why) {
+/* Blocks whose places come in another order than they do say so. */
+static bool read_places(quern_store *store, hid_t group, int s, uint32_t n) {
+	if (H5Lexists(group, "by_place", H5P_DEFAULT) <= 0) return true;
+	uint32_t *place = malloc((size_t)n * sizeof(uint32_t));
+	bool *seen = calloc(n, sizeof(bool)),
+		 good = place && seen && quern_h5_read(group, "by_place", H5T_NATIVE_UINT32, n, 1, place);
+	for (uint32_t q = 0; q < n && good; q++) {
+		good = place[q] < n && !seen[place[q]];
+		if (good) seen[place[q]] = true;
+	}
+	good = good && quern_store_arrange(store, s, place) == QUERN_OK;
+	free(place);
+	free(seen);
+	return good;
+}
+
+static bool read_partition(quern_run *run, hid_t group, int s, quern_text *why) {
+	quern_store *store = &run->plan->store;
 	const quern_set_store *set = &store->sets[s];
 	int64_t n_blocks = -1;
 	if (!quern_h5_read_integer(group, "n_blocks", &n_blocks) || n_blocks < 0 || n_blocks > MOST_ENTRIES)
 		return fault(why, "n_blocks", set->name);
+	if (set->grid && set->n)
+		return quern_grid_cut(&run->grid, store, s) == QUERN_OK || fault(why, "memory", set->name);
 	if (!n_blocks) return true;
 	uint32_t *block = malloc(((size_t)n_blocks + 1) * sizeof(uint32_t));
 	bool good = block && quern_h5_read(group, "block", H5T_NATIVE_UINT32, (size_t)n_blocks + 1, 1, block);
 	good = good && block[0] == 0 && block[n_blocks] == set->n;
 	for (int64_t b = 0; good && b < n_blocks; b++) good = block[b] <= block[b + 1];
-	good = good && quern_store_partition(store, s, (uint32_t)n_blocks, block) == QUERN_OK;
+	good = good && quern_store_partition(store, s, (uint32_t)n_blocks, block) == QUERN_OK &&
+		   read_places(store, group, s, (uint32_t)n_blocks);
 	free(block);
 	return good || fault(why, "the partition", set->name);
 }
@@ -173,7 +196,7 @@ bool quern_state_read(
 	quern_store *store = &run->plan->store;
 	quern_set_store *set = &store->sets[s];
 	set->next_id = g->next_id;
-	if (!set->rows) return read_partition(store, g->at, s, why) && read_fields(store, g->at, s, picks, why);
+	if (!set->rows) return read_partition(run, g->at, s, why) && read_fields(store, g->at, s, picks, why);
 	return !g->n || !keeps_rows(store, s, picks) ||
 		   quern_h5_read(g->at, "row", H5T_NATIVE_DOUBLE, set->n, 8, set->row) ||
 		   fault(why, "rows", set->name);

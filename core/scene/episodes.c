@@ -7,15 +7,13 @@
 
 static const char say_item[] = "{for: TIME, set: {path.to.key: value}}";
 
-/* What is made once, before the first step, or belongs to the whole run. */
-static const char *const fixed[] = { "quern", "name", "model", "dimension", "seed", "domain", "time",
-	"output", "observe", "checkpoint", "run", "stages", NULL };
-
+/* What belongs to the whole run: of the scene's own keys all that say so, its lists and its observers. */
 static bool is_fixed(const char *path) {
-	const size_t n = strcspn(path, ".");
-	for (const char *const *f = fixed; *f; f++)
-		if (strlen(*f) == n && !strncmp(*f, path, n)) return true;
-	return false;
+	for (const quern_param *row = quern_general_rows; row->name; row++)
+		if (row->flags & QUERN_ONCE && quern_same_head(row->name, path)) return true;
+	for (const quern_general_list *l = quern_general_lists; l->name; l++)
+		if (quern_same_head(l->name, path)) return true;
+	return quern_same_head(quern_observe_slot.name, path);
 }
 
 /* The scene with other values; NULL after a sentence. Its marks are those of the old one. */
@@ -29,7 +27,7 @@ static quern_scene *vary(quern_scene *s, const quern_node *set) {
 		else quern_tree_replace(tree, e->key, e->value, e->mark, s->report);
 	}
 	if (quern_report_errors(s->report) == before) {
-		quern_scene *other = quern_scene_vary(tree, s->host);
+		quern_scene *other = quern_scene_vary(s, tree);
 		if (!quern_report_errors(other->report)) return other;
 		quern_report_take(s->report, other->report);
 		quern_scene_destroy(other);
@@ -101,8 +99,7 @@ static void read_item(quern_scene *s, const quern_node *list, size_t i, double *
 	if (last && isfinite(length) && fabs(*begin - s->general.end) > 1e-9 * s->general.end)
 		quern_report_add(s->report, item->value->mark,
 			"stages: the last one would end at %.6g s, and time.end is %.6g s: leave its 'for' out, or "
-			"change one of "
-			"them",
+			"change one of them",
 			*begin, s->general.end);
 }
 

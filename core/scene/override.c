@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* override - plugins of a slot once more, with parameters that are given elsewhere: by an entry of another slot, such as a wall's
- * own friction; or by an item of a list beside the slot, for a case of its own; or by both, the entry's on top */
+/* override - plugins of a slot once more, with parameters that are given elsewhere: by an entry of another slot, for
+ * what it meets; or by an item of a list beside the slot, for a case of its own; or by both, the entry's on top */
 #include "section.h"
 #include "text.h"
 #include <stdlib.h>
 #include <string.h>
-
-static const char *bare(const quern_instance *it) { return strchr(it->file->plugin.id, '.') + 1; }
 
 static quern_node *scratch_map(quern_scene *s) {
 	quern_tree *keep = quern_take(1, sizeof *keep);
@@ -15,7 +13,9 @@ static quern_node *scratch_map(quern_scene *s) {
 	return keep->root = quern_node_create(QUERN_NODE_MAP);
 }
 
-static bool has_name(const quern_instance *it, const char *key) { return !strcmp(bare(it), key); }
+static bool has_name(const quern_instance *it, const char *key) {
+	return !strcmp(quern_id_name(it->file->plugin.id), key);
+}
 
 /* Lays what `over` (NULL: nothing) says to this plugin onto its parameters: keys that it has, but for those of `own`, and all that
  * stands under its name. */
@@ -48,7 +48,7 @@ static size_t owners_of(const quern_slot_use *use, const char *key, const char *
 	size_t n = 0;
 	for (size_t j = 0; j < use->n; j++)
 		if (quern_rows_open(use->filling[j].instance->file->params, key)) {
-			if (n < 2) name[n] = bare(use->filling[j].instance);
+			if (n < 2) name[n] = quern_id_name(use->filling[j].instance->file->plugin.id);
 			n++;
 		}
 	return n;
@@ -81,8 +81,15 @@ static const quern_slot_use *overriding(const quern_scene *s, const char *path) 
 
 /* What entry v of the other slot says to plugins of this one, or NULL. */
 static const quern_node *given_by(const quern_slot_use *other, size_t v, const char *path) {
-	const quern_node *given = quern_node_find(other->filling[v].instance->map, strchr(path, '.') + 1);
-	return given && given->kind == QUERN_NODE_MAP ? given : NULL;
+	return quern_node_find(other->filling[v].instance->map, strchr(path, '.') + 1);
+}
+
+/* The first plugin says what it takes. */
+static void let_refuse(quern_scene *s, const quern_slot_use *use, quern_entry *e) {
+	const quern_plugin_file *file = use->filling[0].instance->file;
+	const quern_reading r = quern_scene_reading(s);
+	const quern_node one = { .kind = QUERN_NODE_MAP, .entries = e, .n = 1 };
+	quern_params_check(&r, file->plugin.id, file->params, &one, NULL);
 }
 
 static void check_given(
@@ -97,11 +104,7 @@ static void check_given(
 	for (size_t e = 0; e < given->n; e++) {
 		if (owners_of(use, given->entries[e].key, name) || !use->n) continue;
 		if (is_named(use, given->entries[e].key)) check_map(s, other->path, &given->entries[e]);
-		else { /* let the first plugin say what it takes */ const quern_reading r = quern_scene_reading(s);
-			const quern_node one = { .kind = QUERN_NODE_MAP, .entries = &given->entries[e], .n = 1 };
-			quern_params_check(&r, use->filling[0].instance->file->plugin.id,
-				use->filling[0].instance->file->params, &one, NULL);
-		}
+		else let_refuse(s, use, &given->entries[e]);
 	}
 }
 
@@ -111,10 +114,10 @@ static void fill_variants(quern_scene *s, quern_slot_use *use, const quern_slot_
 		use->filling[j].variant = quern_take(other->n, sizeof(quern_instance *));
 	}
 	for (size_t v = 0; v < other->n; v++) {
-		const quern_node *said = quern_node_find(other->filling[v].instance->map, strchr(use->path, '.') + 1);
 		const quern_node *given = given_by(other, v, use->path);
-		if (said) check_given(s, use, other, said);
-		for (size_t j = 0; j < use->n && given; j++)
+		if (!given) continue;
+		check_given(s, use, other, given);
+		for (size_t j = 0; j < use->n; j++)
 			use->filling[j].variant[v] =
 				once_more(s, use->filling[j].instance, NULL, NULL, given, given->mark);
 	}

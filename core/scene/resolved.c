@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *bare(const char *id) { return strchr(id, '.') + 1; }
-
 typedef struct {
 	const quern_scene *scene;
 	const quern_naming *naming;
@@ -41,7 +39,7 @@ static void name_files(const writing *w, const char *slot, quern_node *map) {
 	}
 }
 
-/* What a body's `contact` overrides is written as the scene gives it, but for files. */
+/* What overrides another slot is written as the scene gives it, but for files. */
 static void put_override(const writing *w, const quern_slot *slot, const quern_filling *f, quern_node *map) {
 	const char *key = strchr(slot->override, '.') + 1;
 	const quern_node *over = quern_node_find(f->instance->map, key);
@@ -72,7 +70,7 @@ static void put_refined(
 static void put_filling(
 	const writing *w, const quern_slot *slot, const quern_filling *f, quern_node *parent) {
 	const quern_instance *it = f->instance;
-	quern_node *map = quern_node_put_map(parent, bare(it->file->plugin.id));
+	quern_node *map = quern_node_put_map(parent, quern_id_name(it->file->plugin.id));
 	put_params(w, it->file->params, it->self, map);
 	if (slot->rows) put_params(w, slot->rows, f->item, map);
 	if (slot->override) put_override(w, slot, f, map);
@@ -103,7 +101,7 @@ static void put_section(const writing *w, const quern_section *section, quern_no
 		list ? quern_node_put_list(root, section->name) : quern_node_put_map(root, section->name);
 	if (!list) {
 		const quern_instance *solver = section->solver;
-		quern_node_put(node, "solver", bare(solver->file->plugin.id));
+		quern_node_put(node, "solver", quern_id_name(solver->file->plugin.id));
 		put_params(w, solver->file->params, solver->self, node);
 	}
 	for (size_t k = 0; k < section->n_slots; k++) {

@@ -13,41 +13,40 @@ static const char *const instructions[] = { "auto", "v1", "v3", "v4", NULL };
 
 #define ROW(m, name_, unit_, ...) QUERN_PARAM_AS(quern_general, m, name_, unit_, __VA_ARGS__)
 const quern_param quern_general_rows[] = { ROW(version, "quern", "1", "Version of the scene format: 1.",
-											   .flags = QUERN_REQUIRED, .min = 1, .max = 1e9),
-	ROW(name, "name", NULL, "A title for people.", .text = "scene"),
+											   .flags = QUERN_REQUIRED | QUERN_ONCE, .min = 1, .max = 1e9),
+	ROW(name, "name", NULL, "A title for people.", .text = "scene", .flags = QUERN_ONCE),
 	ROW(model, "model", NULL,
 		"Which representation to keep: all sections, or the name of one, which then runs with those that it "
 		"needs.",
-		.text = "all"),
-	ROW(dimension, "dimension", "1", "2 (a slab one metre thick) or 3.", .flags = QUERN_REQUIRED, .min = 2,
-		.max = 3),
-	ROW(seed, "seed", "1", "Seed of all random numbers.", .def = 1, .max = 2147483647),
+		.text = "all", .flags = QUERN_ONCE),
+	ROW(dimension, "dimension", "1", "2 (a slab one metre thick) or 3.", .flags = QUERN_REQUIRED | QUERN_ONCE,
+		.min = 2, .max = 3),
+	ROW(seed, "seed", "1", "Seed of all random numbers.", .def = 1, .max = 2147483647, .flags = QUERN_ONCE),
 	ROW(gravity, "gravity", "m/s^2", "Acceleration of gravity.", .flags = QUERN_REQUIRED, .min = -1e6,
 		.max = 1e6),
-	ROW(lower, "domain.lower", "m", "Lower corner of the domain.", .flags = QUERN_REQUIRED, .min = -1e9,
-		.max = 1e9),
-	ROW(upper, "domain.upper", "m", "Upper corner of the domain.", .flags = QUERN_REQUIRED, .min = -1e9,
-		.max = 1e9),
-	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED, .max = 1e12),
+	ROW(lower, "domain.lower", "m", "Lower corner of the domain.", .flags = QUERN_REQUIRED | QUERN_ONCE,
+		.min = -1e9, .max = 1e9),
+	ROW(upper, "domain.upper", "m", "Upper corner of the domain.", .flags = QUERN_REQUIRED | QUERN_ONCE,
+		.min = -1e9, .max = 1e9),
+	ROW(end, "time.end", "s", "When the run ends.", .flags = QUERN_REQUIRED | QUERN_ONCE, .max = 1e12),
 	ROW(step_text, "time.step", "s",
-		"The long step, or auto. Taken a little shorter, so that a whole number of "
-		"equal steps leads to the next frame.",
-		.text = "auto"),
-	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit."),
+		"The long step, or auto. Taken a little shorter, so that a whole number of equal steps leads to the "
+		"next frame.",
+		.text = "auto", .flags = QUERN_ONCE),
+	ROW(force, "time.force", NULL, "Take the given step although it is beyond a limit.", .flags = QUERN_ONCE),
 	ROW(every, "output.every", "s",
 		"Time between frames and between rows of series.csv; default: end/50. It is divided into equal "
-		"steps, "
-		"so another value changes the step a little, and with it the numbers.",
-		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12),
-	ROW(compress, "output.compress", NULL, "Deflate the frames.", .def = 1),
+		"steps, so another value changes the step a little, and with it the numbers.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN | QUERN_ONCE, .max = 1e12),
+	ROW(compress, "output.compress", NULL, "Deflate the frames.", .def = 1, .flags = QUERN_ONCE),
 	ROW(checkpoint, "checkpoint.every", "s",
 		"Time on the clock between checkpoints; 0: only at the release and at the end.", .def = 300,
-		.max = 1e9),
+		.max = 1e9, .flags = QUERN_ONCE),
 	ROW(batch, "run.batch", "1", "Most entities in a batch; results do not depend on it.", .def = 256,
-		.min = 8, .max = 512, .flags = QUERN_ADVANCED),
+		.min = 8, .max = 512, .flags = QUERN_ADVANCED | QUERN_ONCE),
 	ROW(instructions, "run.instructions", "1",
 		"Highest instruction set to use, x86-64-v1 to v4; results do not depend on it.",
-		.choices = instructions, .flags = QUERN_ADVANCED),
+		.choices = instructions, .flags = QUERN_ADVANCED | QUERN_ONCE),
 	QUERN_END_PARAMS };
 
 const quern_general_list quern_general_lists[] = {
@@ -59,8 +58,7 @@ const quern_general_list quern_general_lists[] = {
 		"Fields to write out beside those that frames always have: SET.NAME, as `quern plan` lists them." },
 	{ "stages", "{for: TIME, set: {path.to.key: value}}",
 		"Intervals of time, one after the other, in which keys have other values than the scene gives them; "
-		"the "
-		"last one needs no `for`. Settling comes before them all." },
+		"the last one needs no `for`. Settling comes before them all." },
 	{ NULL, NULL, NULL }
 };
 
@@ -339,7 +337,7 @@ static void label_observers(quern_scene *s) {
 	for (size_t e = 0; e < n; e++)
 		if (observe_item(s, e)->label) check_label(s, e);
 	for (size_t e = 0; e < n; e++) {
-		const char *name = strchr(s->observe.filling[e].instance->file->plugin.id, '.') + 1;
+		const char *name = quern_id_name(s->observe.filling[e].instance->file->plugin.id);
 		char *label = quern_copy(name);
 		for (int k = 2; !observe_item(s, e)->label && labelled(s, n, label) < n; k++) {
 			free(label);
@@ -369,12 +367,17 @@ static void resolve(quern_scene *s) {
 	label_observers(s);
 }
 
-static quern_scene *create(const quern_host *host) {
+static quern_scene *create(const quern_host *host, quern_loader *loader) {
 	quern_scene *s = quern_take(1, sizeof *s);
 	s->host = host;
 	s->report = quern_report_create();
 	s->units = quern_units_create();
-	s->loader = quern_loader_create();
+	s->loader = loader;
+	return s;
+}
+
+static quern_scene *create_alone(const quern_host *host) {
+	quern_scene *s = create(host, quern_loader_create());
 	quern_watch_know(s->loader);
 	return s;
 }
@@ -384,7 +387,7 @@ bool quern_scene_is_whole(const quern_scene *s) {
 }
 
 quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *host) {
-	quern_scene *s = create(host);
+	quern_scene *s = create_alone(host);
 	s->tree = quern_tree_read(path, s->report);
 	for (; sets && *sets && s->tree->root; sets++) quern_tree_set(s->tree, *sets, s->report);
 	resolve(s);
@@ -392,8 +395,8 @@ quern_scene *quern_scene_read(const char *path, const char *const *sets, const q
 	return s;
 }
 
-quern_scene *quern_scene_vary(quern_tree *tree, const quern_host *host) {
-	quern_scene *s = create(host);
+quern_scene *quern_scene_vary(const quern_scene *base, quern_tree *tree) {
+	quern_scene *s = create(base->host, base->loader);
 	s->tree = tree;
 	s->later = true;
 	resolve(s);
@@ -401,7 +404,7 @@ quern_scene *quern_scene_vary(quern_tree *tree, const quern_host *host) {
 }
 
 quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *host) {
-	quern_scene *s = create(host);
+	quern_scene *s = create_alone(host);
 	s->tree = quern_tree_parse(name, data, length, s->report);
 	resolve(s);
 	if (!quern_report_errors(s->report)) quern_episodes_read(s);
@@ -431,8 +434,10 @@ void quern_scene_destroy(quern_scene *s) {
 	free(s->field_marks);
 	free(s->published);
 	quern_tree_destroy(s->tree);
-	quern_watch_know(NULL);
-	quern_loader_destroy(s->loader);
+	if (!s->later) { /* a stage's plugins are those of its scene */
+		quern_watch_know(NULL);
+		quern_loader_destroy(s->loader);
+	}
 	quern_units_destroy(s->units);
 	quern_report_destroy(s->report);
 	free(s);

@@ -75,7 +75,7 @@ typedef struct quern_episode {
 
 typedef struct quern_scene {
 	quern_general general;
-	bool later; /* these are the values of a stage of another scene */
+	bool later; /* these are the values of a stage of another scene, whose loader this is */
 	bool sound; /* dimension, gravity and domain may be relied on */
 	quern_report *report;
 	quern_units *units;
@@ -103,8 +103,9 @@ typedef struct quern_scene {
 /* Reads and resolves; faults are in scene->report. `sets` are the --set options, NULL-terminated. Never NULL. */
 quern_scene *quern_scene_read(const char *path, const char *const *sets, const quern_host *);
 quern_scene *quern_scene_parse(const char *name, const char *data, size_t length, const quern_host *);
-/* The scene of a tree, which it takes over; `stages` in it count for nothing. */
-quern_scene *quern_scene_vary(quern_tree *, const quern_host *);
+/* The scene of a tree, which it takes over, for a stage of another one, which must outlive it and whose plugins it
+ * has; `stages` in the tree count for nothing. */
+quern_scene *quern_scene_vary(const quern_scene *, quern_tree *);
 void quern_scene_destroy(quern_scene *);
 
 /* The scene with every default written out, in SI: a tree to destroy, or YAML to free(). */

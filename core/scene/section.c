@@ -262,7 +262,7 @@ void quern_slot_refuse_key(quern_scene *s, const quern_slot_use *use, const quer
 		const quern_plugin_file *file = use->filling[j].instance->file;
 		also = first_parts(file->params, &n, also, &capacity);
 		also = quern_grow(also, n + 1, &capacity, sizeof(char *));
-		also[n++] = strchr(file->plugin.id, '.') + 1;
+		also[n++] = quern_id_name(file->plugin.id);
 	}
 	also = quern_grow(also, n, &capacity, sizeof(char *));
 	also[n] = NULL;

@@ -27,16 +27,16 @@ static const char *named_solver(const quern_node *section) {
 	return solver && solver->kind == QUERN_NODE_SCALAR ? solver->text : NULL;
 }
 
-bool quern_section_is_claimed(const quern_section_of *s) {
-	const size_t n = s->section ? strlen(s->section) : 0;
-	for (const quern_param *row = quern_general_rows; n && row->name; row++)
-		if (!strncmp(row->name, s->section, n) && (!row->name[n] || row->name[n] == '.')) return false;
-	return n && strcmp(s->section, quern_observe_slot.name) != 0;
+/* Whether the scene itself reads what stands there: a row or a list of its own begins with this word, or its
+ * observers do. */
+static bool is_key_of_scene(const char *key) {
+	for (const quern_general_list *l = quern_general_lists; l->name; l++)
+		if (quern_same_head(l->name, key)) return true;
+	return quern_rows_open(quern_general_rows, key) || !strcmp(key, quern_observe_slot.name);
 }
 
-static bool is_key_of_scene(const char *key) {
-	const quern_section_of one = { .section = (char *)(uintptr_t)key };
-	return !quern_section_is_claimed(&one);
+bool quern_section_is_claimed(const quern_section_of *s) {
+	return s->section && !is_key_of_scene(s->section);
 }
 
 static bool is_section(quern_scene *s, const quern_entry *e) {

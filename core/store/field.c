@@ -24,6 +24,8 @@ void quern_store_finish(quern_store *store) {
 			for (int k = 0; k < 9; k++) free(store->fields[i].data[copy][k]);
 	for (size_t i = 0; i < store->n_sets; i++) {
 		free(store->sets[i].block);
+		free(store->sets[i].by_place);
+		free(store->sets[i].entry);
 		free(store->sets[i].row);
 		free(store->sets[i].spare[0]);
 		free(store->sets[i].spare[1]);
@@ -133,8 +135,11 @@ typedef struct {
 	uint32_t n;
 } permutation;
 
-/* Where an entry comes from: another one, or -1. */
-static int32_t source(int32_t from) { return from < -1 ? -2 - from : from; }
+/* Where an entry's value comes from: another one, or -1; what a part gets only by give(), or never, from nowhere. */
+static int32_t source(const quern_field *field, int32_t from) {
+	if (from >= -1) return from;
+	return field->rule == QUERN_SUMS || field->rule == QUERN_OWN ? from : -2 - from;
+}
 
 static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 	const permutation *p = arg;
@@ -144,7 +149,7 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 		const int32_t *old = p->old;
 		int32_t *new = p->new;
 		for (uint32_t i = begin; i < end; i++) {
-			const int32_t from = source(p->from[i]);
+			const int32_t from = source(p->field, p->from[i]);
 			new[i] = from >= 0 ? old[from] : (int32_t)p->initial;
 		}
 	} else if (p->field->shape == QUERN_ID) {
@@ -155,8 +160,8 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 		const double *old = p->old;
 		double *new = p->new;
 		for (uint32_t i = begin; i < end; i++) {
-			const int32_t from = source(p->from[i]);
-			new[i] = from >= 0 ? old[from] : p->initial;
+			const int32_t from = source(p->field, p->from[i]);
+			new[i] = from >= 0 ? old[from] : from < -1 && p->field->rule == QUERN_SUMS ? 0 : p->initial;
 		}
 	}
 }
@@ -165,6 +170,14 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 static void number_new(quern_set_store *s, int64_t *id, uint32_t n) {
 	for (uint32_t i = 0; i < n; i++)
 		if (id[i] < 0) id[i] = s->next_id++;
+}
+
+/* ---- blocks ---- */
+
+static void forget_places(quern_set_store *s) {
+	free(s->by_place);
+	free(s->entry);
+	s->by_place = s->entry = NULL;
 }
 
 static quern_status reserve_blocks(quern_set_store *s, uint32_t n_blocks) {
@@ -178,6 +191,7 @@ static quern_status reserve_blocks(quern_set_store *s, uint32_t n_blocks) {
 }
 
 static void put_blocks(quern_set_store *s, uint32_t n_blocks, const uint32_t *block) {
+	forget_places(s);
 	if (block) memmove(s->block, block, ((size_t)n_blocks + 1) * sizeof(uint32_t));
 	s->n_blocks = block ? n_blocks : 0;
 }
@@ -187,6 +201,48 @@ quern_status quern_store_partition(quern_store *store, int set, uint32_t n_block
 	const quern_status status = block ? reserve_blocks(s, n_blocks) : QUERN_OK;
 	if (status == QUERN_OK) put_blocks(s, n_blocks, block);
 	return status;
+}
+
+quern_status quern_store_arrange(quern_store *store, int set, const uint32_t *by_place) {
+	quern_set_store *s = &store->sets[set];
+	uint32_t *places = by_place ? malloc(((size_t)s->n_blocks + 1) * sizeof(uint32_t)) : NULL;
+	uint32_t *entry = by_place ? malloc(((size_t)s->n + 1) * sizeof(uint32_t)) : NULL, n = 0;
+	if (by_place && (!places || !entry)) return free(places), free(entry), QUERN_E_MEMORY;
+	for (uint32_t q = 0; by_place && q < s->n_blocks; q++) {
+		places[q] = by_place[q];
+		for (uint32_t i = s->block[places[q]]; i < s->block[places[q] + 1]; i++) entry[n++] = i;
+	}
+	forget_places(s);
+	s->by_place = places;
+	s->entry = entry;
+	return QUERN_OK;
+}
+
+const quern_parts *quern_store_parts(quern_store *store, int set) {
+	quern_set_store *s = &store->sets[set];
+	s->parts = (quern_parts) { sizeof s->parts, s->n, s->n, s->n_blocks, s->n_blocks ? s->block : NULL,
+		s->by_place, s->entry };
+	return &s->parts;
+}
+
+/* As quern_tree_sum, with a block's sum for a number. */
+static double sum_blocks(const quern_set_store *s, uint32_t first, uint32_t n, const double *values) {
+	double sum = 0;
+	if (n <= 256) {
+		for (uint32_t q = first; q < first + n; q++) {
+			const uint32_t b = quern_nth(s->by_place, q);
+			sum += quern_tree_sum(s->block[b + 1] - s->block[b], values + s->block[b]);
+		}
+		return sum;
+	}
+	uint32_t half = 256;
+	while (half * 2 < n) half *= 2;
+	return sum_blocks(s, first, half, values) + sum_blocks(s, first + half, n - half, values);
+}
+
+double quern_store_sum(const quern_store *store, int set, const double *values) {
+	const quern_set_store *s = &store->sets[set];
+	return s->n_blocks ? sum_blocks(s, 0, s->n_blocks, values) : quern_tree_sum(s->n, values);
 }
 
 static quern_status drop(quern_store *store, int set, const bool *gone);
@@ -228,7 +284,11 @@ static quern_status drop(quern_store *store, int set, const bool *gone) {
 		if (!gone[i]) from[n++] = (int32_t)i;
 	}
 	for (; block && b <= s->n_blocks; b++) block[b] = n;
-	const quern_status status = quern_store_remap(store, set, n, from, s->n_blocks, block);
+	uint32_t *places = s->by_place;
+	s->by_place = NULL;
+	quern_status status = quern_store_remap(store, set, n, from, s->n_blocks, block);
+	if (status == QUERN_OK && places) status = quern_store_arrange(store, set, places);
+	free(places);
 	free(from);
 	free(block);
 	return status;
@@ -285,6 +345,21 @@ quern_status quern_store_remap(
 	}
 	free(inverse);
 	return status;
+}
+
+void quern_store_give(quern_store *store, int set, uint32_t from, int32_t to, double part, double share) {
+	for (size_t i = 0; i < store->n_fields; i++) {
+		quern_field *field = &store->fields[i];
+		if (!owns(field, set) || (field->rule != QUERN_SUMS && field->rule != QUERN_MEANS)) continue;
+		for (uint8_t k = 0; k < field->n_components; k++) {
+			double *x = field->data[field->now][k];
+			if (field->rule == QUERN_MEANS && to >= 0) x[to] += share * (x[from] - x[to]);
+			if (field->rule == QUERN_MEANS) continue;
+			const double given = part * x[from];
+			if (to >= 0) x[to] += given;
+			x[from] -= given;
+		}
+	}
 }
 
 quern_status quern_store_fill(quern_store *store, int set, uint32_t n) {

@@ -10,7 +10,7 @@ typedef struct quern_field {
 	char name[56]; /* SET.NAME */
 	const char *unit, *doc;
 	int set, target; /* indices of sets; target -1 unless INDEX into one */
-	uint8_t shape, n_components;
+	uint8_t shape, n_components, rule;
 	bool twice;    /* read from one copy, written to the other, then swapped */
 	bool state;    /* a step goes on from it */
 	bool settles;  /* changed while settling */
@@ -28,7 +28,9 @@ typedef struct quern_set_store {
 	uint32_t n, cap, rows, lanes;
 	uint32_t n_blocks, block_cap;
 	uint32_t *block;
-	double *row; /* of a row set: n rows of 8 */
+	uint32_t *by_place, *entry; /* see quern_parts */
+	quern_parts parts;          /* as it was asked for last */
+	double *row;                /* of a row set: n rows of 8 */
 	int64_t next_id;
 	void *spare[2];         /* [0] 8-byte, [1] 4-byte: the other half of a reordering */
 	bool grid;              /* entries belong to grid blocks: cells and nodes */
@@ -67,4 +69,11 @@ quern_status quern_store_remap(
 /* Rows are transient: they are made to fit and hold zeros. */
 quern_status quern_store_rows(quern_store *, int set, uint32_t n);
 quern_status quern_store_partition(quern_store *, int set, uint32_t n_blocks, const uint32_t *block);
+/* The order of the places of a set's blocks, as quern_host.arrange takes it; it goes when the set is cut anew. */
+quern_status quern_store_arrange(quern_store *, int set, const uint32_t *by_place);
+const quern_parts *quern_store_parts(quern_store *, int set);
+/* As quern_host.give. */
+void quern_store_give(quern_store *, int set, uint32_t from, int32_t to, double part, double share);
+/* As quern_host.sum_set. */
+double quern_store_sum(const quern_store *, int set, const double *);
 size_t quern_store_bytes(const quern_store *);

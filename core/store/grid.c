@@ -81,11 +81,12 @@ static void clear(quern_grid *g) {
 	free(g->tile);
 	free(g->colour);
 	free(g->by_colour);
+	free(g->by_place);
 	free(g->slot);
 	g->at = NULL;
 	g->asked = NULL;
 	g->tile = NULL;
-	g->colour = g->by_colour = NULL;
+	g->colour = g->by_colour = g->by_place = NULL;
 	g->slot = NULL;
 	g->n_slots = 0;
 }
@@ -103,6 +104,31 @@ static int by_place(const void *pa, const void *pb) {
 		if (a[k] != b[k]) return a[k] < b[k] ? -1 : 1;
 	return 0;
 }
+
+/* Blocks in the order of their places; none where that is their own. */
+static quern_status order_blocks(quern_grid *g, uint32_t n) {
+	bool ordered = true;
+	for (uint32_t b = 1; b < n && ordered; b++) ordered = by_place(g->at[b - 1], g->at[b]) < 0;
+	if (ordered) return QUERN_OK;
+	int32_t(*block)[4] = malloc((size_t)n * sizeof *block);
+	g->by_place = malloc((size_t)n * sizeof(uint32_t));
+	if (!block || !g->by_place) return free(block), QUERN_E_MEMORY;
+	for (uint32_t b = 0; b < n; b++) {
+		memcpy(block[b], g->at[b], sizeof *g->at);
+		block[b][3] = (int32_t)b;
+	}
+	qsort(block, n, sizeof *block, by_place);
+	for (uint32_t q = 0; q < n; q++) g->by_place[q] = (uint32_t)block[q][3];
+	free(block);
+	return QUERN_OK;
+}
+
+#ifdef QUERN_PERMUTED_BLOCKS
+static int by_hash(const void *pa, const void *pb) {
+	const uint32_t a = hash(pa), b = hash(pb);
+	return a != b ? (a < b ? -1 : 1) : by_place(pa, pb);
+}
+#endif
 
 static quern_status index_blocks(quern_grid *g, uint32_t n) {
 	uint32_t slots = 64;
@@ -212,7 +238,8 @@ quern_status quern_grid_restore(quern_grid *g, uint32_t n, const int32_t (*block
 	if (!g->at || !g->tile || !g->asked) return QUERN_E_MEMORY;
 	if (n) memcpy(g->at, block, n * sizeof *g->at);
 	if (n && asked) memcpy(g->asked, asked, n);
-	quern_status status = index_blocks(g, n);
+	quern_status status = order_blocks(g, n);
+	if (status == QUERN_OK) status = index_blocks(g, n);
 	if (status == QUERN_OK) status = colour_blocks(g, n);
 	if (status != QUERN_OK) return status;
 	for (uint32_t b = 0; b < n; b++) fill_tile(g, b, g->tile + (size_t)b * v->tile_size);
@@ -222,6 +249,7 @@ quern_status quern_grid_restore(quern_grid *g, uint32_t n, const int32_t (*block
 	v->tile = g->tile;
 	v->colour = g->colour;
 	v->by_colour = g->by_colour;
+	v->by_place = g->by_place;
 	return QUERN_OK;
 }
 
@@ -242,8 +270,20 @@ static int32_t (*dilate(const quern_grid *g, uint32_t n, const int32_t (*block)[
 	qsort(all, m, sizeof *all, by_place);
 	for (uint32_t i = 0; i < m; i++)
 		if (!kept || by_place(all[kept - 1], all[i])) memmove(all[kept++], all[i], sizeof *all);
+#ifdef QUERN_PERMUTED_BLOCKS
+	qsort(all, kept, sizeof *all, by_hash);
+#endif
 	*out_n = kept;
 	return all;
+}
+
+quern_status quern_grid_cut(const quern_grid *g, quern_store *store, int set) {
+	uint32_t *block = malloc(((size_t)g->view.n_blocks + 1) * sizeof(uint32_t));
+	if (!block) return QUERN_E_MEMORY;
+	for (uint32_t b = 0; b <= g->view.n_blocks; b++) block[b] = b * CELLS;
+	const quern_status status = quern_store_partition(store, set, g->view.n_blocks, block);
+	free(block);
+	return status == QUERN_OK ? quern_store_arrange(store, set, g->by_place) : status;
 }
 
 static quern_status carry_cells(const quern_grid *g, const quern_grid *old, quern_store *store, int set) {
@@ -256,7 +296,7 @@ static quern_status carry_cells(const quern_grid *g, const quern_grid *old, quer
 	}
 	const quern_status status = quern_store_remap(store, set, n, from, 0, NULL);
 	free(from);
-	return status;
+	return status == QUERN_OK ? quern_grid_cut(g, store, set) : status;
 }
 
 /* Marks the blocks that were asked for among those that came of it. */

@@ -10,8 +10,8 @@ typedef struct quern_grid {
 	int32_t (*at)[3];
 	uint8_t *asked;
 	int32_t *tile;
-	uint32_t *colour, *by_colour;
-	int32_t *slot; /* hash table of block indices, -1 free */
+	uint32_t *colour, *by_colour, *by_place; /* by_place NULL: they are in order */
+	int32_t *slot;                           /* hash table of block indices, -1 free */
 	uint32_t n_slots;
 } quern_grid;
 
@@ -26,4 +26,6 @@ void quern_grid_finish(quern_grid *);
 quern_status quern_grid_cover(quern_grid *, quern_store *, uint32_t n, const int32_t (*block)[3]);
 /* Takes the blocks as they are, sorted and complete: a checkpoint's. Cells are not carried. */
 quern_status quern_grid_restore(quern_grid *, uint32_t n, const int32_t (*block)[3], const uint8_t *asked);
+/* A set of cells is cut as the grid is. */
+quern_status quern_grid_cut(const quern_grid *, quern_store *, int set);
 int32_t quern_grid_find(const quern_grid *, const int32_t at[3]); /* -1: not allocated */

@@ -341,7 +341,16 @@ static const quern_plan_use *first_use_of(const quern_plan *p, const char *field
 	return NULL;
 }
 
-/* Every use finds its field; doc, target and initial value come from whoever states them. */
+static void state_rule(quern_plan *p, quern_field *field, const quern_plan_use *u) {
+	static const char *const names[] = { "keeps", "sums", "means", "own" };
+	if (u->row->rule && field->rule && u->row->rule != field->rule)
+		quern_report_add(p->scene->report, u->mark,
+			"%s: by the rule of %s it is '%s' where entries are parted or joined, by that of others '%s'",
+			u->field, u->owner, names[u->row->rule], names[field->rule]);
+	else if (u->row->rule) field->rule = u->row->rule;
+}
+
+/* Every use finds its field; doc, target, rule and initial value come from whoever states them. */
 static void bind_uses(quern_plan *p) {
 	const quern_scene *s = p->scene;
 	for (size_t i = 0; i < p->n_uses; i++) {
@@ -361,6 +370,7 @@ static void bind_uses(quern_plan *p) {
 		if (!field->doc) field->doc = u->row->doc;
 		if (!(u->row->initial == 0)) field->initial = u->row->initial;
 		field->shown = field->shown || u->row->flags & QUERN_SHOWN;
+		state_rule(p, field, u);
 		if (!u->row->target) continue;
 		field->target = quern_store_set(&p->store, u->row->target);
 		if (field->target < 0)

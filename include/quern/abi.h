@@ -72,7 +72,9 @@ typedef enum {
 	QUERN_T_BOOL,     /* bool */
 	QUERN_T_TEXT,     /* const char *, owned by the host for the length of the run */
 	QUERN_T_VECTOR,   /* quern_real[3]; the scene gives one number per dimension, the rest are zero */
-	QUERN_T_LIST /* quern_list of structs described by `rows`; where that is one value, the scene may give it bare */
+	/* quern_list of structs described by `rows`; where that is one vector, or since 2.1 one value, the scene may give it
+	 * bare */
+	QUERN_T_LIST
 } quern_type;
 
 enum {
@@ -94,7 +96,7 @@ typedef struct quern_param {
 	const char *const *choices; /* NULL-terminated, or NULL */
 	const char
 		*text; /* default of a T_TEXT; of a T_INT, a word: "body" lets the scene say a name instead of the
-	                     number, where somebody has published that number as "body.NAME"; of a T_LIST, the
+	                     number, where somebody has published that number as "body.NAME"; since 2.1, of a T_LIST, the
 	                     T_TEXT row of its items that takes the keys where the scene gives a map instead:
 	                     "name" takes {sand: {...}, steel: {...}} for [{name: sand, ...}, {name: steel, ...}] */
 	const char *from; /* default taken from this published quantity, see publish(); where nobody publishes it,
@@ -182,6 +184,15 @@ enum {
 		64 /* since 2.1: this READ only makes the field exist; its column is NULL, and nothing is gathered */
 };
 
+/* Since 2.1: what becomes of a field where an entry is parted into two, or two are joined to one, by quern_host.remap and give. An entry
+ * that is new has `initial`, and what an entry that goes has not given away goes with it. */
+typedef enum {
+	QUERN_KEEPS, /* a part has what the whole had; of joined ones that stays which the one that stays had */
+	QUERN_SUMS,  /* an amount, such as a heat in J: parts share it out, joined ones add up */
+	QUERN_MEANS, /* per mass, such as a strain or a temperature: a part has what the whole had, joined ones the mean by mass */
+	QUERN_OWN /* of the entry itself, such as its age: a part begins with `initial`, and of joined ones the one that stays keeps its own */
+} quern_rule;
+
 /* One use of one field by one plugin. A field exists if and only if a counting, non-optional use names
  * it or the scene writes it out. From the uses follow the order of stages, what is allocated, what is
  * checkpointed (a field that is read or updated before it is written in a step), and what conflicts. */
@@ -196,6 +207,7 @@ typedef struct quern_use {
 	quern_real initial; /* of a new entry; diagonal of SYMMETRIC and TENSOR */
 	uint8_t access, shape, flags;
 	uint8_t hook; /* which function of the kind touches it (0: the main one) */
+	uint8_t rule; /* since 2.1: quern_rule; one use must state it, and no two different ones */
 } quern_use;
 
 /* Pointers to the components of a field, by component; NULL where the field does not exist. */
@@ -217,6 +229,21 @@ typedef struct quern_set_view {
 	const uint32_t *block; /* NULL if the set has no partition */
 } quern_set_view;
 
+/* Since 2.1: how a set is cut. Its results may depend on the order of the blocks' places and on that of the entries within one,
+ * never on the numbers that blocks and entries have: the same scene then has the same bits however its sets are cut, be it among
+ * machines. So whoever adds up one entry after the other, or lets the first one win, goes through entries by quern_nth(entry, q) and
+ * through blocks by quern_nth(by_place, q). Entries from `owned` on are copies of what another process owns: they are there to be
+ * looked at, and count in no sum. Today there is one process, and it owns all. */
+typedef struct quern_parts {
+	uint32_t size, n, owned, n_blocks;
+	const uint32_t *block;    /* as in quern_set_view */
+	const uint32_t *by_place; /* blocks in the order of their places; NULL: in their own */
+	const uint32_t *entry;    /* entries in the order of their blocks' places; NULL: in their own */
+} quern_parts;
+
+/* The q-th of what stands in an order; NULL: in its own. */
+#define quern_nth(order, q) ((order) ? (order)[q] : (q))
+
 /* The sparse grid: blocks of `edge` cells per axis (8 in 2-D, 4 in 3-D: 64 cells in both), allocated where
  * there is material. Block at[b] holds the cells, and the nodes at their lower corners, from edge * at[b] on.
  * Entry b * 64 + k of the set "cell" and of every row set is cell or node k of block b, x fastest. */
@@ -227,12 +254,13 @@ typedef struct quern_grid_view {
 	uint32_t tile_size; /* span^dim */
 	int32_t cells[3];   /* of the domain, per axis: at most 2^22, and fewer than 2^31 in all */
 	bool periodic[3];
-	const int32_t (*at)[3]; /* sorted */
+	const int32_t (*at)[3]; /* in the order of places: by z, then y, then x; unless `by_place` says another */
 	const uint8_t *asked;   /* 1: by the last cover(); 0: a neighbour of such a block */
 	const int32_t *tile;    /* [n_blocks][tile_size]: entry of each tile node, -1 where there is none */
 	uint32_t n_colours;
 	const uint32_t *colour; /* colour[c] .. colour[c + 1] into by_colour: no two tiles share a node */
 	const uint32_t *by_colour;
+	const uint32_t *by_place; /* since 2.1: blocks in the order of their places; NULL: in their own */
 } quern_grid_view;
 
 typedef struct quern_host {
@@ -241,7 +269,9 @@ typedef struct quern_host {
 	 * returns the status it was given, so that `return host->fail(...)` reads well. Never ends the program. */
 	quern_status (*fail)(quern_err *, quern_status, const char *param, const char *fmt, ...)
 		__attribute__((format(printf, 4, 5)));
-	/* [setup] Offers a number that rows with `from` may take as their default: "grain.diameter". */
+	/* [setup] Offers a number in SI under a name, "grain.diameter": what is read later takes it, a row with `from`
+	 * as its default, a whole number with a `text` under the word behind the dot. Of several under one name the
+	 * first counts. The name is copied. */
 	void (*publish)(const struct quern_setup *, const char *name, const char *unit, quern_real value);
 	/* [any] Philox 4x32-10: two uniforms in [0, 1) from (seed, stream, key, counter), whatever the thread or order. */
 	void (*random)(uint64_t stream, uint64_t key, uint64_t counter, quern_real out[2]);
@@ -257,7 +287,7 @@ typedef struct quern_host {
 	/* [stage] Zeroed, 64-byte aligned memory until the stage returns, also of 0 bytes. NULL only if memory is
 	 * gone: return QUERN_E_MEMORY. */
 	void *(*memory)(quern_run *, size_t bytes);
-	/* [stage] Sum in a fixed binary tree over the index: the same for any number of threads. */
+	/* [stage] Sum in a fixed binary tree over the index: the same for any number of threads. Of a set, see sum_set. */
 	quern_real (*sum)(quern_run *, size_t n, const quern_real *);
 	/* [stage] Ends the run with a message that names set and entity (id < 0: none); returns its status. With
 	 * QUERN_E_PARAM, the scene is at fault: `set` then names a parameter of the section, as in fail(). */
@@ -265,7 +295,9 @@ typedef struct quern_host {
 		__attribute__((format(printf, 5, 6)));
 	quern_set_view (*set)(quern_run *, const char *name); /* [stage] n = 0 if there is none */
 	/* [stage] The one structural change: new entry i is old entry from[i]; fresh if from[i] == -1; and below that a
-	 * copy of old entry -2 - from[i], with an ID of its own. Carries every field of the set, rewrites every INDEX
+	 * copy of old entry -2 - from[i], with an ID of its own; of what that has by QUERN_SUMS it gets nothing yet (give), of
+	 * QUERN_OWN its initial value. New IDs count on in the order of `from`: list what is new by
+	 * when and where it appears. Carries every field of the set, rewrites every INDEX
 	 * that points into it, drops entries whose target is gone, and refreshes every column pointer the host handed
 	 * out. `block` (n_blocks + 1 entries) is copied. */
 	quern_status (*remap)(quern_run *, const char *set, uint32_t n, const int32_t *from, uint32_t n_blocks,
@@ -279,6 +311,19 @@ typedef struct quern_host {
 	bool (*has)(quern_run *, const char *section);
 	/* [setup] The same while the scene is read: sections that come later count too. */
 	bool (*keeps)(const struct quern_setup *, const char *section);
+	const quern_parts *(*parts)(quern_run *,
+		const char *set); /* since 2.1 [stage] valid until the set changes; NULL if there is none */
+	/* since 2.1 [stage] The order of the places of a set's blocks, until it is cut anew: by_place[0] comes first. Nobody has to
+	 * say it of blocks that are in order, or of cells. NULL: in their own. */
+	quern_status (*arrange)(quern_run *, const char *set, const uint32_t *by_place);
+	/* since 2.1 [stage] Sum of a number per entry of a set, of those that are owned: in a fixed tree over each block, and then
+	 * over blocks in the order of their places. */
+	quern_real (*sum_set)(quern_run *, const char *set, const quern_real *);
+	/* since 2.1 [stage] Entry `from` of a set gives to entry `to` what its fields' rules say: of amounts the share `part`, which
+	 * it loses; means become those of both, in which it counts for `share`, the mass given over that of both then. To
+	 * QUERN_NO_TARGET: what it gives leaves the set; with a `part` below zero it gets as much, as when it takes mass that is
+	 * like its own from elsewhere. What a solver itself knows of, such as mass and momentum, states no rule. */
+	void (*give)(quern_run *, const char *set, uint32_t from, int32_t to, quern_real part, quern_real share);
 } quern_host;
 
 typedef struct quern_setup {

@@ -16,8 +16,8 @@ typedef struct quern_coupling_job {
 	quern_real *other[3];    /* m/s, of the grains: in and out */
 } quern_coupling_job;
 
-/* All nodes with continuum that grains reach, and all these grains. Grain g reaches the nodes node[row[g]] ..
- * node[row[g + 1] - 1]: a sparse matrix by rows. */
+/* Since 2.1. All nodes with continuum that grains reach, and all these grains. Grain g reaches the nodes
+ * node[row[g]] .. node[row[g + 1] - 1]: a sparse matrix by rows. */
 typedef struct quern_coupling_system {
 	uint32_t dim, n_nodes, n_grains, pad;
 	quern_real dt;              /* s, of the continuum's step */
@@ -37,8 +37,8 @@ typedef struct quern_coupling_ops {
 	uint32_t size, affine; /* affine: 1 lets both clouds send v + L (x_i - x) */
 	void (*couple)(
 		const void *self, const quern_coupling_job *); /* [batch] conserves mass * velocity, node by node */
-	/* [stage] once a step, in place of `couple` and of the grains' transfer; conserves the sum of mass * velocity over
-	 * nodes and of grain_weight * grain_mass * grain_velocity over grains. May be NULL */
+	/* since 2.1: [stage] once a step, in place of `couple` and of the grains' transfer; conserves the sum of
+	 * mass * velocity over nodes and of grain_weight * grain_mass * grain_velocity over grains. May be NULL */
 	quern_status (*solve)(const void *self, const quern_coupling_system *);
 } quern_coupling_ops;
 

@@ -77,10 +77,10 @@ static inline int32_t quern_grid_block(const quern_grid_view *g, const int32_t a
 	int32_t low = 0, high = (int32_t)g->n_blocks - 1;
 	while (low <= high) {
 		const int32_t middle = (low + high) / 2;
+		const uint32_t b = quern_nth(g->by_place, (uint32_t)middle);
 		int order = 0;
-		for (int k = 2; k >= 0 && !order; k--)
-			order = (g->at[middle][k] > at[k]) - (g->at[middle][k] < at[k]);
-		if (!order) return middle;
+		for (int k = 2; k >= 0 && !order; k--) order = (g->at[b][k] > at[k]) - (g->at[b][k] < at[k]);
+		if (!order) return (int32_t)b;
 		if (order < 0) low = middle + 1;
 		else high = middle - 1;
 	}
@@ -133,6 +133,11 @@ QUERN_INLINE bool quern_grid_cell_of(const quern_grid_view *g, uint32_t entry, i
 		inside = inside && cell[a] < g->cells[a];
 	}
 	return inside;
+}
+
+/* The q-th entry in the order of the blocks' places. */
+QUERN_INLINE uint32_t quern_grid_nth(const quern_grid_view *g, uint32_t q) {
+	return quern_nth(g->by_place, q / QUERN_BLOCK_CELLS) * QUERN_BLOCK_CELLS + q % QUERN_BLOCK_CELLS;
 }
 
 /* Position of an entry's node, the lower corner of its cell, in metres. */

@@ -9,7 +9,7 @@ extern "C" {
 #endif
 
 typedef struct quern_observer_batch {
-	uint32_t n, dim; /* entries of this leaf; `whole`: 0 */
+	uint32_t n, dim; /* entries of this leaf, part of a block of the set; `whole`: 0 */
 	quern_real time, gravity[3], lower[3], upper[3];
 	/* by row of `uses`; in `map` the columns of `set` begin at the leaf's first entry, others are whole */
 	const quern_column *use;

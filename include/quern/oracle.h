@@ -13,7 +13,7 @@ enum {
 	QUERN_SURFACE_FLOOD = 1, /* outside counts only where it is connected with an open boundary */
 	QUERN_SURFACE_WALLS = 2  /* walls and bodies count as surface */
 };
-enum { QUERN_ORACLE_GAP = 1, QUERN_ORACLE_WEIGHT = 2 }; /* what an oracle wants in its batches */
+enum { QUERN_ORACLE_GAP = 1, QUERN_ORACLE_WEIGHT = 2 }; /* since 2.1: what an oracle wants in its batches */
 
 typedef struct quern_cell_batch {
 	uint32_t n, cap, dim, pad;
@@ -25,8 +25,9 @@ typedef struct quern_cell_batch {
 	const quern_column *use; /* cell.* of this batch */
 	quern_real *level;       /* marking: > 0 inside, <= 0 outside; its zero contour is the surface */
 	int32_t *wish;           /* deciding: zone; the least continuous of all oracles wins */
-	quern_real time, dt;     /* s; dt of the continuum's step */
-	quern_real gravity[3];   /* m/s^2 */
+	/* since 2.1, up to the end */
+	quern_real time, dt;   /* s; dt of the continuum's step */
+	quern_real gravity[3]; /* m/s^2 */
 	/* m from the cell's centre to the nearest of the bodies that this oracle means and that are there now, less than 0
 	 * inside, infinite where there is none; moved by up to half the hysteresis while deciding, as distance is. NULL where
 	 * the oracle does not want it */
@@ -41,7 +42,8 @@ typedef struct quern_oracle_ops {
 	void (*mark)(const void *self, const quern_cell_batch *);   /* [batch] */
 	void (*decide)(const void *self, const quern_cell_batch *); /* [batch] */
 	uint32_t (*surface)(const void *self);                      /* [setup] QUERN_SURFACE_*; NULL: 0 */
-	uint32_t (*wants)(const void *self);                        /* [setup] QUERN_ORACLE_*; NULL: 0 */
+	/* since 2.1, up to the end */
+	uint32_t (*wants)(const void *self); /* [setup] QUERN_ORACLE_*; NULL: 0 */
 	/* [setup] whether the oracle means body number b of the scene: `gap` leads to those alone, and of walls these alone
 	 * count as surface. NULL: all */
 	bool (*means)(const void *self, uint32_t b);

@@ -37,8 +37,9 @@ typedef struct quern_set {
 	uint32_t
 		counted; /* 1: series.csv and summary.json say how many there are, and how many steps they took */
 	quern_real
-		cost[2];      /* s that a step of one entry takes on one core in 2-D and 3-D, about: for estimates */
-	const char *when; /* parameter of this solver: the set is there only if that is not zero; NULL: always */
+		cost[2]; /* s that a step of one entry takes on one core in 2-D and 3-D, about: for estimates */
+	/* since 2.1: parameter of this solver: the set is there only if that is not zero; NULL: always */
+	const char *when;
 } quern_set;
 
 struct quern_bound;
@@ -117,9 +118,9 @@ typedef struct quern_stage {
 	uint32_t phase, flags;
 	const quern_use *uses;
 	quern_status (*run)(const void *self, const quern_step *); /* [stage] */
-	const char
-		*when; /* parameter of this solver: the stage is there only if that is not zero; NULL: always. The
-	                     first stage of a solver always is */
+	/* since 2.1: parameter of this solver: the stage is there only if that is not zero; NULL: always. The first
+	 * stage of a solver always is */
+	const char *when;
 } quern_stage;
 
 typedef struct quern_solver_ops {
@@ -142,21 +143,22 @@ typedef struct quern_solver_ops {
 	/* [stage] largest stable step of this solver's phase and what limits it; NULL: none. `hard`: beyond it the method
 	 * is unstable; the value returned is the recommended one. Uses are those of the first stage. */
 	quern_real (*limit)(const void *self, const quern_step *, quern_real *hard, char reason[160]);
-	uint32_t (*substeps)(
-		const void *self); /* [setup] how often QUERN_SUBSTEP runs in a step; NULL: no wish */
+	/* [setup, stage] how often QUERN_SUBSTEP runs in a step, which follows from parameters alone; 0 or NULL: no
+	 * wish. All wishes must be one; in another stage of the scene it may be another */
+	uint32_t (*substeps)(const void *self);
 	/* [stage] after every substep while settling: true when at rest. NULL: nothing to settle */
 	bool (*settled)(const void *self, const quern_step *);
-	/* [stage] one number for each of `sums`, of what the solver carries now. Of the names, the program knows mass (kg; none
-	 * may get lost), owed (kg, of mass that is on its way between solvers), left and poured (kg so far, out through faces of the
-	 * domain and in by sources), momentum_x, momentum_y, momentum_z (kg m/s),
-	 * kinetic, potential, elastic (J), discrete (kg of mass that single bodies carry), and defect (of the solver's own
-	 * invariants so far, relative); all others stand in summary.json under `sums`. NULL: nothing */
+	/* [stage] one number for each of `sums`, of what the solver carries now. Of the names, the program knows mass
+	 * (kg; none may get lost), owed (kg, of mass that is on its way between solvers), left and poured (since 2.1; kg
+	 * so far, out through faces of the domain and in by sources), momentum_x, momentum_y, momentum_z (kg m/s),
+	 * kinetic, potential, elastic (J), discrete (kg of mass that single bodies carry), and defect (of the solver's
+	 * own invariants so far, relative); all others stand in summary.json under `sums`. NULL: nothing */
 	void (*account)(const void *self, const quern_step *, quern_real *sum);
 	/* [stage] after the set-up: about how many steps of s->dt it takes until settled, within a factor of three or so. For
 	 * an estimate alone; may be NULL */
 	quern_real (*settling)(const void *self, const quern_step *);
-	quern_real (*cell)(
-		const void *self); /* [setup] m, of the shared grid; NULL: no wish. All wishes must be one */
+	/* [setup] m, of the shared grid; 0 or NULL: no wish. All wishes must be one, in all stages of the scene */
+	quern_real (*cell)(const void *self);
 	/* [stage] after all state has been read from a file, where anything may stand: whether the solver can go on from it, or
 	 * host->stop. Numbers are finite, and indices lead somewhere. May be NULL */
 	quern_status (*accept)(const void *self, const quern_step *);

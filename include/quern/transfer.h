@@ -19,11 +19,11 @@ typedef struct quern_transfer_batch {
 	quern_real *send[3];         /* m/s, what to send next; NULL in the last pass */
 	quern_real *velocity[3];     /* m/s, in: old, out (last pass only): new */
 	const quern_column *use;
-	/* The last three are NULL but in the last pass of a transfer whose table says `affine`; row-major. With B = sum S v_i
-	 * (x_i - x) and D = sum S (x_i - x)^2, axis by axis: the slope B/D of the linear field around the point, 1/s; D over
-	 * what it will be where the point goes in this step, 1 where shape functions have no D all over; and out, 1/s, the
-	 * matrix C with which the point sends velocity + C (x_i - x) in the next step. B/D keeps slopes, and that times
-	 * `shift` keeps B, the moment. */
+	/* Since 2.1. The last three are NULL but in the last pass of a transfer whose table says `affine`; row-major.
+	 * With B = sum S v_i (x_i - x) and D = sum S (x_i - x)^2, axis by axis: the slope B/D of the linear field around
+	 * the point, 1/s; D over what it will be where the point goes in this step, 1 where shape functions have no D
+	 * all over; and out, 1/s, the matrix C with which the point sends velocity + C (x_i - x) in the next step. B/D
+	 * keeps slopes, and that times `shift` keeps B, the moment. */
 	const quern_real *fit[9], *shift[3];
 	quern_real *affine[9];
 } quern_transfer_batch;
@@ -32,9 +32,10 @@ typedef struct quern_transfer_ops {
 	uint32_t size;
 	uint32_t passes;                                                   /* extra round trips; 0: none */
 	void (*gather[2])(const void *self, const quern_transfer_batch *); /* [batch] */
-	/* [setup] extra round trips of an instance, in place of `passes`; may be NULL */
+	/* since 2.1: [setup] extra round trips of an instance, in place of `passes`; may be NULL */
 	uint32_t (*trips)(const void *self);
-	uint32_t affine; /* 1: is told `fit` and writes `affine`; for points alone, since grains send no matrix */
+	/* since 2.1; 1: is told `fit` and writes `affine`; for points alone, since grains send no matrix */
+	uint32_t affine;
 	uint32_t pad;
 } quern_transfer_ops;
 

@@ -37,12 +37,13 @@ static inline void body_books_add(
 	for (uint32_t k = 0; k < n && to->real[0]; k++) to->real[k][entry] += booked[first + k];
 }
 
-/* Block after block into fields of the bodies; what else holds into `rest`, one entry. Each may not exist. */
+/* Block after block, by their places, into fields of the bodies; what else holds into `rest`, one entry. Each may not exist. */
 static inline void body_books_close(const body_books *b, const quern_step *s, uint32_t n_blocks,
-	const quern_column *impulse, const quern_column *twist, const quern_column *work,
-	const quern_column *rest) {
+	const uint32_t *by_place, const quern_column *impulse, const quern_column *twist,
+	const quern_column *work, const quern_column *rest) {
 	const uint32_t turns = s->dim == 3 ? 3 : 1;
-	for (uint32_t block = 0; block < n_blocks; block++) {
+	for (uint32_t q = 0; q < n_blocks; q++) {
+		const uint32_t block = quern_nth(by_place, q);
 		for (uint32_t body = 0; body + 1 < b->n_bodies; body++) {
 			const quern_real *booked = body_booked(b, block, body);
 			body_books_add(impulse, body, booked, B_IMPULSE, s->dim);

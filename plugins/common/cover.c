@@ -64,7 +64,7 @@ static quern_status cover_material(const quern_step *s, const cover *c, uint32_t
 													  c->grain.real[k][i] <= s->upper[k]));
 		if (inside) key[m++] = block_key(g, c->grain.real, i, &place);
 	}
-	quern_sort_order(m, key, from, work);
+	quern_sort_order(m, key, NULL, from, work);
 	for (uint32_t i = 0; i < m; i++) sorted[i] = key[from[i]];
 	uint32_t blocks = list_blocks(g, m, sorted, block);
 	for (uint32_t b = 0; c->holds && b < g->n_blocks; b++)
@@ -94,6 +94,7 @@ quern_status quern_cover_sort(const quern_step *s, const cover *wanted) {
 		block[b + 1]++;
 	}
 	for (uint32_t b = 0; b < g->n_blocks; b++) block[b + 1] += block[b];
-	quern_sort_order(n, key, from, work);
-	return s->host->remap(s->run, "point", n, from, g->n_blocks, block);
+	quern_sort_order(n, key, s->host->parts(s->run, "point")->entry, from, work);
+	const quern_status sorted = s->host->remap(s->run, "point", n, from, g->n_blocks, block);
+	return sorted == QUERN_OK ? s->host->arrange(s->run, "point", g->by_place) : sorted;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "outlets.h"
 #include "radius.h"
+#include "renew.h"
 #include <math.h>
 
 /* The face that entry i has passed, the first in their order; -1: none. What is fixed stays wherever it is. */
@@ -43,18 +44,14 @@ static void book_entry(const quern_step *s, const outlets *o, uint32_t i, uint32
 
 quern_status quern_outlets_run(const quern_step *s, const outlets *o) {
 	if (!any_outside(s, o)) return QUERN_OK;
-	const quern_set_view set = s->host->set(s->run, o->set);
-	int32_t *from = s->host->memory(s->run, ((size_t)set.n + 1) * sizeof(int32_t));
-	uint32_t *block = s->host->memory(s->run, ((size_t)set.n_blocks + 1) * sizeof(uint32_t));
-	uint32_t kept = 0, b = 0;
-	if (!from || !block) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < set.n; i++) {
+	const quern_parts *p = s->host->parts(s->run, o->set);
+	bool *drop = s->host->memory(s->run, (size_t)p->n + 1);
+	if (!drop) return QUERN_E_MEMORY;
+	for (uint32_t q = 0; q < p->n; q++) {
+		const uint32_t i = quern_nth(p->entry, q);
 		const int32_t face = passed(s, o, i);
-		for (; set.block && b < set.n_blocks && set.block[b] <= i; b++) block[b] = kept;
-		if (face < 0) from[kept++] = (int32_t)i;
-		else book_entry(s, o, i, (uint32_t)face);
+		drop[i] = face >= 0;
+		if (drop[i]) book_entry(s, o, i, (uint32_t)face);
 	}
-	for (; b <= set.n_blocks; b++) block[b] = kept;
-	if (kept == set.n) return QUERN_OK;
-	return s->host->remap(s->run, o->set, kept, from, set.n_blocks, set.block ? block : NULL);
+	return quern_renew(s, &(renewal) { .set = o->set, .drop = drop });
 }

@@ -113,7 +113,7 @@ static quern_real distance2(const placer *p, const quern_spot *a, const quern_sp
 	return d2;
 }
 
-static bool overlaps(const placer *p, const quern_spot *a, const quern_spot *b) {
+bool quern_placer_overlaps(const placer *p, const quern_spot *a, const quern_spot *b) {
 	const quern_real reach = (a->radius + b->radius) - 1e-9 * a->radius;
 	return distance2(p, a, b) < reach * reach;
 }
@@ -146,7 +146,7 @@ bool quern_placer_free(const placer *p, const quern_spot *s) {
 				int32_t c[3] = { 0 };
 				for (uint32_t k = 0; k < p->dim; k++) c[k] = wrapped(p, k, middle[k] + offset[k]);
 				for (int32_t i = p->head[hash(c) & (p->n_heads - 1)]; i >= 0; i = p->next[i])
-					if (overlaps(p, s, &p->spot[i])) return false;
+					if (quern_placer_overlaps(p, s, &p->spot[i])) return false;
 			}
 	return !meets_body(p, s);
 }

@@ -31,6 +31,8 @@ void quern_placer_finish(placer *);
  * that act on the continuum. Until the stage returns; false if memory is gone. */
 bool quern_placer_bodies(placer *, const quern_step *, uint32_t slot, bool nodes);
 void quern_placer_add(placer *, const quern_spot *);
+/* Whether two spots overlap, as the nearest images, by more than 1e-9 of the first one's radius. */
+bool quern_placer_overlaps(const placer *, const quern_spot *, const quern_spot *);
 /* No overlap with grains or bodies above 1e-9 of the spot's radius. */
 bool quern_placer_free(const placer *, const quern_spot *);
 /* The grain that a spot overlaps most, of those that `counts` is true of (NULL: all), by more than `share` of the

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "source.h"
+#include "renew.h"
 #include "tools.h"
 #include <math.h>
 #include <stdio.h>
@@ -70,10 +71,7 @@ quern_status quern_source_room(
 	if (n > MOST - *old)
 		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 			"sources have poured more %s than can be numbered, %d", what, MOST);
-	int32_t *from = s->host->memory(s->run, ((size_t)*old + n + 1) * sizeof(int32_t));
-	if (!from) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < *old + n; i++) from[i] = i < *old ? (int32_t)i : -1;
-	return s->host->remap(s->run, set, *old + n, from, 0, NULL);
+	return quern_renew(s, &(renewal) { .set = set, .n_new = n });
 }
 
 void quern_source_note(const quern_step *s, uint32_t i, const char *section, const source *p,

@@ -110,7 +110,7 @@ QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
 /* The grains with rows of dem.fill; `weight` NULL: all of what each is. */
 QUERN_INLINE cloud dem_cloud(const quern_step *s, const quern_real *weight) {
 	return (cloud) { s->use[FILL_MASS].real[0], weight, s->use[FILL_FIXED].index,
-		s->host->set(s->run, "grain").n };
+		s->host->set(s->run, "grain").n, "grain" };
 }
 
 /* What law to take for item `item` of the pairs (-1: none) and a body (-1: between grains): the contact's own instance. */

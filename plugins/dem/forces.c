@@ -130,6 +130,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->starts = sh->looks && s->step == 0;
 	sh->material = sh->d->pairs.n ? s->use[FORCE_MATERIAL].index : NULL;
 	sh->grain = grains.block;
+	sh->by_place = s->host->parts(s->run, "grain")->by_place;
 	sh->contact = contacts.block;
 	sh->touch = touches.n ? touches.block : NULL;
 	for (uint32_t b = 0; b < grains.n_blocks; b++) {
@@ -172,19 +173,20 @@ static quern_real farthest_with_bodies(const forces_shared *sh, quern_real farth
 	return fmax(farthest, 0.5 * (farthest + *swept));
 }
 
-/* Blocks in order, so that sums do not depend on who did what. */
+/* Blocks in the order of their places, so that sums do not depend on who did what. */
 static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_step *s = sh->s;
 	const quern_column *u = sh->use;
 	quern_real farthest = u[FORCE_DISPLACEMENT].real[0][0];
 	quern_real energy[N_ENERGIES] = { 0 };
-	for (uint32_t b = 0; b < n_blocks; b++) {
+	for (uint32_t q = 0; q < n_blocks; q++) {
+		const uint32_t b = quern_nth(sh->by_place, q);
 		const quern_real way = sqrt(sh->farthest[b]);
 		farthest = way > farthest ? way : farthest;
 		for (int e = 0; e < N_ENERGIES; e++) energy[e] += sh->sums[(size_t)b * N_ENERGIES + (uint32_t)e];
 	}
 	if (!s->settling)
-		body_books_close(&sh->books_of_bodies, s, n_blocks, &u[FORCE_IMPULSE], &u[FORCE_TWIST],
+		body_books_close(&sh->books_of_bodies, s, n_blocks, sh->by_place, &u[FORCE_IMPULSE], &u[FORCE_TWIST],
 			&u[FORCE_WORK], &u[FORCE_SUPPORT]);
 	u[FORCE_DISPLACEMENT].real[0][0] = farthest_with_bodies(sh, farthest);
 	if (u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
@@ -221,7 +223,10 @@ static quern_status look_for_trembling(const forces_shared *sh, uint32_t n_block
 	const quern_step *s = sh->s;
 	int32_t *score = sh->use[FORCE_TREMBLING].index;
 	quern_real turned = 0, mass = 0;
-	for (uint32_t b = 0; b < n_blocks; b++) turned += sh->turned[2 * b], mass += sh->turned[2 * b + 1];
+	for (uint32_t q = 0; q < n_blocks; q++) {
+		const uint32_t b = quern_nth(sh->by_place, q);
+		turned += sh->turned[2 * b], mass += sh->turned[2 * b + 1];
+	}
 	const quern_real way = 1e-9 * sh->d->material[0].radii.mean; /* below that it may be round-off */
 	if (-turned * s->dt * s->dt > mass * way * way) ++*score;
 	else if (*score) --*score;
@@ -265,7 +270,8 @@ quern_status quern_dem_observe(const void *self, const quern_step *s) {
 	if (status == QUERN_OK && sh.deep) status = quern_dem_judge_contacts(&sh, grains.n_blocks);
 	if (status != QUERN_OK) return status;
 	quern_real energy[N_ENERGIES] = { 0 };
-	for (uint32_t b = 0; b < grains.n_blocks; b++) {
+	for (uint32_t q = 0; q < grains.n_blocks; q++) {
+		const uint32_t b = quern_nth(sh.by_place, q);
 		if (sh.bad[b] >= 0) return lost(&sh, sh.bad[b]);
 		for (int e = E_KINETIC; e <= E_SHEARED; e++)
 			energy[e] += sh.sums[(size_t)b * N_ENERGIES + (uint32_t)e];

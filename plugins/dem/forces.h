@@ -51,6 +51,7 @@ typedef struct forces_shared {
 	quern_images images;
 	const int32_t *material; /* NULL: no two contacts of a list have parameters of their own */
 	const uint32_t *grain, *contact, *touch; /* partitions */
+	const uint32_t *by_place;                /* blocks in the order of their places; NULL: in their own */
 	body_books books_of_bodies;              /* the last one of a block: by fixed grains */
 	quern_real *sums;                        /* [block][N_ENERGIES] */
 	quern_real *farthest;                    /* [block] square of the way since the last list */

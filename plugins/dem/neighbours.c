@@ -24,6 +24,7 @@ typedef struct {
 	const uint32_t *bucket; /* by grain: its old entries in `entry` */
 	const int32_t *entry;
 	const int32_t *old_first, *old_second;
+	const uint32_t *by_place;   /* blocks of grains, and so of contacts and touches; NULL: in order */
 	const int32_t *old_feature; /* of touches; NULL: entries of one pair are one */
 	const body_pose *pose;      /* by body */
 } listing;
@@ -58,6 +59,29 @@ static void set_job(listing *l) {
 	l->id = s->use[NEAR_ID].id;
 }
 
+#ifdef QUERN_PERMUTED_BLOCKS
+/* Numbers of blocks that run against the order of their places: an odd factor takes no two to one. */
+static void permute_blocks(uint32_t n, uint64_t *key) {
+	for (uint32_t i = 0; i < n; i++)
+		key[i] = (uint64_t)((uint32_t)(key[i] >> 32) * 2654435761u) << 32 | (uint32_t)key[i];
+}
+
+/* place[b] is the number that block b would have had. */
+static uint32_t *places_of(
+	const listing *l, const uint64_t *key, const int32_t *from, const uint32_t *block, uint32_t n) {
+	const quern_step *s = l->s;
+	uint64_t *place = s->host->memory(s->run, ((size_t)n + 1) * sizeof(uint64_t));
+	int32_t *order = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
+	void *work = s->host->memory(s->run, quern_sort_bytes(n));
+	if (!place || !order || !work) return NULL;
+	for (uint32_t b = 0; b < n; b++) place[b] = (uint32_t)(key[from[block[b]]] >> 32) * 244002641u;
+	for (uint32_t b = 0; b < n; b++) place[b] &= 0xffffffffu;
+	quern_sort_order(n, place, NULL, order, work);
+	return (uint32_t *)order;
+}
+#endif
+
+/* Grains of one place keep the order that they had by their blocks' places. */
 static quern_status sort_grains(listing *l) {
 	const quern_step *s = l->s;
 	set_job(l);
@@ -65,16 +89,25 @@ static quern_status sort_grains(listing *l) {
 	uint64_t *key = s->host->memory(s->run, ((size_t)n + 1) * sizeof(uint64_t));
 	int32_t *from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
 	uint64_t *work = s->host->memory(s->run, quern_sort_bytes(n));
-	uint32_t *block = s->host->memory(s->run, ((size_t)n + 2) * sizeof(uint32_t));
+	uint32_t *block = s->host->memory(s->run, ((size_t)n + 2) * sizeof(uint32_t)), *by_place = NULL;
 	if (!key || !from || !work || !block) return QUERN_E_MEMORY;
 	const size_t wanted = l->ops->keys(l->search->self, &l->job, key);
-	quern_sort_order(n, key, from, work);
+#ifdef QUERN_PERMUTED_BLOCKS
+	permute_blocks(n, key);
+#endif
+	quern_sort_order(n, key, s->host->parts(s->run, "grain")->entry, from, work);
 	uint32_t n_blocks = 0;
 	for (uint32_t i = 0; i < n; i++)
 		if (!i || key[from[i]] >> 32 != key[from[i - 1]] >> 32) block[n_blocks++] = i;
 	block[n_blocks] = n;
-	const quern_status status = s->host->remap(s->run, "grain", n, from, n_blocks, block);
+#ifdef QUERN_PERMUTED_BLOCKS
+	by_place = places_of(l, key, from, block, n_blocks);
+	if (!by_place) return QUERN_E_MEMORY;
+#endif
+	quern_status status = s->host->remap(s->run, "grain", n, from, n_blocks, block);
+	if (status == QUERN_OK) status = s->host->arrange(s->run, "grain", by_place);
 	if (status != QUERN_OK) return status;
+	l->by_place = by_place;
 	set_job(l);
 	l->job.memory = s->host->memory(s->run, wanted + 64);
 	if (!l->job.memory) return QUERN_E_MEMORY;
@@ -98,7 +131,7 @@ static void sort_by(const listing *l, quern_pair *pair, uint32_t n, int by, uint
 	int32_t *from = (int32_t *)(void *)(work + quern_sort_bytes(n) / sizeof *work + 1);
 	quern_pair *copy = (quern_pair *)(void *)(from + n + n % 2);
 	for (uint32_t i = 0; i < n; i++) key[i] = key_of(l, &pair[i], by);
-	quern_sort_order(n, key, from, work);
+	quern_sort_order(n, key, NULL, from, work);
 	memcpy(copy, pair, n * sizeof *pair);
 	for (uint32_t i = 0; i < n; i++) pair[i] = copy[from[i]];
 }
@@ -142,7 +175,7 @@ static quern_status index_old(listing *l, const char *set, const int32_t *first,
 	uint32_t *bucket = s->host->memory(s->run, ((size_t)n_grains + 2) * sizeof(uint32_t));
 	int32_t *entry = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
 	if (!bucket || !entry) return QUERN_E_MEMORY;
-	quern_bucket(n, first, n_grains, bucket, entry);
+	quern_bucket(n, first, NULL, n_grains, bucket, entry);
 	l->bucket = bucket;
 	l->entry = entry;
 	l->old_first = first;
@@ -203,6 +236,7 @@ static quern_status list_contacts(listing *l) {
 	l->old_feature = NULL;
 	s->host->parallel(s->run, l->job.n_blocks, gather_pairs, l);
 	status = s->host->remap(s->run, "contact", n, l->list_from, l->job.n_blocks, l->start);
+	if (status == QUERN_OK) status = s->host->arrange(s->run, "contact", l->by_place);
 	if (status != QUERN_OK) return status;
 	int32_t *first = s->use[NEAR_FIRST].index, *second = s->use[NEAR_SECOND].index;
 	for (uint32_t k = 0; k < n; k++) first[k] = l->list[k].first, second[k] = l->list[k].second;
@@ -332,6 +366,7 @@ static quern_status list_touches(listing *l) {
 	l->old_feature = s->use[NEAR_FEATURE].index;
 	s->host->parallel(s->run, l->job.n_blocks, gather_touches, l);
 	status = s->host->remap(s->run, "touch", n, l->list_from, l->job.n_blocks, l->start);
+	if (status == QUERN_OK) status = s->host->arrange(s->run, "touch", l->by_place);
 	if (status != QUERN_OK) return status;
 	int32_t *grain = s->use[NEAR_GRAIN].index, *body = s->use[NEAR_BODY].index,
 			*feature = s->use[NEAR_FEATURE].index;

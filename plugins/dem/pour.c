@@ -144,7 +144,9 @@ static uint32_t points_near(pouring *p, obstacle *near) {
 	const quern_real *volume = s->use[POUR_POINT_VOLUME].real[0];
 	uint32_t m = 0;
 	if (!s->use[POUR_POINT].real[0] || !volume) return 0;
-	for (uint32_t i = 0; i < s->host->set(s->run, "point").n; i++) {
+	const quern_parts *points = s->host->parts(s->run, "point");
+	for (uint32_t q = 0; q < points->n; q++) {
+		const uint32_t i = quern_nth(points->entry, q);
 		const quern_real width = s->dim == 2 ? sqrt(volume[i]) : quern_cbrt(volume[i]);
 		obstacle o = { 0, { .radius = 0.5 * width } };
 		for (uint32_t k = 0; k < s->dim; k++) o.spot.x[k] = s->use[POUR_POINT].real[k][i];

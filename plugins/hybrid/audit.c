@@ -50,24 +50,23 @@ static quern_real impulse(const quern_step *s, uint32_t axis) {
 
 static bool take_sums(const quern_step *s, sums *out) {
 	const quern_column *u = s->use;
-	const size_t cells = s->host->set(s->run, "cell").n;
 	const cloud grains = { u[A_GRAIN_MASS].real[0], u[A_GRAIN_WEIGHT].real[0], u[A_GRAIN_FIXED].index,
-		s->host->set(s->run, "grain").n };
+		s->host->set(s->run, "grain").n, "grain" };
 	const cloud points = { u[A_POINT_MASS].real[0], u[A_POINT_WEIGHT].real[0], NULL,
-		s->host->set(s->run, "point").n };
+		s->host->set(s->run, "point").n, "point" };
 	if (!add_cloud(s, &grains, &u[A_GRAIN_VELOCITY], out) ||
 		!add_cloud(s, &points, &u[A_POINT_VELOCITY], out))
 		return false;
-	out->mass = out->carried + s->host->sum(s->run, cells, u[A_GRAIN_OWED].real[0]) +
-				s->host->sum(s->run, cells, u[A_POINT_OWED].real[0]);
+	out->mass = out->carried + s->host->sum_set(s->run, "cell", u[A_GRAIN_OWED].real[0]) +
+				s->host->sum_set(s->run, "cell", u[A_POINT_OWED].real[0]);
 	if (u[A_PASSED].real[0]) {
 		out->poured = book_total(u[A_POURED].real[0], entries(s, "grain_source"));
 		out->left = book_total(u[A_GRAIN_LEFT].real[0], outlet_faces(s)) +
 					book_total(u[A_POINT_LEFT].real[0], outlet_faces(s)) + u[A_OWED_LEFT].real[0][0];
 	}
 	for (uint32_t k = 0; k < s->dim; k++)
-		out->owed_momentum[k] = s->host->sum(s->run, cells, u[A_GRAIN_OWED_MOMENTUM].real[k]) +
-								s->host->sum(s->run, cells, u[A_POINT_OWED_MOMENTUM].real[k]);
+		out->owed_momentum[k] = s->host->sum_set(s->run, "cell", u[A_GRAIN_OWED_MOMENTUM].real[k]) +
+								s->host->sum_set(s->run, "cell", u[A_POINT_OWED_MOMENTUM].real[k]);
 	return true;
 }
 

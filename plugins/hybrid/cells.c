@@ -83,8 +83,10 @@ quern_status quern_hybrid_sort(update *d) {
 		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i, &last);
 	for (uint32_t i = 0; i < d->n_points; i++)
 		d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i, &last);
-	quern_bucket(d->n_grains, d->grain_cell, d->n_cells, d->grain_begin, d->grain);
-	quern_bucket(d->n_points, d->point_cell, d->n_cells, d->point_begin, d->point);
+	d->grain_order = s->host->parts(s->run, "grain")->entry;
+	d->point_order = s->host->parts(s->run, "point")->entry;
+	quern_bucket(d->n_grains, d->grain_cell, d->grain_order, d->n_cells, d->grain_begin, d->grain);
+	quern_bucket(d->n_points, d->point_cell, d->point_order, d->n_cells, d->point_begin, d->point);
 	return QUERN_OK;
 }
 
@@ -162,8 +164,10 @@ void quern_hybrid_fixed(update *d) {
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
 	quern_real *taken = fixed ? take(d, d->n_cells, sizeof(quern_real)) : NULL;
 	if (!taken) return;
-	for (uint32_t i = 0; i < d->n_grains; i++)
+	for (uint32_t q = 0; q < d->n_grains; q++) {
+		const uint32_t i = quern_nth(d->grain_order, q);
 		if (fixed[i]) spread_grain(d, i, d->h->density / d->h->packed, taken);
+	}
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		if (!(taken[c] > 0)) continue;
 		const quern_real left = d->open[c] - taken[c];
@@ -178,8 +182,10 @@ void quern_hybrid_fractions(update *d) {
 	quern_real *fraction = u[U_FRACTION].real[0];
 	if (!fraction) return;
 	memset(fraction, 0, d->n_cells * sizeof(quern_real));
-	for (uint32_t i = 0; i < d->n_grains; i++)
+	for (uint32_t q = 0; q < d->n_grains; q++) {
+		const uint32_t i = quern_nth(d->grain_order, q);
 		if (d->grain_cell[i] >= 0) spread_grain(d, i, 1, fraction);
+	}
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		quern_real mass = 0;
 		for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
@@ -309,8 +315,10 @@ quern_status quern_hybrid_normals(update *d) {
 /* `mass`: by cell, of all whose home it is; NULL: nobody asks. */
 static void put_homes(
 	const update *d, const cloud *of, const quern_column *x, int32_t *home, quern_real *mass) {
+	const uint32_t *order = d->s->host->parts(d->s->run, of->set)->entry;
 	quern_grid_cursor last = { .block = -1 };
-	for (uint32_t i = 0; i < of->n; i++) {
+	for (uint32_t q = 0; q < of->n; q++) {
+		const uint32_t i = quern_nth(order, q);
 		const int32_t c = of->fixed && of->fixed[i] ? -1 : cell_of(d, x->real, i, &last);
 		int32_t cell[3];
 		home[i] = -1;

@@ -102,7 +102,12 @@ quern_status quern_hybrid_couple(const void *self, const quern_step *s) {
 	s->host->parallel(s->run, g->n_blocks, couple_block, &w);
 	quern_real *worst = s->use[C_EXCHANGE].real[0];
 	*worst = 0;
-	for (uint32_t b = 0; b < g->n_blocks; b++) *worst = w.defect[b] > *worst ? w.defect[b] : *worst;
-	if (s->use[C_ENERGY].real[0]) s->use[C_ENERGY].real[0][0] += s->host->sum(s->run, g->n_blocks, w.energy);
+	quern_real taken = 0;
+	for (uint32_t q = 0; q < g->n_blocks; q++) {
+		const uint32_t b = quern_nth(g->by_place, q);
+		*worst = w.defect[b] > *worst ? w.defect[b] : *worst;
+		taken += w.energy[b];
+	}
+	if (s->use[C_ENERGY].real[0]) s->use[C_ENERGY].real[0][0] += taken;
 	return QUERN_OK;
 }

@@ -1,166 +1,117 @@
 /* SPDX-License-Identifier: MIT */
-/* enrich - mass owed to the grains becomes grains: a packer places them, the flow around gives them their motion */
+/* enrich - mass owed to the grains becomes grains: a packer places them, the flow around gives them their motion. Cells that
+ * do not see each other are packed at once, by all threads; which do is a matter of place alone. */
 #include "../common/placer.h"
+#include "../common/renew.h"
+#include "../common/sort.h"
 #include "update.h"
 #include <math.h>
-#include <quern/math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_SEEDS = 4096 };
-
+/* A cell that is owed grains, and those that it gets. */
 typedef struct {
+	const struct enriching *all;
+	uint32_t c;
+	int32_t cell[3];
+	quern_real lower[3], upper[3];
+	quern_real rest; /* kg still owed to it */
+	new_grain *grain;
+	uint32_t n, cap;
+	bool failed; /* memory ran out */
+} packed_cell;
+
+typedef struct enriching {
 	update *d;
-	placer placer;
-	quern_spot *seed;
-	uint64_t draws;
-	uint32_t c;                    /* the cell that is being enriched */
-	quern_real lower[3], upper[3]; /* of it */
-	quern_real rest;               /* kg still owed to it */
-	uint32_t first;                /* of its grains among the new ones */
+	placer placer;     /* grains that are there, and those of colours before */
+	packed_cell *cell; /* in the order of places */
+	uint32_t n;
+	int32_t *by_colour; /* numbers of cells */
+	uint64_t *colour;   /* by cell */
 } enriching;
 
 static quern_real mass_of(const hybrid *h, quern_real r) { return quern_radius_mass(r, h->density, h->dim); }
 
-static quern_real waiting(const enriching *e) {
-	return quern_radius_draw(&e->d->h->radii, e->d->s->host, e->draws);
+/* The radius of the grain that waits: the same until it is placed, be it in a later update, since one that could be drawn anew
+ * would come out small too often. A cell that is new begins with numbers of its own. */
+static quern_real waiting(const update *d, const packed_cell *p) {
+	enum { EACH = 64, MOST = 1 << 25 };
+	int32_t *draws = &d->u[U_DRAWS].index[p->c];
+	if (!*draws) *draws = 1 + EACH * (d->u[U_UPDATES].index[0] % MOST);
+	const uint64_t number = (uint64_t)quern_grid_number(d->g, p->cell) << 32 | (uint32_t)*draws;
+	return quern_radius_draw(&d->h->radii, d->s->host, number);
 }
 
 /* Half a grain over would never be paid back: a grain is placed while more than all of it is owed. */
-static bool is_owed(const enriching *e) {
-	return e->rest > grain_share(e->d, e->c) * mass_of(e->d->h, waiting(e));
+static bool is_owed(const update *d, const packed_cell *p) {
+	return p->rest > grain_share(d, p->c) * mass_of(d->h, waiting(d, p));
 }
 
 /* ---- what a packer may ask ---- */
 
-static quern_real job_radius(quern_pack_job *job) { return waiting(job->scene); }
+static quern_real job_radius(quern_pack_job *job) {
+	const packed_cell *p = job->scene;
+	return waiting(p->all->d, p);
+}
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
-	const enriching *e = job->scene;
-	for (uint32_t k = 0; k < e->d->s->dim; k++)
-		if (x[k] < e->lower[k] || x[k] >= e->upper[k]) return false;
+	const packed_cell *p = job->scene;
+	for (uint32_t k = 0; k < job->dim; k++)
+		if (x[k] < p->lower[k] || x[k] >= p->upper[k]) return false;
 	return true;
 }
 
+/* The placer knows the cell's own new grains only once its colour is through. */
 static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
-	return quern_placer_free(&((const enriching *)job->scene)->placer, spot);
+	const packed_cell *p = job->scene;
+	for (uint32_t i = 0; i < p->n; i++) {
+		quern_spot own = { .radius = p->grain[i].radius };
+		memcpy(own.x, p->grain[i].position, sizeof own.x);
+		if (quern_placer_overlaps(&p->all->placer, spot, &own)) return false;
+	}
+	return quern_placer_free(&p->all->placer, spot);
 }
 
 static bool job_place(quern_pack_job *job, const quern_spot *spot) {
-	enriching *e = job->scene;
-	update *d = e->d;
-	if (d->n_new_grains == d->cap_grains) {
-		const uint32_t cap = d->cap_grains ? 2 * d->cap_grains : 256;
-		new_grain *grown = realloc(d->grains, cap * sizeof(new_grain));
-		if (!grown) return d->failed = true, false;
-		d->grains = grown;
-		d->cap_grains = cap;
+	packed_cell *p = job->scene;
+	const update *d = p->all->d;
+	if (p->n == p->cap) {
+		const uint32_t cap = p->cap ? 2 * p->cap : 16;
+		new_grain *grown = realloc(p->grain, cap * sizeof(new_grain));
+		if (!grown) return p->failed = true, false;
+		p->grain = grown;
+		p->cap = cap;
 	}
-	new_grain *g = &d->grains[d->n_new_grains++];
-	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d, e->c), .cell = (int32_t)e->c };
+	new_grain *g = &p->grain[p->n++];
+	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d, p->c), .cell = (int32_t)p->c };
 	memcpy(g->position, spot->x, sizeof g->position);
-	quern_placer_add(&e->placer, spot);
-	e->rest -= g->weight * mass_of(d->h, g->radius);
-	e->draws++;
-	d->failed = d->failed || e->placer.failed;
-	return !d->failed && is_owed(e);
-}
-
-/* ---- the motion of the flow around ---- */
-
-typedef struct {
-	quern_real weight, velocity[3], moment[3][3]; /* sums over w, w v, w v_i x_j */
-	quern_real way[3];
-} surroundings;
-
-static void look_at(const update *d, const quern_column *x, const quern_column *v, quern_real mass,
-	uint32_t i, const quern_real at[3], surroundings *sum) {
-	const uint32_t dim = d->s->dim;
-	const quern_real inverse = 1 / d->h->diameter;
-	quern_real r[3] = { 0 }, r2 = 0;
-	for (uint32_t k = 0; k < dim; k++) {
-		r[k] = quern_image(x->real[k][i] - at[k], d->images.half[k], d->images.length[k]);
-		r2 += r[k] * r[k] * inverse * inverse;
-	}
-	if (r2 > 36) return;
-	const quern_real w = mass * quern_exp(-0.5 * r2);
-	sum->weight += w;
-	for (uint32_t k = 0; k < dim; k++) {
-		sum->velocity[k] += w * v->real[k][i];
-		sum->way[k] += w * r[k];
-		for (uint32_t j = 0; j < dim; j++) sum->moment[k][j] += w * v->real[k][i] * r[j];
-	}
-}
-
-static void look_into(const update *d, uint32_t c, const quern_real at[3], surroundings *sum) {
-	const quern_column *u = d->u;
-	const cloud grains = moving_grains(d->s), points = all_points(d->s);
-	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
-		const uint32_t i = (uint32_t)d->grain[q];
-		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY], cloud_mass(&grains, i), i, at, sum);
-	}
-	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const uint32_t i = (uint32_t)d->point[q];
-		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY], cloud_mass(&points, i), i, at, sum);
-	}
-}
-
-static void look_around(const update *d, const quern_real at[3], surroundings *sum) {
-	const quern_real reach = 6 * d->h->diameter;
-	int32_t low[3] = { 0 }, high[3] = { 0 };
-	*sum = (surroundings) { .weight = 0 };
-	for (uint32_t k = 0; k < d->s->dim; k++) {
-		low[k] = quern_grid_cell(d->g, k, at[k] - reach);
-		high[k] = quern_grid_cell(d->g, k, at[k] + reach);
-		if (d->g->periodic[k] && high[k] - low[k] >= d->g->cells[k]) low[k] = 0, high[k] = d->g->cells[k] - 1;
-	}
-	for (int32_t z = low[2]; z <= high[2]; z++)
-		for (int32_t y = low[1]; y <= high[1]; y++)
-			for (int32_t x = low[0]; x <= high[0]; x++) {
-				const int32_t c = quern_grid_entry_back(d->g, (int32_t[3]) { x, y, z });
-				if (c >= 0) look_into(d, (uint32_t)c, at, sum);
-			}
-}
-
-/* Velocity: the mean under a Gaussian of one diameter; spin: half the curl of that mean as a field. */
-static void set_motion(const update *d, new_grain *g) {
-	const quern_real inverse2 = 1 / (d->h->diameter * d->h->diameter);
-	quern_real slope[3][3] = { { 0 } };
-	surroundings sum;
-	look_around(d, g->position, &sum);
-	if (!(sum.weight > 0)) return;
-	for (uint32_t k = 0; k < d->s->dim; k++) g->velocity[k] = sum.velocity[k] / sum.weight;
-	for (uint32_t k = 0; k < d->s->dim; k++)
-		for (uint32_t j = 0; j < d->s->dim; j++)
-			slope[k][j] = (sum.moment[k][j] - g->velocity[k] * sum.way[j]) * inverse2 / sum.weight;
-	if (d->s->dim == 2) g->spin[0] = 0.5 * (slope[1][0] - slope[0][1]);
-	else
-		for (uint32_t k = 0; k < 3; k++)
-			g->spin[k] = 0.5 * (slope[(k + 2) % 3][(k + 1) % 3] - slope[(k + 1) % 3][(k + 2) % 3]);
+	p->rest -= g->weight * mass_of(d->h, g->radius);
+	d->u[U_DRAWS].index[p->c]++;
+	return is_owed(d, p);
 }
 
 /* ---- one cell ---- */
 
 /* The packer's grains together get the momentum that was owed; what they draw is booked. */
-static void settle(enriching *e) {
-	update *d = e->d;
+static void settle(packed_cell *p) {
+	update *d = p->all->d;
 	const uint32_t dim = d->s->dim;
 	quern_real *owed = d->u[U_GRAIN_OWED].real[0];
 	quern_real mass = 0, momentum[3] = { 0 }, wanted[3] = { 0 };
-	quern_hybrid_owed_velocity(d, e->c, owed[e->c], d->u[U_GRAIN_OWED_MOMENTUM], wanted);
-	for (uint32_t i = e->first; i < d->n_new_grains; i++) {
-		const quern_real m = mass_of(d->h, d->grains[i].radius);
-		set_motion(d, &d->grains[i]);
+	quern_hybrid_owed_velocity(d, p->c, owed[p->c], d->u[U_GRAIN_OWED_MOMENTUM], wanted);
+	for (uint32_t i = 0; i < p->n; i++) {
+		const quern_real m = mass_of(d->h, p->grain[i].radius);
+		quern_hybrid_motion(d, &p->grain[i]);
 		mass += m;
-		for (uint32_t k = 0; k < dim; k++) momentum[k] += m * d->grains[i].velocity[k];
+		for (uint32_t k = 0; k < dim; k++) momentum[k] += m * p->grain[i].velocity[k];
 	}
-	for (uint32_t i = e->first; i < d->n_new_grains; i++) {
-		new_grain *g = &d->grains[i];
+	for (uint32_t i = 0; i < p->n; i++) {
+		new_grain *g = &p->grain[i];
 		const quern_real m = g->weight * mass_of(d->h, g->radius);
-		owed[e->c] -= m;
+		owed[p->c] -= m;
 		for (uint32_t k = 0; k < dim; k++) {
 			g->velocity[k] += wanted[k] - momentum[k] / mass;
-			d->u[U_GRAIN_OWED_MOMENTUM].real[k][e->c] -= m * g->velocity[k];
+			d->u[U_GRAIN_OWED_MOMENTUM].real[k][p->c] -= m * g->velocity[k];
 		}
 	}
 }
@@ -179,40 +130,89 @@ static void find_upstream(const update *d, const int32_t cell[3], quern_real ups
 	for (uint32_t k = 0; k < d->s->dim && length > 0; k++) upstream[k] /= sqrt(length);
 }
 
-static void enrich_cell(enriching *e, uint32_t c) {
-	update *d = e->d;
+static void enrich_cell(packed_cell *p) {
+	const enriching *e = p->all;
+	const update *d = e->d;
 	const quern_bound *packer = &d->s->slot[SLOT_PACKER][0];
-	int32_t cell[3];
-	e->c = c;
-	e->rest = d->u[U_GRAIN_OWED].real[0][c];
-	e->first = d->n_new_grains;
-	if (!is_owed(e) || !quern_grid_cell_of(d->g, c, cell)) return;
-	for (uint32_t k = 0; k < 3; k++) {
-		e->lower[k] = k < d->s->dim ? d->g->lower[k] + cell[k] * d->g->cell : 0;
-		e->upper[k] = k < d->s->dim ? e->lower[k] + d->g->cell : 0;
+	uint32_t n = 0;
+	quern_spot *seed =
+		quern_placer_seeds(&e->placer, p->lower, p->upper, 2 * quern_radius_most(&d->h->radii), &n);
+	if (!seed) {
+		p->failed = true;
+		return;
 	}
 	quern_pack_job job = { .dim = d->s->dim,
 		.stream = d->h->radii.stream + 1,
 		.host = d->s->host,
-		.key = (uint64_t)quern_grid_number(d->g, cell),
+		.key = (uint64_t)quern_grid_number(d->g, p->cell),
 		.counter = (uint64_t)d->u[U_UPDATES].index[0] << 32,
-		.seed = e->seed,
+		.seed = seed,
+		.n_seed = n,
 		.radius = job_radius,
 		.inside = job_inside,
 		.free = job_free,
 		.place = job_place,
-		.scene = e };
-	memcpy(job.lower, e->lower, sizeof job.lower);
-	memcpy(job.upper, e->upper, sizeof job.upper);
-	find_upstream(d, cell, job.upstream);
-	const uint32_t n = quern_placer_near(
-		&e->placer, e->lower, e->upper, 2 * quern_radius_most(&d->h->radii), e->seed, MOST_SEEDS);
-	job.n_seed = n < MOST_SEEDS ? n : MOST_SEEDS;
+		.scene = p };
+	memcpy(job.lower, p->lower, sizeof job.lower);
+	memcpy(job.upper, p->upper, sizeof job.upper);
+	find_upstream(d, p->cell, job.upstream);
 	((const quern_packer_ops *)packer->ops)->pack[d->s->dim - 2](packer->self, &job);
-	settle(e);
+	free(seed);
+	settle(p);
 }
 
-/* ---- all cells, in their order ---- */
+static void enrich_one(void *arg, uint32_t i, uint32_t worker) {
+	const enriching *e = arg;
+	(void)worker;
+	enrich_cell(&e->cell[e->by_colour[i]]);
+}
+
+/* ---- all cells, colour by colour ---- */
+
+static bool find_cells(enriching *e) {
+	const update *d = e->d;
+	const quern_real *owed = d->u[U_GRAIN_OWED].real[0];
+	size_t most = 0;
+	for (uint32_t c = 0; c < d->n_cells; c++) most += d->zone[c] == QUERN_HYBRID && owed[c] > 0;
+	e->cell = d->s->host->memory(d->s->run, (most + 1) * sizeof *e->cell);
+	if (!e->cell) return false;
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		packed_cell p = { .all = e, .c = nth_cell(d, q), .rest = owed[nth_cell(d, q)] };
+		if (d->zone[p.c] != QUERN_HYBRID || !(p.rest > 0) || !quern_grid_cell_of(d->g, p.c, p.cell)) continue;
+		if (!is_owed(d, &p)) continue;
+		for (uint32_t k = 0; k < d->s->dim; k++) {
+			p.lower[k] = d->g->lower[k] + p.cell[k] * d->g->cell;
+			p.upper[k] = p.lower[k] + d->g->cell;
+		}
+		e->cell[e->n++] = p;
+	}
+	return true;
+}
+
+/* Cells that are `apart` or more steps from each other along an axis cannot touch each other's grains. Where that many
+ * do not go into a periodic axis, the cells that are left over have colours of their own. */
+static uint64_t colour_of(const update *d, const int32_t cell[3], int32_t apart) {
+	uint64_t colour = 0;
+	for (uint32_t k = 0; k < d->s->dim; k++) {
+		const int32_t rounds = d->g->cells[k] - d->g->cells[k] % apart;
+		const bool over = d->g->periodic[k] && cell[k] >= rounds;
+		colour = colour * 2 * (uint64_t)apart + (uint64_t)(over ? apart + cell[k] - rounds : cell[k] % apart);
+	}
+	return colour;
+}
+
+static bool colour_cells(enriching *e) {
+	const update *d = e->d;
+	const quern_step *s = d->s;
+	const quern_real reach = 2 * quern_radius_most(&d->h->radii) / d->g->cell;
+	e->colour = s->host->memory(s->run, ((size_t)e->n + 1) * sizeof *e->colour);
+	e->by_colour = s->host->memory(s->run, ((size_t)e->n + 1) * sizeof *e->by_colour);
+	void *work = s->host->memory(s->run, quern_sort_bytes(e->n));
+	if (!e->colour || !e->by_colour || !work) return false;
+	for (uint32_t i = 0; i < e->n; i++) e->colour[i] = colour_of(d, e->cell[i].cell, (int32_t)reach + 2);
+	quern_sort_order(e->n, e->colour, NULL, e->by_colour, work);
+	return true;
+}
 
 static bool place_obstacles(enriching *e) {
 	const update *d = e->d;
@@ -220,12 +220,11 @@ static bool place_obstacles(enriching *e) {
 	quern_real most = quern_radius_most(&d->h->radii);
 	for (uint32_t i = 0; i < d->n_grains; i++)
 		most = d->u[U_GRAIN_RADIUS].real[0][i] > most ? d->u[U_GRAIN_RADIUS].real[0][i] : most;
-	e->seed = s->host->memory(s->run, MOST_SEEDS * sizeof(quern_spot));
-	if (!e->seed ||
-		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
+	if (quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
 		!quern_placer_bodies(&e->placer, s, SLOT_BODIES, false))
 		return false;
-	for (uint32_t i = 0; i < d->n_grains; i++) {
+	for (uint32_t q = 0; q < d->n_grains; q++) {
+		const uint32_t i = quern_nth(d->grain_order, q);
 		quern_spot spot = { .radius = d->u[U_GRAIN_RADIUS].real[0][i] };
 		if (d->drop_grain[i]) continue;
 		for (uint32_t k = 0; k < s->dim; k++) spot.x[k] = d->u[U_GRAIN_POSITION].real[k][i];
@@ -234,40 +233,70 @@ static bool place_obstacles(enriching *e) {
 	return !e->placer.failed;
 }
 
-quern_status quern_hybrid_grains(update *d) {
-	enriching e = { .d = d, .draws = (uint64_t)d->u[U_DRAWS].index[0] };
-	bool any = false;
-	for (uint32_t c = 0; c < d->n_cells; c++) {
-		e.c = c;
-		e.rest = d->u[U_GRAIN_OWED].real[0][c];
-		any = any || (d->zone[c] == QUERN_HYBRID && is_owed(&e));
+/* What the cells of one colour have got is in the way of the next ones. */
+static bool add_obstacles(enriching *e, uint32_t begin, uint32_t end) {
+	bool good = true;
+	for (uint32_t i = begin; i < end; i++) {
+		const packed_cell *p = &e->cell[e->by_colour[i]];
+		good = good && !p->failed;
+		for (uint32_t k = 0; k < p->n; k++) {
+			quern_spot spot = { .radius = p->grain[k].radius };
+			memcpy(spot.x, p->grain[k].position, sizeof spot.x);
+			quern_placer_add(&e->placer, &spot);
+		}
 	}
-	if (!any) return QUERN_OK;
-	d->failed = d->failed || !place_obstacles(&e);
-	for (uint32_t c = 0; c < d->n_cells && !d->failed; c++)
-		if (d->zone[c] == QUERN_HYBRID) enrich_cell(&e, c);
-	d->u[U_DRAWS].index[0] = (int32_t)e.draws;
+	return good && !e->placer.failed;
+}
+
+static bool enrich_all(enriching *e) {
+	const quern_step *s = e->d->s;
+	int32_t *all = e->by_colour;
+	bool good = true;
+	for (uint32_t begin = 0, end; begin < e->n && good; begin = end) {
+		for (end = begin + 1; end < e->n && e->colour[all[end]] == e->colour[all[begin]];) end++;
+		e->by_colour = all + begin;
+		s->host->parallel(s->run, end - begin, enrich_one, e);
+		e->by_colour = all;
+		good = add_obstacles(e, begin, end);
+	}
+	return good;
+}
+
+/* New grains in the order of their cells' places, which gives them their numbers. */
+static bool gather(enriching *e) {
+	update *d = e->d;
+	size_t n = 0;
+	for (uint32_t i = 0; i < e->n; i++) n += e->cell[i].n;
+	d->grains = malloc((n + 1) * sizeof(new_grain));
+	for (uint32_t i = 0; i < e->n && d->grains; i++) {
+		if (!e->cell[i].n) continue;
+		memcpy(d->grains + d->n_new_grains, e->cell[i].grain, e->cell[i].n * sizeof(new_grain));
+		d->n_new_grains += e->cell[i].n;
+	}
+	return d->grains;
+}
+
+quern_status quern_hybrid_grains(update *d) {
+	enriching e = { .d = d };
+	bool good = find_cells(&e);
+	if (good && !e.n) return QUERN_OK;
+	good = good && colour_cells(&e) && place_obstacles(&e) && enrich_all(&e) && gather(&e);
+	for (uint32_t i = 0; i < e.n; i++) free(e.cell[i].grain);
 	quern_placer_finish(&e.placer);
-	return d->failed ? QUERN_E_MEMORY : QUERN_OK;
+	return good ? QUERN_OK : QUERN_E_MEMORY;
 }
 
 /* ---- the set itself ---- */
 
 quern_status quern_hybrid_apply_grains(update *d) {
 	const quern_step *s = d->s;
-	uint32_t kept = 0;
-	int32_t *from = s->host->memory(s->run, ((size_t)d->n_grains + d->n_new_grains + 1) * sizeof(int32_t));
-	if (!from) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < d->n_grains; i++)
-		if (!d->drop_grain[i]) from[kept++] = (int32_t)i;
-	if (kept == d->n_grains && !d->n_new_grains) return QUERN_OK;
-	for (uint32_t i = 0; i < d->n_new_grains; i++) from[kept + i] = -1;
-	const quern_status status = s->host->remap(s->run, "grain", kept + d->n_new_grains, from, 0, NULL);
-	if (status != QUERN_OK) return status;
+	renewal r = { .set = "grain", .drop = d->drop_grain, .n_new = d->n_new_grains };
+	const quern_status status = quern_renew(s, &r);
+	if (status != QUERN_OK || (r.first == d->n_grains && !d->n_new_grains)) return status;
 	const quern_column *u = d->u;
 	for (uint32_t i = 0; i < d->n_new_grains; i++) {
 		const new_grain *g = &d->grains[i];
-		const uint32_t to = kept + i;
+		const uint32_t to = r.first + i;
 		for (uint32_t k = 0; k < s->dim; k++) {
 			u[U_GRAIN_POSITION].real[k][to] = g->position[k];
 			u[U_GRAIN_VELOCITY].real[k][to] = g->velocity[k];

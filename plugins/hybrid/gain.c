@@ -10,20 +10,25 @@ static quern_real in_contacts(const quern_step *s) {
 	const quern_real *radius = s->use[A_GRAIN_RADIUS].real[0];
 	quern_real sum = 0;
 	contact_seen c;
-	for (uint32_t b = 0; b < list.contacts.n_blocks; b++)
+	const uint32_t *by_place = s->host->parts(s->run, "contact")->by_place;
+	for (uint32_t k = 0; k < list.contacts.n_blocks; k++) {
+		const uint32_t b = quern_nth(by_place, k);
 		for (uint32_t q = list.contacts.block[b]; q < list.contacts.block[b + 1]; q++) {
 			if (!contact_at(&list, b, q, &c)) continue;
 			const quern_real overlap = radius[c.first] + radius[c.second] - sqrt(c.distance2);
 			if (overlap > 0) sum += sqrt(c.force2) * overlap;
 		}
+	}
 	return sum;
 }
 
 static quern_real in_spins(const quern_step *s) {
 	const quern_column *u = s->use;
 	const quern_real share = 0.5 * quern_radius_inertia(s->dim);
+	const quern_parts *grains = s->host->parts(s->run, "grain");
 	quern_real sum = 0;
-	for (uint32_t i = 0; u[A_GRAIN_SPIN].real[0] && i < s->host->set(s->run, "grain").n; i++) {
+	for (uint32_t q = 0; u[A_GRAIN_SPIN].real[0] && q < grains->n; q++) {
+		const uint32_t i = quern_nth(grains->entry, q);
 		const quern_real r = u[A_GRAIN_RADIUS].real[0][i],
 						 m = u[A_GRAIN_WEIGHT].real[0][i] * u[A_GRAIN_MASS].real[0][i];
 		for (uint32_t k = 0; k < (s->dim == 3 ? 3 : 1); k++)
@@ -38,7 +43,9 @@ static quern_real in_points(const quern_step *s) {
 	const quern_bound *material = &s->slot[SLOT_MATERIAL][0];
 	quern_real bulk, shear, density, sum = 0;
 	((const quern_material_ops *)material->ops)->moduli(material->self, s->dim, &bulk, &shear, &density);
-	for (uint32_t i = 0; i < s->host->set(s->run, "point").n; i++) {
+	const quern_parts *points = s->host->parts(s->run, "point");
+	for (uint32_t q = 0; q < points->n; q++) {
+		const uint32_t i = quern_nth(points->entry, q);
 		const symmetric t = SYMMETRIC_AT(u[A_POINT_STRESS].real, i, s->dim);
 		const quern_real p = -(t.xx + t.yy + t.zz) / s->dim;
 		const quern_real all =

@@ -54,11 +54,11 @@ quern_status quern_hybrid_judge_gain(
 /* The clouds with rows of the update, until a set changes. */
 QUERN_INLINE cloud moving_grains(const quern_step *s) {
 	return (cloud) { s->use[U_GRAIN_MASS].real[0], s->use[U_GRAIN_WEIGHT].real[0],
-		s->use[U_GRAIN_FIXED].index, s->host->set(s->run, "grain").n };
+		s->use[U_GRAIN_FIXED].index, s->host->set(s->run, "grain").n, "grain" };
 }
 QUERN_INLINE cloud all_points(const quern_step *s) {
 	return (cloud) { s->use[U_POINT_MASS].real[0], s->use[U_POINT_WEIGHT].real[0], NULL,
-		s->host->set(s->run, "point").n };
+		s->host->set(s->run, "point").n, "point" };
 }
 
 /* The continuum's share in a cell of that zone, where there are no ramps. */

@@ -40,6 +40,7 @@ static bool is_empty(entry e, uint32_t c, uint32_t dim) {
 typedef struct {
 	const int32_t *home; /* by particle: linear cell of the last update, -1: new */
 	const int32_t *now;  /* by particle: its cell */
+	const uint32_t *order;
 	cloud of;
 } movers;
 
@@ -89,7 +90,8 @@ static void let_go(update *d, entry e, const entry old, uint32_t c, quern_real s
 static void release(update *d, entry grains, const entry old_grains, entry points, const entry old_points,
 	quern_real *of_home) {
 	const quern_real *before = d->u[U_HOME_MASS].real[0];
-	for (uint32_t c = 0; before && c < d->n_cells; c++) {
+	for (uint32_t q = 0; before && q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
 		const quern_real gone = before[c] - of_home[c];
 		if (!(gone > 1e-9 * before[c])) continue;
 		let_go(d, grains, old_grains, c, gone / before[c]);
@@ -101,8 +103,8 @@ static void release(update *d, entry grains, const entry old_grains, entry point
 /* A particle that has left a cell takes its share of what the cell owed: by mass, of both clouds together. */
 void quern_hybrid_move_entries(update *d) {
 	const quern_column *u = d->u;
-	const movers clouds[2] = { { u[U_GRAIN_HOME].index, d->grain_cell, moving_grains(d->s) },
-		{ u[U_POINT_HOME].index, d->point_cell, all_points(d->s) } };
+	const movers clouds[2] = { { u[U_GRAIN_HOME].index, d->grain_cell, d->grain_order, moving_grains(d->s) },
+		{ u[U_POINT_HOME].index, d->point_cell, d->point_order, all_points(d->s) } };
 	quern_real *of_home = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	quern_real *grain_momentum[3] = { NULL }, *point_momentum[3] = { NULL };
 	const entry grains = grain_entry(d), points = point_entry(d);
@@ -113,13 +115,15 @@ void quern_hybrid_move_entries(update *d) {
 		return;
 	}
 	for (const movers *m = clouds; m < clouds + 2; m++)
-		for (uint32_t i = 0; i < m->of.n; i++) {
+		for (uint32_t q = 0; q < m->of.n; q++) {
+			const uint32_t i = quern_nth(m->order, q);
 			const int32_t home = m->now[i] < 0 ? -1 : home_entry(d, m->home[i]);
 			if (home >= 0) of_home[home] += cloud_mass(&m->of, i);
 		}
 	release(d, grains, old_grains, points, old_points, of_home);
 	for (const movers *m = clouds; m < clouds + 2; m++)
-		for (uint32_t i = 0; i < m->of.n; i++) {
+		for (uint32_t q = 0; q < m->of.n; q++) {
+			const uint32_t i = quern_nth(m->order, q);
 			const int32_t now = m->now[i], home = now < 0 ? -1 : home_entry(d, m->home[i]);
 			if (home < 0 || home == now || !(of_home[home] > 0)) continue;
 			if (is_empty(old_grains, (uint32_t)home, d->s->dim) &&
@@ -159,7 +163,8 @@ void quern_hybrid_weigh(update *d) {
 	const uint32_t dim = d->s->dim;
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (u[U_ZONE].index[c] == QUERN_HYBRID && d->zone[c] == QUERN_CONTINUUM) take_over_stress(d, c);
-	for (uint32_t i = 0; i < d->n_grains; i++) {
+	for (uint32_t q = 0; q < d->n_grains; q++) {
+		const uint32_t i = quern_nth(d->grain_order, q);
 		const int32_t c = d->grain_cell[i];
 		if (c < 0) continue;
 		const quern_real weight = grain_share(d, (uint32_t)c), change = weight - u[U_GRAIN_WEIGHT].real[0][i];
@@ -169,7 +174,8 @@ void quern_hybrid_weigh(update *d) {
 		u[U_GRAIN_WEIGHT].real[0][i] = weight;
 		d->drop_grain[i] = weight == 0;
 	}
-	for (uint32_t i = 0; i < d->n_points; i++) {
+	for (uint32_t q = 0; q < d->n_points; q++) {
+		const uint32_t i = quern_nth(d->point_order, q);
 		const int32_t c = d->point_cell[i];
 		const quern_real weight = c < 0 ? u[U_POINT_WEIGHT].real[0][i] : point_share(d, (uint32_t)c);
 		const quern_real change = weight - u[U_POINT_WEIGHT].real[0][i];
@@ -214,9 +220,11 @@ quern_status quern_hybrid_hand_over(update *d) {
 	if (!any) return QUERN_OK;
 	const quern_status status = quern_hybrid_nearest(d, source, nearest);
 	if (status != QUERN_OK) return status;
-	for (uint32_t c = 0; c < d->n_cells; c++)
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
 		if (d->zone[c] == QUERN_DISCRETE && !is_empty(grains, c, d->s->dim) && nearest[c] >= 0)
 			shift(grains, (uint32_t)nearest[c], grains, c, d->s->dim);
+	}
 	return QUERN_OK;
 }
 

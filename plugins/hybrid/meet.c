@@ -24,6 +24,6 @@ bool quern_hybrid_residents(
 	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < n; i++)
 		block[i] = fixed && fixed[i] ? -1 : block_of(g, position->real, i, &last);
-	quern_bucket(n, block, g->n_blocks, r->begin, r->grain);
+	quern_bucket(n, block, s->host->parts(s->run, "grain")->entry, g->n_blocks, r->begin, r->grain);
 	return true;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* points - mass owed to the continuum becomes points, or joins those that are there; few are split, many are merged */
+#include "../common/renew.h"
 #include "../common/stressed.h"
 #include "update.h"
 #include <math.h>
@@ -119,6 +120,7 @@ static void grow(update *d, uint32_t c, quern_real mass, quern_real held, const 
 			quern_real *p = &u[U_POINT_VELOCITY].real[k][i];
 			*p = (m * *p + more * v[k]) / (m + more);
 		}
+		d->s->host->give(d->s->run, "point", (uint32_t)i, QUERN_NO_TARGET, -more / m, 0);
 		u[U_POINT_MASS].real[0][i] = m + more;
 		u[U_POINT_VOLUME].real[0][i] *= (m + more) / m;
 	}
@@ -133,6 +135,7 @@ static void shrink(update *d, uint32_t c, quern_real mass, quern_real held) {
 		const quern_real old = u[U_POINT_MASS].real[0][i], new = factor *old;
 		quern_real v[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) v[k] = u[U_POINT_VELOCITY].real[k][i];
+		d->s->host->give(d->s->run, "point", (uint32_t)i, QUERN_NO_TARGET, 1 - factor, 0);
 		u[U_POINT_MASS].real[0][i] = new;
 		u[U_POINT_VOLUME].real[0][i] *= factor;
 		draw(d, c, weight * (new - old), v);
@@ -172,22 +175,8 @@ static void settle(update *d, uint32_t c) {
 }
 
 /* ---- few and many: what parts and joins keeps mass, momentum and volume, and with them the density: an open point
- * stays open. Stress is the mean by volume, so that the sum of V sigma stays; history that goes with the stress is
- * the mean by mass. Whatever else a point remembers is that of the heavier one. ---- */
-
-/* What the material's state-from-stress writes. Entry `to` gets the share of what entry i has. */
-static void mix_history(const update *d, uint32_t to, uint32_t i, quern_real share) {
-	const quern_bound *material = &d->s->slot[SLOT_MATERIAL][0];
-	for (uint32_t r = 0; r < material->n_uses; r++) {
-		const quern_use *row = &material->uses[r];
-		if (row->hook != QUERN_MATERIAL_ASSIGN || row->shape == QUERN_INDEX || row->shape == QUERN_ID)
-			continue;
-		for (uint32_t k = 0; k < quern_shape_size(row->shape, d->s->dim); k++) {
-			quern_real *x = material->column[r].real[k];
-			if (x) x[to] += share * (x[i] - x[to]);
-		}
-	}
-}
+ * stays open. Stress is the mean by volume, so that the sum of V sigma stays. Whatever else a point remembers follows the rules of
+ * its fields; of joined points the heavier one stays. ---- */
 
 /* An empty quadrant of a thinly populated cell gets a point that takes an equal share from each of the others. */
 static void split(update *d, uint32_t c) {
@@ -273,14 +262,15 @@ static void merge(update *d, uint32_t c) {
 		quern_real *stress = u[U_POINT_STRESS].real[k];
 		stress[near] = (va * stress[near] + vb * stress[light]) / (va + vb);
 	}
-	mix_history(d, (uint32_t)near, (uint32_t)light, b / (a + b));
+	d->s->host->give(d->s->run, "point", (uint32_t)light, near, 1, b / (a + b));
 	u[U_POINT_MASS].real[0][near] = a + b;
 	u[U_POINT_VOLUME].real[0][near] = va + vb;
 	d->drop_point[light] = true;
 }
 
 void quern_hybrid_points(update *d) {
-	for (uint32_t c = 0; c < d->n_cells; c++) {
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
 		if (d->zone[c] == QUERN_DISCRETE) continue;
 		const uint32_t before = d->n_new_points;
 		if (d->u[U_POINT_OWED].real[0][c] != 0) settle(d, c);
@@ -291,35 +281,34 @@ void quern_hybrid_points(update *d) {
 
 /* ---- the set itself ---- */
 
-/* The history of a part: by mass that of those it was taken from, which all lie in its cell. `now`: by old entry. */
+/* What a part remembers, from all points of its cell that have each given as much of themselves. `now`: by old entry. */
 static void take_part(const update *d, const new_point *p, uint32_t to, const int32_t *now) {
+	const uint32_t begin = d->point_begin[p->cell], end = d->point_begin[p->cell + 1];
 	quern_real mass = 0;
-	for (uint32_t q = d->point_begin[p->cell]; q < d->point_begin[p->cell + 1]; q++) {
+	for (uint32_t q = begin; q < end; q++) {
 		const uint32_t i = (uint32_t)now[d->point[q]];
-		mass += d->u[U_POINT_MASS].real[0][i];
-		mix_history(d, to, i, d->u[U_POINT_MASS].real[0][i] / mass);
+		const quern_real m = d->u[U_POINT_MASS].real[0][i];
+		mass += m;
+		d->s->host->give(d->s->run, "point", i, (int32_t)to, 1.0 / (end - begin + 1), m / mass);
 	}
 }
 
 quern_status quern_hybrid_apply_points(update *d) {
 	const quern_step *s = d->s;
 	const uint32_t dim = s->dim;
-	uint32_t kept = 0;
-	int32_t *from = s->host->memory(s->run, ((size_t)d->n_points + d->n_new_points + 1) * sizeof(int32_t));
+	int32_t *parent = s->host->memory(s->run, ((size_t)d->n_new_points + 1) * sizeof(int32_t));
 	int32_t *now = s->host->memory(s->run, ((size_t)d->n_points + 1) * sizeof(int32_t));
-	if (!from || !now) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < d->n_points; i++) {
-		now[i] = (int32_t)kept;
-		if (!d->drop_point[i]) from[kept++] = (int32_t)i;
-	}
-	for (uint32_t i = 0; i < d->n_new_points; i++)
-		from[kept + i] = d->points[i].parent < 0 ? -1 : -2 - d->points[i].parent;
-	const quern_status status = s->host->remap(s->run, "point", kept + d->n_new_points, from, 0, NULL);
+	if (!parent || !now) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < d->n_new_points; i++) parent[i] = d->points[i].parent;
+	renewal r = {
+		.set = "point", .drop = d->drop_point, .n_new = d->n_new_points, .parent = parent, .now = now
+	};
+	const quern_status status = quern_renew(s, &r);
 	if (status != QUERN_OK) return status;
 	const quern_column *u = d->u;
 	for (uint32_t i = 0; i < d->n_new_points; i++) {
 		const new_point *p = &d->points[i];
-		const uint32_t to = kept + i;
+		const uint32_t to = r.first + i;
 		for (uint32_t k = 0; k < dim; k++) {
 			u[U_POINT_POSITION].real[k][to] = p->position[k];
 			u[U_POINT_VELOCITY].real[k][to] = p->velocity[k];

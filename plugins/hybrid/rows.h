@@ -45,7 +45,7 @@
 	X(U_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, \
 		.doc = "Sum of the contact stress over the samples since the last update.") \
 	X(U_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Samples of the contact stress.") \
-	X(U_DRAWS, "total.draws", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Radii drawn for new grains.") \
+	X(U_DRAWS, "cell.draws", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Number of the radius that waits for room.") \
 	X(U_UPDATES, "total.updates", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Zone updates so far.") \
 	X(U_MASS, "total.mass_initial", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass at the release.") \
 	X(U_DISPLACEMENT, "total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY) \

@@ -56,9 +56,12 @@ static void sample_contact(sampling *p, const contact_seen *c) {
 static void sample_contacts(sampling *p) {
 	const contact_list list = contacts_of(p->s, S_FORCE, S_FIRST, S_SECOND, S_POSITION);
 	contact_seen c;
-	for (uint32_t b = 0; b < list.contacts.n_blocks; b++)
+	const uint32_t *by_place = p->s->host->parts(p->s->run, "contact")->by_place;
+	for (uint32_t k = 0; k < list.contacts.n_blocks; k++) {
+		const uint32_t b = quern_nth(by_place, k);
 		for (uint32_t q = list.contacts.block[b]; q < list.contacts.block[b + 1]; q++)
 			if (contact_at(&list, b, q, &c)) sample_contact(p, &c);
+	}
 }
 
 /* On a body the branch goes from the surface to the grain's centre. */
@@ -90,8 +93,9 @@ quern_status quern_hybrid_sample(const void *self, const quern_step *s) {
 	p.pose = quern_body_poses_now(s, SLOT_BODIES);
 	if (!p.pose) return QUERN_E_MEMORY;
 	sample_contacts(&p);
-	for (uint32_t q = 0; s->use[S_TOUCH_FORCE].real[0] && q < s->host->set(s->run, "touch").n; q++)
-		sample_touch(&p, q);
+	const quern_parts *touches = s->host->parts(s->run, "touch");
+	for (uint32_t q = 0; s->use[S_TOUCH_FORCE].real[0] && q < touches->n; q++)
+		sample_touch(&p, quern_nth(touches->entry, q));
 	s->use[S_SAMPLES].real[0][0]++;
 	return QUERN_OK;
 }

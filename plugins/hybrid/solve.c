@@ -72,7 +72,8 @@ static bool add_rows(solve_work *w, bool write) {
 	solve_memory *m = s->host->scratch(s->run, 0, sizeof *m);
 	if (!m) return false;
 	w->n_grains = w->n_values = 0;
-	for (uint32_t b = 0; b < w->g->n_blocks; b++) {
+	for (uint32_t q = 0; q < w->g->n_blocks; q++) {
+		const uint32_t b = quern_nth(w->g->by_place, q);
 		if (!load_continuum(w->g, &w->at, w->node, b, m->mass)) continue;
 		for (uint32_t i = w->at.begin[b]; i < w->at.begin[b + 1]; i += STENCIL) {
 			const uint32_t left = w->at.begin[b + 1] - i, n = left < STENCIL ? left : STENCIL;

@@ -186,13 +186,12 @@ static const quern_output sums[] = {
 
 static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
-	const size_t n = s->host->set(s->run, "cell").n;
 	(void)self;
-	out[SUM_OWED] =
-		s->host->sum(s->run, n, u[U_GRAIN_OWED].real[0]) + s->host->sum(s->run, n, u[U_POINT_OWED].real[0]);
+	out[SUM_OWED] = s->host->sum_set(s->run, "cell", u[U_GRAIN_OWED].real[0]) +
+					s->host->sum_set(s->run, "cell", u[U_POINT_OWED].real[0]);
 	for (uint32_t k = 0; k < s->dim; k++)
-		out[SUM_OWED_MOMENTUM + k] = s->host->sum(s->run, n, u[U_GRAIN_OWED_MOMENTUM].real[k]) +
-									 s->host->sum(s->run, n, u[U_POINT_OWED_MOMENTUM].real[k]);
+		out[SUM_OWED_MOMENTUM + k] = s->host->sum_set(s->run, "cell", u[U_GRAIN_OWED_MOMENTUM].real[k]) +
+									 s->host->sum_set(s->run, "cell", u[U_POINT_OWED_MOMENTUM].real[k]);
 	const quern_real mass = u[U_MASS_DEFECT].real[0][0], momentum = u[U_MOMENTUM_DEFECT].real[0][0];
 	if (u[U_OWED_LEFT].real[0]) out[SUM_LEFT] = u[U_OWED_LEFT].real[0][0];
 	out[SUM_DEFECT] = mass > momentum ? mass : momentum;

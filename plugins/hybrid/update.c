@@ -60,8 +60,10 @@ static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed
 static quern_real carried_mass(const quern_step *s) {
 	const cloud clouds[2] = { moving_grains(s), all_points(s) };
 	quern_real sum = 0;
-	for (int k = 0; k < 2; k++)
-		for (uint32_t i = 0; i < clouds[k].n; i++) sum += cloud_mass(&clouds[k], i);
+	for (int k = 0; k < 2; k++) {
+		const uint32_t *order = s->host->parts(s->run, clouds[k].set)->entry;
+		for (uint32_t q = 0; q < clouds[k].n; q++) sum += cloud_mass(&clouds[k], quern_nth(order, q));
+	}
 	return sum;
 }
 
@@ -70,8 +72,11 @@ static void say(const quern_step *s, uint32_t changed) {
 	const quern_real passed = u[U_PASSED].real[0] ? u[U_PASSED].real[0][0] : 0;
 	const quern_real all = u[U_MASS].real[0][0] - passed, whole = all > 0 ? all : 1;
 	quern_real entries = 0;
-	for (uint32_t c = 0; c < s->host->set(s->run, "cell").n; c++)
+	const quern_parts *cells = s->host->parts(s->run, "cell");
+	for (uint32_t q = 0; q < cells->n; q++) {
+		const uint32_t c = quern_nth(cells->entry, q);
 		entries += fabs(u[U_GRAIN_OWED].real[0][c]) + fabs(u[U_POINT_OWED].real[0][c]);
+	}
 	s->host->log(s->run, 0,
 		"update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",
 		u[U_UPDATES].index[0], (long long)s->step, changed, entries / whole,

@@ -25,6 +25,8 @@ typedef struct update {
 	/* by cell: the moving grains and the points in it */
 	uint32_t *grain_begin, *point_begin;
 	int32_t *grain, *point;
+	const uint32_t *grain_order,
+		*point_order; /* of the sets' entries, by the places of their blocks; NULL: their own */
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
 	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that is open */
@@ -37,11 +39,13 @@ typedef struct update {
 	new_point *points;
 	uint32_t n_new_points, cap_points;
 	new_grain *grains;
-	uint32_t n_new_grains, cap_grains;
+	uint32_t n_new_grains;
 	uint32_t changed; /* cells that changed zone */
 	bool failed;      /* memory ran out */
 } update;
 
+/* The q-th cell in the order of places: whoever adds up cell by cell, or makes something in them, takes them so. */
+QUERN_INLINE uint32_t nth_cell(const update *d, uint32_t q) { return quern_grid_nth(d->g, q); }
 /* Weights of points and of grains in a cell from now on. */
 QUERN_INLINE quern_real point_share(const update *d, uint32_t c) { return d->share[c]; }
 QUERN_INLINE quern_real grain_share(const update *d, uint32_t c) { return 1 - d->share[c]; }
@@ -104,6 +108,10 @@ void quern_hybrid_owed_velocity(
 void quern_hybrid_points(update *);
 void quern_hybrid_assign(const update *, uint32_t begin, uint32_t n);
 quern_status quern_hybrid_apply_points(update *);
+
+/* ---- surroundings.c ---- */
+/* Velocity and spin of a new grain: those of what moves around it. */
+void quern_hybrid_motion(const update *, new_grain *);
 
 /* ---- enrich.c ---- */
 quern_status quern_hybrid_grains(update *);

@@ -12,7 +12,7 @@ enum { N = QUERN_BLOCK_CELLS };
 
 typedef struct {
 	quern_real distance;
-	uint32_t cell;
+	uint32_t cell, place; /* its entry; where it comes in the order of places */
 } heap_entry;
 
 typedef struct {
@@ -21,12 +21,13 @@ typedef struct {
 	size_t n, cap;
 	quern_real *distance; /* by cell */
 	int32_t (*way)[3];    /* by cell: to its source, in cells */
+	uint32_t *place;      /* by block, in the order of places; NULL: as they come */
 	bool boxes;           /* the source is a whole cell, not its centre */
 	bool failed;
 } spreading;
 
 static bool sooner(heap_entry a, heap_entry b) {
-	return a.distance != b.distance ? a.distance < b.distance : a.cell < b.cell;
+	return a.distance != b.distance ? a.distance < b.distance : a.place < b.place;
 }
 
 static void push(spreading *p, heap_entry e) {
@@ -72,7 +73,7 @@ static void offer(spreading *p, uint32_t cell, const int32_t way[3]) {
 	if (!(distance < p->distance[cell])) return;
 	p->distance[cell] = distance;
 	memcpy(p->way[cell], way, sizeof p->way[cell]);
-	push(p, (heap_entry) { distance, cell });
+	push(p, (heap_entry) { distance, cell, p->place ? p->place[cell / N] * N + cell % N : cell });
 }
 
 /* `open` NULL: through every cell; otherwise only through those that are set. */
@@ -101,7 +102,9 @@ static void spread(spreading *p, const bool *open) {
 static bool spreading_init(spreading *p, update *d, bool boxes, quern_real *distance) {
 	*p = (spreading) { .d = d, .distance = distance, .boxes = boxes };
 	p->way = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof *p->way);
-	if (!p->way || !distance) return false;
+	if (d->g->by_place) p->place = d->s->host->memory(d->s->run, d->g->n_blocks * sizeof(uint32_t));
+	if (!p->way || !distance || !p->place != !d->g->by_place) return false;
+	for (uint32_t q = 0; p->place && q < d->g->n_blocks; q++) p->place[d->g->by_place[q]] = q;
 	for (uint32_t c = 0; c < d->n_cells; c++) distance[c] = INFINITY;
 	return true;
 }

@@ -211,7 +211,7 @@ quern_status quern_mpm_nodes(const void *self, const quern_step *s) {
 	w.twists = s->use[NODES_TWIST].real[0] || s->use[NODES_WORK].real[0];
 	if (!prepare(&w, s->use[NODES_NODE], s->use[NODES_MOTION])) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, move_nodes, &w);
-	body_books_close(&w.books, s, w.g->n_blocks, &s->use[NODES_IMPULSE], &s->use[NODES_TWIST],
+	body_books_close(&w.books, s, w.g->n_blocks, w.g->by_place, &s->use[NODES_IMPULSE], &s->use[NODES_TWIST],
 		&s->use[NODES_WORK], &s->use[NODES_FACES]);
 	return QUERN_OK;
 }
@@ -223,7 +223,7 @@ quern_status quern_mpm_walls(const void *self, const quern_step *s) {
 	w.twists = s->use[WALLS_TWIST].real[0] || s->use[WALLS_WORK].real[0];
 	if (!prepare(&w, s->use[WALLS_NODE], s->use[WALLS_MOTION])) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, meet_walls, &w);
-	body_books_close(&w.books, s, w.g->n_blocks, &s->use[WALLS_IMPULSE], &s->use[WALLS_TWIST],
+	body_books_close(&w.books, s, w.g->n_blocks, w.g->by_place, &s->use[WALLS_IMPULSE], &s->use[WALLS_TWIST],
 		&s->use[WALLS_WORK], &s->use[WALLS_FACES]);
 	return QUERN_OK;
 }

@@ -69,7 +69,7 @@ static bool draw_way(pouring *w) {
 		s->host->random(w->p->stream, (uint64_t)w->i << 32 | k, (uint64_t)s->step, u);
 		key[k] = (uint64_t)(u[0] * 0x1p32);
 	}
-	quern_sort_order(n, key, w->way, work);
+	quern_sort_order(n, key, NULL, w->way, work);
 	return true;
 }
 

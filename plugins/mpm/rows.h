@@ -111,7 +111,7 @@ QUERN_USE_ENUM(WALLS_USES);
 	X(GATHER_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(GATHER_GRADIENT, "point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Velocity gradient of the last step.") \
-	X(GATHER_AFFINE, "point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
+	X(GATHER_AFFINE, "point.affine", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, .rule = QUERN_MEANS, \
 		.with = "point.affine", \
 		.doc = "What points send with their velocity: the same, or what the transfer gives in its place.") \
 	X(GATHER_PRESSURE, "point.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \

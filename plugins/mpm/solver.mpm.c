@@ -284,7 +284,7 @@ static const quern_output sums[] = { ACCOUNT_ROWS,
 static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
 	const cloud points = { u[FILL_MASS].real[0], u[FILL_WEIGHT].real[0], NULL,
-		s->host->set(s->run, "point").n };
+		s->host->set(s->run, "point").n, "point" };
 	cloud_sums c;
 	(void)self;
 	out[SUM_LEFT] = book_total(u[FILL_LEFT].real[0], outlet_faces(s));

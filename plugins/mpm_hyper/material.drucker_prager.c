@@ -26,9 +26,9 @@ static const quern_param params[] = { QUERN_PARAM(drucker_prager, bulk_modulus, 
 
 /* clang-format off */
 #define USES(X) \
-	X(VOLUME, "point.volume_strain", "1", QUERN_UPDATE, QUERN_SCALAR, \
+	X(VOLUME, "point.volume_strain", "1", QUERN_UPDATE, QUERN_SCALAR, .rule = QUERN_MEANS, \
 		.doc = "J - 1, elastic; positive while the point is open.") \
-	X(DEVIATOR, "point.deviator", "1", QUERN_UPDATE, QUERN_SYMMETRIC, \
+	X(DEVIATOR, "point.deviator", "1", QUERN_UPDATE, QUERN_SYMMETRIC, .rule = QUERN_MEANS, \
 		.doc = "Deviator of the isochoric elastic left Cauchy-Green strain.") \
 	X(ASSIGNED_VOLUME, "point.volume_strain", "1", QUERN_WRITE, QUERN_SCALAR, .hook = QUERN_MATERIAL_ASSIGN, \
 		.doc = "From stress.") \

@@ -105,7 +105,7 @@ static void average(const observer *o, const quern_observer_batch *b, const int3
 		term[RATTLERS][i] = left_out[i] ? share : 0;
 	}
 	quern_real sum[3];
-	for (int k = 0; k < 3; k++) sum[k] = host->sum(run, grains, term[k]);
+	for (int k = 0; k < 3; k++) sum[k] = host->sum_set(run, "grain", term[k]);
 	const quern_real all = sum[GRAINS] + (o->rattlers ? 0 : sum[RATTLERS]);
 	out[GRAINS] = sum[GRAINS];
 	out[NUMBER] = sum[GRAINS] > 0 ? sum[NUMBER] / sum[GRAINS] : 0;

@@ -50,10 +50,10 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	if (!size || !observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < n; i++)
 		size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
-	out[0] = host->sum(run, n, size) / mass;
+	out[0] = host->sum_set(run, "cell", size) / mass;
 	out[1] = (cloud_total(&grains) + cloud_total(&points)) / mass - 1;
-	out[2] = host->sum(run, n, u[GRAIN_OWED].real[0]);
-	out[3] = host->sum(run, n, u[POINT_OWED].real[0]);
+	out[2] = host->sum_set(run, "cell", u[GRAIN_OWED].real[0]);
+	out[3] = host->sum_set(run, "cell", u[POINT_OWED].real[0]);
 	for (int k = 0; k < 3; k++) out[4 + k] = u[MASS_DEFECT + k].real[0][0];
 	return QUERN_OK;
 }

@@ -165,14 +165,14 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	for (uint32_t i = 0; i < grains.n; i++)
 		term[i] = (grains.weight ? grains.weight[i] : 1) *
 				  volume_in(o, u[GRAIN_POSITION].real, i, u[GRAIN_RADIUS].real[0][i], b->dim, grain_volume);
-	out[GRAINS] = host->sum(run, grains.n, term) / box;
+	if (grains.n) out[GRAINS] = host->sum_set(run, grains.set, term) / box;
 	for (uint32_t i = 0; i < points.n; i++) {
 		const quern_real volume = u[POINT_VOLUME].real[0][i];
 		const quern_real half = 0.5 * (b->dim == 2 ? __builtin_sqrt(volume) : quern_cbrt(volume));
 		term[i] = cloud_mass(&points, i) / (o->density * volume) *
 				  volume_in(o, u[POINT_POSITION].real, i, half, b->dim, cube_volume);
 	}
-	out[POINTS] = host->sum(run, points.n, term) / box;
+	if (points.n) out[POINTS] = host->sum_set(run, points.set, term) / box;
 	out[FRACTION] = out[GRAINS] + out[POINTS];
 	return QUERN_OK;
 }

@@ -106,9 +106,11 @@ static bool is_beside(const observer *o, quern_real *const *x, uint32_t i, uint3
 	return true;
 }
 
-static void add_all(const slabs *s, const cloud *c, const quern_column *x, const quern_column *v,
-	const quern_real *radius, const quern_real *volume) {
-	for (uint32_t i = 0; i < c->n; i++) {
+/* `order`: of the entries. */
+static void add_all(const slabs *s, const cloud *c, const uint32_t *order, const quern_column *x,
+	const quern_column *v, const quern_real *radius, const quern_real *volume) {
+	for (uint32_t q = 0; q < c->n; q++) {
+		const uint32_t i = quern_nth(order, q);
 		const quern_real mass = cloud_mass(c, i);
 		if (!(mass > 0) || !is_beside(s->o, x->real, i, s->dim)) continue;
 		const quern_real size =
@@ -126,13 +128,14 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	slabs s = { o, b->dim, o->low[axis], (o->high[axis] - o->low[axis]) / o->bins,
 		(quern_real(*)[N_OUTPUTS])(void *)out, false };
 	quern_real volume = s.width;
-	(void)host, (void)run;
+	const uint32_t *grain = grains.n ? host->parts(run, grains.set)->entry : NULL,
+				   *point = points.n ? host->parts(run, points.set)->entry : NULL;
 	for (uint32_t k = 0; k < b->dim; k++)
 		if (k != axis) volume *= o->high[k] - o->low[k];
 	for (int pass = 0; pass < 2; pass++) {
 		s.again = pass;
-		add_all(&s, &grains, &u[GRAIN_POSITION], &u[GRAIN_VELOCITY], u[GRAIN_RADIUS].real[0], NULL);
-		add_all(&s, &points, &u[POINT_POSITION], &u[POINT_VELOCITY], NULL, u[POINT_VOLUME].real[0]);
+		add_all(&s, &grains, grain, &u[GRAIN_POSITION], &u[GRAIN_VELOCITY], u[GRAIN_RADIUS].real[0], NULL);
+		add_all(&s, &points, point, &u[POINT_POSITION], &u[POINT_VELOCITY], NULL, u[POINT_VOLUME].real[0]);
 		for (int32_t k = 0; k < o->bins && !pass; k++)
 			for (uint32_t c = X; c <= Z; c++)
 				s.bin[k][c] = s.bin[k][DENSITY] > 0 ? s.bin[k][c] / s.bin[k][DENSITY] : 0;

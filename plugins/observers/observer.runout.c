@@ -64,14 +64,17 @@ static int by_up(const void *a, const void *b) {
 	return order(x->up, y->up, x->number, y->number);
 }
 
-static uint32_t collect(const observer *o, const quern_observer_batch *b, item *out) {
+static uint32_t collect(
+	const observer *o, const quern_observer_batch *b, const quern_host *host, quern_run *run, item *out) {
 	const uint32_t up = quern_vertical(b->dim, b->gravity);
 	const bool down = b->gravity[up] > 0; /* gravity points to higher coordinates */
 	uint32_t n = 0;
 	for (int point = 0; point < 2; point++) {
 		const quern_column *x = &b->use[point ? POINT_POSITION : GRAIN_POSITION];
 		const cloud c = observed(b, point);
-		for (uint32_t i = 0; i < c.n; i++) {
+		const uint32_t *order = c.n ? host->parts(run, c.set)->entry : NULL;
+		for (uint32_t q = 0; q < c.n; q++) {
+			const uint32_t i = quern_nth(order, q);
 			const quern_real m = cloud_mass(&c, i);
 			if (!(m > 0)) continue;
 			const quern_real h = down ? b->upper[up] - x->real[up][i] : x->real[up][i] - b->lower[up];
@@ -99,7 +102,7 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	quern_real all = 0, mass = 0;
 	uint32_t connected = 0;
 	if (!it) return QUERN_E_MEMORY;
-	const uint32_t n = collect(o, b, it);
+	const uint32_t n = collect(o, b, host, run, it);
 	qsort(it, n, sizeof *it, by_along);
 	for (uint32_t i = 0; i < n; i++) {
 		const bool next = connected == i && (!i || it[i].along - it[i - 1].along <= o->gap);

@@ -21,7 +21,7 @@ QUERN_INLINE cloud observed(const quern_observer_batch *b, bool point) {
 	const quern_column *u = b->use;
 	const uint32_t row = point ? POINT_MASS : GRAIN_MASS;
 	return (cloud) { u[row].real[0], u[point ? POINT_WEIGHT : GRAIN_WEIGHT].real[0],
-		point ? NULL : u[GRAIN_FIXED].index, u[row].real[0] ? b->count[row] : 0 };
+		point ? NULL : u[GRAIN_FIXED].index, u[row].real[0] ? b->count[row] : 0, point ? "point" : "grain" };
 }
 
 /* Both, for sums; false if memory is gone. */

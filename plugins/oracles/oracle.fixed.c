@@ -49,10 +49,8 @@ static const quern_param params[] = { QUERN_PARAM(fixed, boxes, NULL, "Boxes alo
 		.def = QUERN_CONTINUUM),
 	QUERN_PARAM(fixed, ramp, "m",
 		"How far the hybrid zone reaches from grains into the continuum, whose share grows on that way from "
-		"none "
-		"to all; 0: it is only where it is drawn. It begins at the face of each region by itself: let "
-		"regions that "
-		"shall be one overlap by as much.",
+		"none to all; 0: it is only where it is drawn. It begins at the face of each region by itself: let "
+		"regions that shall be one overlap by as much.",
 		.max = 1e6),
 	QUERN_PARAM(
 		fixed, cell, "m", "Cell of the grid.", .from = "grid.cell", .flags = QUERN_MAYBE | QUERN_ADVANCED),
@@ -188,8 +186,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.id = "oracle.fixed",
 	.brief = "Zones that the scene draws.",
 	.doc = "Boxes, spheres and half spaces, each with its zone, whatever flows through them; between grains "
-		   "and continuum "
-		   "a ramp if wished. A cell belongs to a region that holds its centre.",
+		   "and continuum a ramp if wished. A cell belongs to a region that holds its centre.",
 	.instance_size = sizeof(fixed),
 	.params = params,
 	.uses = uses,

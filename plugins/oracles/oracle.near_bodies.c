@@ -79,8 +79,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.id = "oracle.near_bodies",
 	.brief = "Grains near bodies.",
 	.doc = "Cells within a distance of a body are made of grains, then a hybrid zone follows; where no body "
-		   "is near, "
-		   "others in the list of oracles have their say.",
+		   "is near, others in the list of oracles have their say.",
 	.cite = "Yue et al. 2018, 8 (as future work)",
 	.instance_size = sizeof(near_bodies),
 	.params = params,

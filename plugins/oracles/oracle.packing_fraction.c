@@ -49,8 +49,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.id = "oracle.packing_fraction",
 	.brief = "Grains within a depth of the free surface.",
 	.doc = "The surface is where the packing fraction falls below a critical one and open space is connected "
-		   "with the "
-		   "outside; a void within does not count.",
+		   "with the outside; a void within does not count.",
 	.cite = "Yue et al. 2018, 4.1",
 	.instance_size = sizeof(surface),
 	.params = params,

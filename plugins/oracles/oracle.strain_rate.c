@@ -62,8 +62,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.id = "oracle.strain_rate",
 	.brief = "Grains where the flow shears fast.",
 	.doc = "Cells whose shear rate or inertial number is above a threshold count as surface: shear bands and "
-		   "jets are "
-		   "made of grains before they matter. Combine it with packing_fraction by a list.",
+		   "jets are made of grains before they matter. Combine it with packing_fraction by a list.",
 	.cite = "Yue et al. 2018, 8 (as future work); GDR MiDi 2004",
 	.instance_size = sizeof(shear),
 	.params = params,

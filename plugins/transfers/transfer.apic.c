@@ -39,8 +39,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.id = "transfer.apic",
 	.brief = "PIC with the linear field around each point: keeps angular momentum.",
 	.doc = "Points send v + C (x_i - x). What neither that nor the grid shows is gone after a step. For "
-		   "points; grains "
-		   "send no matrix.",
+		   "points; grains send no matrix.",
 	.cite = "Jiang et al. 2015; Jiang et al. 2017",
 	.instance_size = sizeof(apic),
 	.params = params,

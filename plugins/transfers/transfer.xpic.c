@@ -9,11 +9,12 @@ typedef struct {
 	int32_t order;
 	quern_real factor[MOST]; /* by power of A: of (1 - A)^(order - 1) */
 } xpic;
-static const quern_param params[] = { QUERN_PARAM(xpic, order, "1",
-										  "1: PIC. Each order more costs a round trip to the grid and damps "
-										  "slow waves less.",
-										  .def = 2, .min = 1, .max = MOST),
-	QUERN_END_PARAMS };
+static const quern_param params[] = {
+	QUERN_PARAM(xpic, order, "1",
+		"1: PIC. Each order more costs a round trip to the grid and damps slow waves less.", .def = 2,
+		.min = 1, .max = MOST),
+	QUERN_END_PARAMS
+};
 static const quern_use uses[] = { QUERN_END_USES };
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
@@ -62,8 +63,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.id = "transfer.xpic",
 	.brief = "PIC of a higher order.",
 	.doc = "Noise that the grid does not show is gone after a step, as with PIC; waves that it resolves are "
-		   "damped less the "
-		   "higher the order is.",
+		   "damped less the higher the order is.",
 	.cite = "Hammerquist & Nairn 2017; Nairn & Hammerquist 2021",
 	.instance_size = sizeof(xpic),
 	.params = params,

@@ -41,26 +41,28 @@ def mean_flow(rows, begin, end):
 
 
 def look(folder, begin, end):
+    s = json.loads((folder / "summary.json").read_text())
+    if s["time_end"] < end:
+        sys.exit(f"{folder} has come to {s['time_end']:g} s, and the flow is taken up to {end:g} s: resume that run, or give --to")
     scene = yaml.safe_load((folder / "scene.yaml").read_text())
     grains = scene["grains"]["material"]
-    gate = scene["bodies"][4]["segment"]
+    gate = next(body["segment"] for body in scene["bodies"] if body.get("segment", {}).get("name") == "gate")
     width, diameter = float(gate["to"][0]) - float(gate["from"][0]), 2 * float(grains["radius"]["mean"])
     flow, fraction = mean_flow(series(folder), begin, end)
     bulk = fraction * float(grains["density"])
     law = bulk * math.sqrt(9.81) * (width - K * diameter) ** 1.5
-    s = json.loads((folder / "summary.json").read_text())
     return {"width": width / diameter, "flow": flow, "fraction": fraction, "C": flow / law, "grains": s["observers"]["outflow"]["count"]["last"]}
 
 
 def run(out, width):
-    """The hopper of configs/ with another orifice, unless it is there."""
+    """The hopper of configs/ with another orifice, unless it has run to its end there."""
     half = width * 1e-3  # D/2 = 1 mm
-    ends = 0.06 - half, 0.06 + half
-    if not (out / "summary.json").exists():
+    left, right = 0.06 - half, 0.06 + half
+    summary = out / "summary.json"
+    if not summary.exists() or json.loads(summary.read_text())["status"] != "done":
         subprocess.run([ROOT / "build/quern", "run", ROOT / "configs/hopper.yaml", "-o", out, "--force", "--quiet", "--no-cache"]
-                       + [f"--set={key}=[{x:.6g}, 0]" for key, x in (("bodies.2.segment.to", ends[0]), ("bodies.3.segment.to", ends[1]),
-                                                                     ("bodies.4.segment.from", ends[0]), ("bodies.4.segment.to", ends[1]))],
-                       check=True)
+                       + [f"--set=bodies.{key}=[{x:.6g}, 0]" for key, x in (("left_slope.to", left), ("right_slope.to", right),
+                                                                            ("gate.from", left), ("gate.to", right))], check=True)
     return out
 
 

@@ -80,7 +80,7 @@ static uint64_t *search(const char *id, const cloud *c, uint32_t *n_pairs) {
 	}
 	job.radius = c->radius;
 	const size_t bytes = ops->keys(nothing, &job, key);
-	quern_sort_order(GRAINS, key, from, work);
+	quern_sort_order(GRAINS, key, NULL, from, work);
 	for (uint32_t i = 0; i < GRAINS; i++) {
 		for (uint32_t k = 0; k < c->dim; k++) x[k][i] = c->x[k][from[i]];
 		radius[i] = c->radius[from[i]];

@@ -17,7 +17,8 @@
 
 static const double cell = 4e-3, density = 1900;
 static const char *const materials[] = { "mu_i: {bulk_modulus: 1e5, critical_density: 1900}",
-	"drucker_prager: {bulk_modulus: 1e5, density: 1900}" };
+	"drucker_prager: {bulk_modulus: 1e5, density: 1900}", "remembering: {bulk_modulus: 1e5, density: 1900}" };
+enum { HYPER = 1, REMEMBERS };
 
 static double uniform(void) {
 	return (double)rand() / RAND_MAX;
@@ -120,8 +121,57 @@ static void look(quern_run *run, int dim, double *loose, double *dense, double *
 	}
 }
 
+/* ---- what a material of somebody else remembers, by the rules that it states ---- */
+
+typedef struct memories {
+	quern_column heat, warmth, mark, age, mass;
+	uint32_t n;
+} memories;
+
+static memories memories_of(quern_run *run) {
+	return (memories) { harness_field(run, "point.heat"), harness_field(run, "point.warmth"),
+		harness_field(run, "point.mark"), harness_field(run, "point.age"), harness_field(run, "point.mass"),
+		harness_count(run, "point") };
+}
+
+/* As much heat a kilogram for every point, a mark of each, all of one age. */
+static void remember(quern_run *run) {
+	const memories m = memories_of(run);
+	for (uint32_t i = 0; i < m.n; i++) {
+		m.heat.real[0][i] = 1000 * m.mass.real[0][i];
+		m.warmth.real[0][i] = 300 + uniform();
+		m.mark.real[0][i] = i;
+		m.age.real[0][i] = 50;
+	}
+}
+
+static double warmth(quern_run *run) {
+	const memories m = memories_of(run);
+	const quern_column w = harness_field(run, "point.weight");
+	double sum = 0;
+	for (uint32_t i = 0; i < m.n; i++) sum += w.real[0][i] * m.mass.real[0][i] * m.warmth.real[0][i];
+	return sum;
+}
+
+/* Heat a kilogram is what it was for each, whoever has parted or joined; marks are those there were; parts are new. */
+static bool still_remember(quern_run *run, uint32_t n, double warm) {
+	const memories m = memories_of(run);
+	double worst = 0;
+	bool good = true;
+	uint32_t parts = 0;
+	for (uint32_t i = 0; i < m.n; i++) {
+		const double mark = m.mark.real[0][i], age = m.age.real[0][i];
+		worst = fmax(worst, fabs(m.heat.real[0][i] / (1000 * m.mass.real[0][i]) - 1));
+		good &= mark >= 0 && mark < n && mark == floor(mark) && (age == 50 || age == 7);
+		parts += age == 7;
+	}
+	printf("  %u of %u points are parts of others\n", parts, m.n);
+	good &= parts > 0 && table_row("  heat a kilogram, worst", worst, 0, 1e-13);
+	return table_row("  mean warmth", warmth(run) / warm, 1, 1e-13) && good;
+}
+
 static bool try_crowd(int dim, int which, bool open) {
-	const bool hyper = which == 1;
+	const bool hyper = which == HYPER, remembers = which == REMEMBERS;
 	char name[80];
 	bool good = true;
 	srand(7);
@@ -129,7 +179,9 @@ static bool try_crowd(int dim, int which, bool open) {
 	crowd(run, dim, hyper, open);
 	double loose, dense, stress;
 	look(run, dim, &loose, &dense, &stress);
+	if (remembers) remember(run);
 	const sums before = sum(run, dim, hyper);
+	const double warm = remembers ? warmth(run) : 0;
 	const uint32_t n = harness_count(run, "point");
 	uint32_t most = n, least = n;
 	for (int k = 0; k < 6; k++) {
@@ -145,6 +197,7 @@ static bool try_crowd(int dim, int which, bool open) {
 	for (int k = 0; k < dim; k++)
 		good &=
 			table_row("  momentum gained", (after.momentum[k] - before.momentum[k]) / before.size, 0, 1e-13);
+	if (remembers) good &= still_remember(run, n, warm);
 	if (hyper) good &= table_row("  mean volume strain", after.strain / before.strain, 1, 1e-12);
 	for (int k = 0; k < (dim == 2 ? 3 : 6) && !open; k++)
 		good &= table_row("  volume times stress, gained over that of xx",
@@ -168,7 +221,7 @@ static void many_and_few(void **state) {
 	(void)state;
 	table_head("splitting and merging, six updates: after over before");
 	for (int dim = 2; dim <= 3; dim++)
-		for (int which = 0; which < 2; which++)
+		for (int which = 0; which <= REMEMBERS; which++)
 			for (int open = 0; open <= 1; open++) good &= try_crowd(dim, which, open);
 	assert_true(good);
 }

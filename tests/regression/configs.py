@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
 """The scenes of configs/ do what they say, as they stand; the two columns do so in bits.py and rerun.py, made shorter."""
-import csv
 import math
 import pathlib
 
@@ -71,8 +70,8 @@ def drum(place):
     out = place / "drum"
     lab.run("drum", out, "--set=grains.material.radius.mean=2.5 mm", "--set=time.end=3.55 s", "--set=output.every=0.05 s",
             "--set=observe.2.repose.width=10 mm", "--set=run.batch=64")
-    with open(out / "series.csv", newline="") as file:
-        rows = [{key.split(" ")[0]: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    header, rows = lab.series(out)
+    rows = [dict(zip((name.split(" ")[0] for name in header), row)) for row in rows]
     angles = [math.degrees(row["repose.angle"]) for row in rows if row["time"] > 1.5]
     lean = sum(angles) / len(angles)
     print(f"drum: surface at {lean:.1f} degrees on average, from {min(angles):.1f} to {max(angles):.1f}")

@@ -25,10 +25,7 @@ HOPPER = lab.sets(
 def same(name, options, folder):
     base = folder / "base"
     lab.run(name, base, *options)
-    lab.run(name, folder / "threads", *options, threads=2)
-    lab.same(base, folder / "threads", f"{name}: 2 threads")
-    lab.run(name, folder / "batch", *options, "--set=run.batch=16")
-    lab.same(base, folder / "batch", f"{name}: run.batch: 16")
+    lab.same_ways(name, base, folder, *options, what=f"{name}: ", batches=(16,))
     bits.stopped(name, base, folder, None, options, lab.seeded())
     return base
 

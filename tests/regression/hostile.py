@@ -110,6 +110,19 @@ def try_force(folder, place):
     print(f"{len(cases)} ends in a kernel leave frames and a checkpoint, and say so")
 
 
+def check_observer(folder):
+    """In an observer whose outputs repeat: how often they do is asked apart from the call."""
+    begin = "\tconst observer *o = self;\n\tconst quern_column *u"
+    for statement, expected in [("exit(0);", "observer.profile ended the program in whole")] + [
+            (crash, f"observer.profile crashed ({name}) in whole") for crash, name in CRASHES]:
+        text = source("observers/observer.profile.c", (begin, statement + begin), ("#include <math.h>", "#include <math.h>\n#include <signal.h>\n#include <stdlib.h>"))
+        compile(text, "observer.profile", folder, beside="observers")
+        sentence(quern(folder, "run", SCENE, "--set=observe=[{profile: {axis: 0, bins: 3}}]", "-o", folder / "out", "--quiet", "--force", status=3),
+                 expected)
+    os.remove(folder / "observer.profile.so")
+    print("so do ends in an observer whose outputs repeat")
+
+
 def check_stage(folder):
     """And in a stage of a solver: the template's own, which moves grains."""
     scene = folder / "flight.yaml"
@@ -164,6 +177,6 @@ def check_forks(folder):
 
 
 if __name__ == "__main__":
-    for test in (check_init, check_force, check_stage, check_environment, check_forks):
+    for test in (check_init, check_force, check_observer, check_stage, check_environment, check_forks):
         with tempfile.TemporaryDirectory() as name:
             test(pathlib.Path(name))

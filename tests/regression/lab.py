@@ -203,6 +203,20 @@ def same(one, two, what, checkpoint=True):
     return len(first), count, size
 
 
+def same_ways(name, base, folder, *options, what="", batches=(8,), levels=()):
+    """A scene leaves what it has left in `base`, to the bit: with two threads, and so in other batches, with other instruction sets, and
+    where QUERN_OTHER names a program of another compiler, by that one."""
+    ways = {"2 threads": ([], {"threads": 2})}
+    ways |= {f"run.batch: {batch}": ([f"--set=run.batch={batch}"], {"threads": 2}) for batch in batches}
+    ways |= {f"run.instructions: {level}": ([f"--set=run.instructions={level}"], {}) for level in levels}
+    if os.environ.get("QUERN_OTHER"):
+        ways["another compiler"] = ([], {"program": os.environ["QUERN_OTHER"]})
+    for number, (way, (more, how)) in enumerate(ways.items()):
+        out = folder / f"way{number}"
+        run(name, out, *options, *more, **how)
+        same(base, out, f"{what}{way}")
+
+
 def whole(path):
     """Reads every byte of an HDF5 file; fails if it is not whole."""
     try:

@@ -141,6 +141,8 @@ TABLES = [
     (library(uses=f"{{ {USE}, .shape = 9 }},"), "access, shape, hook or flags of contact.a are unknown"),
     (library(uses=f"{{ {USE}, .access = 0 }},"), "access, shape, hook or flags of contact.a are unknown"),
     (library(uses=f"{{ {USE}, .hook = 3 }},"), "access, shape, hook or flags of contact.a are unknown"),
+    (library(uses=f"{{ {USE}, .rule = 4 }},"), "the rule of contact.a is unknown, or asks for sums of what is no number"),
+    (library(uses=f"{{ {USE}, .shape = QUERN_INDEX, .rule = QUERN_MEANS }},"), "asks for sums of what is no number"),
     (library(uses=f'{{ {USE}, .when = "b" }},'), "contact.a hangs on 'b', which is no parameter"),
     (library(uses=f'{{ {USE}, .with = "b" }},'), "contact.a goes with 'b', which is no SET.NAME"),
     (library(uses=f'{{ {USE}, .target = "grain" }},'), "only an index has a target"),

@@ -2,7 +2,6 @@
 """A scene of several materials: the same bits for threads, batches, instruction sets and compilers, and across stops; its plan and
 the tables show what a scene may say of them; the resolved scene says it again; and a scene of one material has none of it."""
 import json
-import os
 import pathlib
 import subprocess
 
@@ -19,14 +18,7 @@ MORE = ["--set=grains.contact=[{linear: {stiffness: 1e6, restitution: 0.5, frict
 def check_bits(folder, options, what):
     base = folder / "base"
     lab.run("mixture", base, *options)
-    ways = {"2 threads": ([], {"threads": 2}), "run.batch: 8": (["--set=run.batch=8"], {}), "run.batch: 97": (["--set=run.batch=97"], {"threads": 2})}
-    ways |= {level: ([f"--set=run.instructions={level}"], {}) for level in ("v1", "v3", "v4")}
-    if os.environ.get("QUERN_OTHER"):
-        ways["another compiler"] = ([], {"program": os.environ["QUERN_OTHER"]})
-    for name, (more, how) in ways.items():
-        out = folder / name.replace(" ", "_")
-        lab.run("mixture", out, *options, *more, **how)
-        lab.same(base, out, f"{what}, {name}")
+    lab.same_ways("mixture", base, folder, *options, what=f"{what}, ", batches=(8, 97), levels=("v1", "v3", "v4"))
     out = folder / "stopped"
     lab.run("mixture", out, *options, "--until=33 ms")
     lab.run("mixture", out, *options, resume=True)

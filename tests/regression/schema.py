@@ -11,6 +11,7 @@ import sys
 import tempfile
 
 import lab
+import workshop
 
 QUERN, SOURCE = os.environ["QUERN"], pathlib.Path(os.environ["QUERN_SOURCE"])
 MALFORMED = SOURCE / "tests/regression/malformed"
@@ -39,7 +40,7 @@ def check_tables():
     assert scene["checkpoint"]["properties"]["every"]["default"] == 300
     grains = scene["grains"]["else"]
     assert not grains["additionalProperties"] and "contact" in grains["required"]
-    assert {"required": ["material"]} in grains["anyOf"] and {"required": ["materials"]} in grains["anyOf"]
+    assert grains["allOf"] == [{"anyOf": [{"required": ["material"]}, {"required": ["materials"]}]}]
     assert {"density", "radius"} <= set(grains["properties"]["material"]["required"])
     law = next(one for one in grains["properties"]["contact"]["anyOf"][0]["anyOf"] if "properties" in one)["properties"]
     assert law["linear"]["required"] == ["stiffness"] and not law["linear"]["additionalProperties"]
@@ -50,6 +51,50 @@ def check_tables():
     for text in ("", "mm", "5 5", "five", "0,1 s", "5 -m"):
         assert not pattern.match(text), text
     print("the schema says what the tables say")
+
+
+# lists in every form, whose items a slot opens or stands in, and two keys that another one stands for each
+FORMS = """#include <quern/packer.h>
+#include <quern/solver.h>
+typedef struct { const char *name; quern_real size; } part;
+typedef struct { quern_list named, couple, bare; quern_real a, b, c, d; } forms;
+static const quern_param named_rows[] = { QUERN_PARAM(part, name, NULL, "N.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM(part, size, "m", "S."), QUERN_PARAM_AS(part, size, "width", "m", "S."), QUERN_END_PARAMS };
+static const quern_param size_rows[] = { QUERN_PARAM(part, size, "m", "S."), QUERN_END_PARAMS };
+#define LIST(m, rows_, ...) QUERN_PARAM(forms, m, NULL, "L.", .rows = rows_, .item_size = sizeof(part), __VA_ARGS__)
+#define EITHER(m, other) QUERN_PARAM(forms, m, "1", "E.", .flags = QUERN_REQUIRED, .unless = #other), \
+	QUERN_PARAM(forms, other, "1", "O.", .flags = QUERN_MAYBE)
+static const quern_param params[] = { LIST(named, named_rows, .text = "name"), LIST(couple, size_rows, .min = 2, .max = 4),
+	LIST(bare, size_rows, .max = 4), EITHER(a, b), EITHER(c, d), QUERN_END_PARAMS };
+static const quern_use none[] = { QUERN_END_USES };
+static const quern_set sets[] = { { .name = "bead", .doc = "S." }, { .name = NULL } };
+#define SLOT(name_, ...) { .name = name_, .doc = "P.", .kind = &quern_packer_kind, __VA_ARGS__ }
+static const quern_slot slots[] = { SLOT("couple.packer", .def = "random"), SLOT("bare.packer", .def = "random"),
+	SLOT("one", .def = "random", .refine = "named"), { .name = NULL } };
+static quern_status nothing(const void *self, const quern_step *s) { return (void)self, (void)s, QUERN_OK; }
+static const quern_stage stages[] = { { .name = "forms.do", .doc = "D.", .phase = QUERN_END, .uses = none, .run = nothing }, { .name = NULL } };
+static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "forms", .sets = sets, .slots = slots, .stages = stages };
+static const quern_plugin plugin = { .size = sizeof plugin, .revision = 1, .dims = 3, .id = "solver.forms", .brief = "F.",
+	.instance_size = sizeof(forms), .params = params, .uses = none, .ops = &ops };
+QUERN_LIBRARY(plugin, "1", "MIT");
+"""
+
+
+def check_forms():
+    """Keys of a slot are known in the items of its list in whatever form that may be given; each key that another one stands for is wanted."""
+    with tempfile.TemporaryDirectory() as folder:
+        workshop.compile(FORMS, "solver.forms", folder)
+        section = json.loads(said("schema", env={**os.environ, "QUERN_PLUGIN_PATH": folder}))["properties"]["forms"]["else"]
+    found = section["properties"]
+    by_name, listed = found["named"]["anyOf"]
+    for item in (by_name["additionalProperties"], listed["items"]):
+        assert item["additionalProperties"] is True, item
+    couple, bare = found["couple"], found["bare"]["anyOf"]
+    packers = [item["anyOf"][0]["properties"]["packer"] for item in (couple["items"], bare[0], bare[1]["items"])]
+    assert couple["minItems"] == 2 and len(packers[0]["anyOf"]) == 2 and packers[0] == packers[1] == packers[2], packers
+    wanted = [[one["required"] for one in both["anyOf"]] for both in section["allOf"]]
+    assert wanted == [[["a"], ["b"]], [["c"], ["d"]]], wanted
+    print("lists take a slot's keys in every form")
 
 
 def check_scenes(validator, yaml):
@@ -111,6 +156,7 @@ def check_words(validator, yaml):
 
 if __name__ == "__main__":
     check_tables()
+    check_forms()
     try:
         import jsonschema
         import yaml as reader

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Stages of a scene: values change when they shall, and nothing else does; runs with them are the same for any number of threads,
 stopped anywhere, and from the scene that they leave."""
+import json
 import math
 import os
 import pathlib
@@ -8,6 +9,7 @@ import pathlib
 import h5py
 
 import lab
+from workshop import quern
 
 FLIGHT = """
 quern: 1
@@ -157,6 +159,16 @@ def courses_lead_on(place):
     print("courses lead on, or are refused; gravity may go")
 
 
+def keys_that_stay(place):
+    """Of the scene's own keys, a stage may change those alone of which `describe` does not say that none does."""
+    keys = json.loads(quern("describe", "scene", "--json", status=0))["params"]
+    assert [key["name"] for key in keys if not key["once"]] == ["gravity"]
+    for key in [*(key["name"] for key in keys if key["once"]), "observe", "domain", "observe.0.mass"]:
+        said = quern("plan", lab.scene("two_grains"), f"--set=stages=[{{for: 5 ms}}, {{set: {{{key}: 1}}}}]", status=2)
+        assert f"stages: {key} cannot change in the course of a run" in said, said
+    print(f"{len(keys) - 1} keys of the scene stay as they are")
+
+
 def frames_stand_alone(place):
     """Where a stage ends with a frame but for round-off, there is one frame and no step of no length."""
     for every, first, second in (("10 ms", "10 ms", "50 ms"), ("0.3", "0.1", "0.2"), ("0.1", "0.1", "0.2")):
@@ -171,6 +183,23 @@ def frames_stand_alone(place):
         gaps = [b - a for a, b in zip(times, times[1:])]
         assert min(gaps) > 0.3 * max(gaps), f"{every}, {first}, {second}: frames at {times}"
     print("frames where stages end stand alone")
+
+
+def walls_become_smooth(place):
+    """Walls get a friction of their own in a stage, for which plugins are made that the scene does not have: grains move otherwise from then
+    on, and not before. That this is no other start is seen beside solvers whose keys count before the first step alone."""
+    held = [*lab.SMALL["column"], "--set=time.end=12 ms", "--set=output.every=4 ms", "--set=hybrid=null", "--set=continuum=null",
+            "--set=observe=null", "--set=output.fields=[grain.velocity]"]
+    stages = "--set=stages=[{for: 8 ms}, {set: {bodies.0.plane.contact: {friction: 0.1}, bodies.1.plane.contact.friction: 0.2}}]"
+    lab.run("column", place / "held", *held)
+    lab.run("column", place / "smooth", *held, stages)
+    for number, same in ((1, True), (2, True), (3, False)):
+        with h5py.File(lab.frames(place / "held")[number]) as a, h5py.File(lab.frames(place / "smooth")[number]) as b:
+            assert (a["grains/velocity"][:] == b["grains/velocity"][:]).all() == same, number
+    lab.plan("column", stages)
+    said = quern("plan", lab.scene("column"), "--set=stages=[{for: 1 ms}, {set: {bodies.0.plane.contact: {friction: 0.1}, continuum.points: 3}}]",
+                 status=2)
+    assert "stages: continuum.points cannot change in the course of a run" in said, said
 
 
 def substeps_change(place):
@@ -193,5 +222,5 @@ if __name__ == "__main__":
     os.environ["QUERN_CACHE"] = ""
     with lab.workplace() as name:
         for test in (gravity_turns, a_block_begins_to_slide, a_gate_opens, stages_of_one_value_change_nothing, courses_lead_on,
-                     frames_stand_alone, substeps_change):
+                     walls_become_smooth, keys_that_stay, frames_stand_alone, substeps_change):
             test(pathlib.Path(name))

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Transfers with matrices and round trips, and shares on a ramp, leave the same bits: for any number of threads, batch and
 instruction set, and across a stop; with QUERN_OTHER, of another compiler's program too."""
-import os
 import pathlib
 
 import lab
@@ -11,8 +10,6 @@ SCENES = {
     "xpic for both, half shares": ["--set=continuum.transfer={xpic: {order: 3}}", "--set=hybrid.transfer={xpic: {order: 2}}"],
     "zones that are drawn": ["--set=continuum.transfer=apic", "--set=hybrid.oracle=[{fixed: {boxes: [{lower: [0.02, -1], "
                              "upper: [1, 1]}], ramp: 12 mm}}, {near_bodies: {distance: 5 mm, width: 8 mm, bodies: [{body: 0}]}}]"]}
-WAYS = {"2 threads": ([], 2), "run.batch: 8": (["--set=run.batch=8"], 1),
-        **{f"run.instructions: {level}": ([f"--set=run.instructions={level}"], 1) for level in ("v1", "v3")}}
 SHORT = ["--set=time.end=20 ms", "--set=output.every=5 ms", "--set=hybrid.update=100"]
 
 
@@ -24,12 +21,7 @@ def check(name, options, folder):
     assert max(abs(s["mass_defect"]), abs(s["invariant_defect"])) < 1e-12, f"{name}: the books are open"
     assert s["points"] > 0, f"{name}: there is no continuum"
     print(f"{name}: {s['steps']} steps, {s['grains']} grains, {s['points']} points")
-    for number, (way, (more, threads)) in enumerate(WAYS.items()):
-        lab.run("column", folder / str(number), *options, *more, threads=threads)
-        lab.same(base, folder / str(number), way)
-    if os.environ.get("QUERN_OTHER"):
-        lab.run("column", folder / "other", *options, program=os.environ["QUERN_OTHER"])
-        lab.same(base, folder / "other", "another compiler")
+    lab.same_ways("column", base, folder, *options, levels=("v1", "v3"))
     out = folder / "stopped"
     lab.run("column", out, *options, "--until", "10 ms")
     lab.run("column", out, *options, resume=True)

@@ -84,8 +84,7 @@ static void grains_declare(void **state) {
 	for (int verlet = 0; verlet <= 1; verlet++) {
 		quern_run *run = harness_open(1,
 			"{quern: 1, dimension: 2, gravity: [1, -9.81], domain: {lower: [0, 0], upper: [0.1, 0.1], "
-			"periodic: "
-			"[true, false]},\n"
+			"periodic: [true, false]},\n"
 			"time: {end: 1}, output: {fields: [touch.force, grain.force, body.impulse]}, observe: [energy, "
 			"mass],\n"
 			"bodies: [{plane: {point: [0, 0], normal: [0, 1]}}],\n"

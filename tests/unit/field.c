@@ -154,6 +154,70 @@ static void points_at_nothing(void **state) {
 	assert_int_equal(s->sets[CONTACT].n, 0);
 }
 
+/* Numbers of blocks and their places are two things: sums and orders go by places, whatever the numbers are. */
+static void goes_by_places(void **state) {
+	static const int32_t turned[] = { 3, 4, 0, 1,
+		2 }; /* the last of the blocks {0, 1}, {2}, {3, 4} gets the first number */
+	static const uint32_t block[] = { 0, 2, 3, 5 }, other[] = { 0, 2, 4, 5 }, by_place[] = { 1, 2, 0 };
+	static const double x[] = { 5e15, 5e15, 1, -5e15, -5e15 }, y[] = { -5e15, -5e15, 5e15, 5e15, 1 };
+	quern_store *s = *state;
+	fill(s);
+	assert_null(quern_store_parts(s, GRAIN)->block);
+	assert_true(quern_store_sum(s, GRAIN, x) == quern_tree_sum(5, x));
+	assert_int_equal(quern_store_partition(s, GRAIN, 3, block), QUERN_OK);
+	assert_null(quern_store_parts(s, GRAIN)->entry);
+	assert_true(quern_store_sum(s, GRAIN, x) == 0); /* 1 is lost beside 1e16 */
+	assert_int_equal(quern_store_remap(s, GRAIN, 5, turned, 3, other), QUERN_OK);
+	assert_true(quern_store_sum(s, GRAIN, y) == 1); /* in the order of numbers it is not */
+	assert_int_equal(quern_store_arrange(s, GRAIN, by_place), QUERN_OK);
+	const quern_parts *p = quern_store_parts(s, GRAIN);
+	assert_int_equal(p->owned, 5);
+	for (uint32_t q = 0; q < 5; q++) assert_true(column(s, POSITION).real[0][p->entry[q]] == q);
+	assert_true(quern_store_sum(s, GRAIN, y) == 0);
+	assert_int_equal(quern_store_partition(s, GRAIN, 3, other), QUERN_OK); /* cut anew */
+	assert_null(quern_store_parts(s, GRAIN)->by_place);
+}
+
+/* Parts and joined entries follow the rules of their fields. */
+static void parts_and_joins(void **state) {
+	static const int32_t from[] = { 0, 1, 2, 3, 4, -2 - 4, -1 };
+	static const uint8_t rules[] = { QUERN_SUMS, QUERN_MEANS, QUERN_KEEPS, QUERN_OWN };
+	quern_store *s = *state;
+	for (size_t r = 0; r < sizeof rules; r++) {
+		s->fields[POSITION].rule = rules[r];
+		fill(s);
+		double *x;
+		assert_int_equal(quern_store_remap(s, GRAIN, 7, from, 0, NULL),
+			QUERN_OK); /* the last two: a part of 4, and a new one */
+		x = column(s, POSITION).real[0];
+		assert_true(x[4] == 4 && x[6] == 0.5);
+		assert_true(x[5] == (rules[r] == QUERN_SUMS ? 0 : rules[r] == QUERN_OWN ? 0.5 : 4));
+		quern_store_give(s, GRAIN, 4, 5, 0.25, 1); /* a quarter goes to the part */
+		quern_store_give(s, GRAIN, 1, 3, 1, 0.25); /* 1 joins 3, and has a quarter of the mass of both */
+		quern_store_give(s, GRAIN, 2, QUERN_NO_TARGET, 0.5, 0);
+		assert_true(x[5] == (rules[r] == QUERN_SUMS ? 1 : rules[r] == QUERN_OWN ? 0.5 : 4));
+		assert_true(x[4] == (rules[r] == QUERN_SUMS ? 3 : 4));
+		assert_true(x[3] == (rules[r] == QUERN_SUMS ? 4 : rules[r] == QUERN_MEANS ? 2.5 : 3));
+		assert_true(x[2] == (rules[r] == QUERN_SUMS ? 1 : 2));
+	}
+}
+
+/* Contacts that lose a grain go; the places of the blocks of those that stay are what they were. */
+static void keeps_places(void **state) {
+	static const int32_t from[] = { 0, 1, 3, 4 };
+	static const uint32_t block[] = { 0, 2, 3, 4 }, by_place[] = { 2, 0, 1 };
+	quern_store *s = *state;
+	fill(s);
+	assert_int_equal(quern_store_partition(s, CONTACT, 3, block), QUERN_OK);
+	assert_int_equal(quern_store_arrange(s, CONTACT, by_place), QUERN_OK);
+	assert_int_equal(quern_store_remap(s, GRAIN, 4, from, 0, NULL), QUERN_OK);
+	const quern_parts *p = quern_store_parts(s, CONTACT);
+	assert_int_equal(p->n, 2);
+	assert_int_equal(p->by_place[0], 2);
+	assert_int_equal(p->entry[0], 1);
+	assert_int_equal(p->entry[1], 0);
+}
+
 static void keeps_two_copies(void **state) {
 	quern_store *s = *state;
 	s->fields[POSITION].twice = true;
@@ -204,6 +268,7 @@ static void copies(void **state) {
 int main(void) {
 #define STORE(test) cmocka_unit_test_setup_teardown(test, open_store, close_store)
 	const struct CMUnitTest tests[] = { STORE(starts_as_new), STORE(reorders), STORE(copies),
-		STORE(drops_orphans), STORE(points_at_nothing), STORE(keeps_two_copies), STORE(grows) };
+		STORE(drops_orphans), STORE(goes_by_places), STORE(keeps_places), STORE(parts_and_joins),
+		STORE(points_at_nothing), STORE(keeps_two_copies), STORE(grows) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -152,6 +152,8 @@ static void conflicts(void **state) {
 		{ .field = "grain.a", .unit = "m", .doc = "x", .access = QUERN_READ, .shape = QUERN_VECTOR },
 		QUERN_END_USES
 	};
+	static const quern_use sums[] = { U("grain.a", QUERN_READ, .rule = QUERN_SUMS), QUERN_END_USES };
+	static const quern_use means[] = { U("grain.a", QUERN_READ, .rule = QUERN_MEANS), QUERN_END_USES };
 	static const quern_use nowhere[] = { U("rock.a", QUERN_READ, .flags = 0), QUERN_END_USES };
 	const quern_stage *w = STAGES("one.write", QUERN_EXCHANGE, writes);
 	(void)state;
@@ -171,6 +173,11 @@ static void conflicts(void **state) {
 		"grain.a: two.seconds takes it in s, others in m");
 	refused((const quern_stage *[]) { w, STAGES("two.vector", QUERN_EXCHANGE, vectors) }, 2,
 		"grain.a: two.vector takes it for a vector, one.write for a scalar");
+	refused((const quern_stage *[]) { w, STAGES("two.sums", QUERN_EXCHANGE, sums),
+				STAGES("three.means", QUERN_EXCHANGE, means) },
+		3,
+		"grain.a: by the rule of three.means it is 'means' where entries are parted or joined, by that of "
+		"others 'sums'");
 }
 
 /* A row that hangs on a parameter or is optional makes nothing by itself. */
