@@ -11,7 +11,8 @@ extern "C" {
 enum { QUERN_DISCRETE, QUERN_HYBRID, QUERN_CONTINUUM };
 enum {
 	QUERN_SURFACE_FLOOD = 1, /* outside counts only where it is connected with an open boundary */
-	QUERN_SURFACE_WALLS = 2  /* walls and bodies count as surface */
+	QUERN_SURFACE_WALLS = 2, /* walls and bodies count as surface */
+	QUERN_SURFACE_VOIDS = 4  /* since 2.1: with FLOOD, outside counts also where it is not connected */
 };
 enum { QUERN_ORACLE_GAP = 1, QUERN_ORACLE_WEIGHT = 2 }; /* since 2.1: what an oracle wants in its batches */
 

@@ -145,6 +145,7 @@ typedef struct {
 	const quern_real *gap;          /* by cell: to these, NULL if nobody wants to know */
 	bool *outside, *solid, *inside; /* by cell */
 	uint32_t *queue;
+	bool found; /* there is any */
 } surface;
 
 /* What lies one step from a cell: another one, open space, a closed face of the domain, or a wall, which may stand
@@ -192,13 +193,14 @@ static void flood(const update *d, surface *f, const quern_real *level) {
 }
 
 static void find_sides(const update *d, surface *f, const quern_real *level) {
+	const bool floods = f->flags & QUERN_SURFACE_FLOOD && !(f->flags & QUERN_SURFACE_VOIDS);
 	int32_t cell[3];
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
 		f->solid[c] = d->open[c] == 0;
-		if (!(f->flags & QUERN_SURFACE_FLOOD)) f->outside[c] = !f->solid[c] && level[c] <= 0;
+		if (!floods) f->outside[c] = !f->solid[c] && level[c] <= 0;
 	}
-	if (f->flags & QUERN_SURFACE_FLOOD) flood(d, f, level);
+	if (floods) flood(d, f, level);
 	for (uint32_t c = 0; c < d->n_cells; c++) f->inside[c] = !f->outside[c] && !f->solid[c];
 }
 
@@ -247,10 +249,12 @@ static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern
 		.inside = s->host->memory(s->run, d->n_cells + 1u),
 		.queue = s->host->memory(s->run, ((size_t)d->n_cells + 1) * sizeof(uint32_t)) };
 	if (!f->outside || !f->solid || !f->inside || !f->queue || !meant != !ops->means) return false;
-	for (uint32_t b = 0; meant && b < bodies; b++) meant[b] = ops->means(oracle->self, b);
-	if (meant) f->gap = gap;
+	bool all = true;
+	for (uint32_t b = 0; meant && b < bodies; b++) all &= meant[b] = ops->means(oracle->self, b);
+	if (all) f->meant = NULL; /* as if nothing had been said */
+	if (f->meant) f->gap = gap;
 	else if (wants & QUERN_ORACLE_GAP) f->gap = d->wall;
-	return !meant || quern_hybrid_gaps(d, meant, gap) == QUERN_OK;
+	return !f->meant || quern_hybrid_gaps(d, f->meant, gap) == QUERN_OK;
 }
 
 /* Distance of a cell's centre to the nearest cell outside. */
@@ -259,6 +263,7 @@ static quern_status surface_distance(update *d, surface *f, const quern_real *le
 	if (!spreading_init(&p, d, true, distance)) return QUERN_E_MEMORY;
 	find_sides(d, f, level);
 	begin_at_surface(&p, f);
+	f->found = p.n;
 	spread(&p, f->inside);
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (!f->inside[c]) distance[c] = 0;
@@ -328,6 +333,17 @@ static void ask_shares(
 	}
 }
 
+/* At the first update, of an oracle that looks for open space: without any there is no surface, and all becomes continuum. */
+static void warn_of_closed(const update *d, const quern_bound *oracle, const surface *f) {
+	bool any = false;
+	for (uint32_t c = 0; c < d->n_cells && !any; c++) any = f->inside[c] && d->mass[c] > 0;
+	if (!any || f->found || !(f->flags & QUERN_SURFACE_FLOOD) || d->u[U_UPDATES].index[0]) return;
+	d->s->host->log(d->s->run, 2,
+		"%s finds no surface: no open space reaches the material, so all becomes continuum; in a "
+		"closed vessel let voids count (oracle.packing_fraction: voids)",
+		oracle->id);
+}
+
 /* A zone between the two that are wished for stays. */
 static quern_status wishes(update *d, const quern_bound *oracle, const wish_cells *w) {
 	const quern_oracle_ops *ops = oracle->ops;
@@ -341,6 +357,7 @@ static quern_status wishes(update *d, const quern_bound *oracle, const wish_cell
 		ask(d, oracle, b, NULL, f.gap, 0, m, w->level + (size_t)b * N, NULL);
 	const quern_status status = surface_distance(d, &f, w->level, w->distance);
 	if (status != QUERN_OK) return status;
+	warn_of_closed(d, oracle, &f);
 	for (uint32_t b = 0; b < d->g->n_blocks; b++)
 		for (int side = 0; side < 2; side++) {
 			int32_t *out = (side ? w->high : w->low) + (size_t)b * N;

@@ -1,47 +1,30 @@
 /* SPDX-License-Identifier: MIT */
 /* oracle.near_bodies - a body always meets grains. docs/theory/hybrid.md, section 3 */
-#include <math.h>
-#include <quern/oracle.h>
+#include "named.h"
 
-typedef struct {
-	int32_t body;
-} named;
 typedef struct {
 	quern_real distance, width, cell, count;
 	quern_list bodies;
 } near_bodies;
 
-static const quern_param named_rows[] = { QUERN_PARAM(named, body, "1",
-											  "Name of the body, or its number in the scene's list, from 0.",
-											  .text = "body", .max = 1e6, .flags = QUERN_REQUIRED),
-	QUERN_END_PARAMS };
 static const quern_param params[] = {
 	QUERN_PARAM(near_bodies, distance, "m",
 		"From a body to the centre of a cell: up to here there are grains alone.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(near_bodies, width, "m", "Of the hybrid zone behind; a cell at least.",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(near_bodies, bodies, NULL, "Which bodies; none: all of them.", .rows = named_rows,
-		.item_size = sizeof(named)),
 	QUERN_PARAM(near_bodies, cell, "m", "Cell of the grid.", .from = "grid.cell",
 		.flags = QUERN_MAYBE | QUERN_ADVANCED),
-	QUERN_PARAM(near_bodies, count, "1", "Bodies that there are.", .from = "bodies.count",
-		.flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),
-	QUERN_END_PARAMS
+	NAMED_PARAMS(near_bodies, "Which bodies; none: all of them."), QUERN_END_PARAMS
 };
 static const quern_use uses[] = { QUERN_END_USES };
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	const near_bodies *p = self;
-	const named *n = p->bodies.items;
 	if (p->width < (1 - 1e-9) * p->cell)
 		return setup->host->fail(err, QUERN_E_PARAM, "width",
 			"must be a cell at least, %.4g m: a narrower zone is none in places", p->cell);
-	for (uint32_t i = 0; i < p->bodies.n && !isnan(p->count); i++)
-		if (n[i].body >= p->count)
-			return setup->host->fail(err, QUERN_E_PARAM, "bodies",
-				"there is no body %d; the scene has %.0f, counted from 0", n[i].body, p->count);
-	return QUERN_OK;
+	return named_check(&p->bodies, p->count, setup, err);
 }
 
 static void mark(const void *self, const quern_cell_batch *b) {
@@ -63,11 +46,7 @@ static uint32_t wants(const void *self) {
 }
 
 static bool means(const void *self, uint32_t b) {
-	const near_bodies *p = self;
-	const named *n = p->bodies.items;
-	for (uint32_t i = 0; i < p->bodies.n; i++)
-		if (n[i].body == (int32_t)b) return true;
-	return !p->bodies.n;
+	return named_means(&((const near_bodies *)self)->bodies, b);
 }
 
 static const quern_oracle_ops ops = {

@@ -468,11 +468,78 @@ static void slope_of_points(void **state) {
 	assert_true(good);
 }
 
+/* ---- two of a kind ---- */
+
+/* Four grains on the left, of which two touch, and two on the right: observers of one kind, each with its own half. */
+static void halves(void **state) {
+	const double r = 0.01, m = 2500 * pi * r * r, area = 0.5;
+	bool good = true;
+	(void)state;
+#define LEFT "region: {box: {lower: [0, 0], upper: [0.5, 1]}}}}, "
+#define RIGHT "region: {box: {lower: [0.5, 0], upper: [1, 1]}}}}, "
+	seen s = grains(2,
+		ALONE "[{packing_fraction: {label: full_l, " LEFT "{packing_fraction: {label: full_r, " RIGHT
+			  "{coordination: {label: touch_l, " LEFT "{coordination: {label: touch_r, " RIGHT
+			  "{granular_temperature: {label: heat_l, " LEFT "{granular_temperature: {label: heat_r, " RIGHT
+			  "{profile: {bins: 2}}, {profile: {axis: 1, bins: 2, label: rows}}]",
+		"{position: [0.2, 0.5], velocity: [1, 0]}, {position: [0.3, 0.5], velocity: [-1, 0]}, {position: "
+		"[0.2, 0.2]}, {position: [0.2199, 0.2]}, {position: [0.7, 0.5], velocity: [0, 2]}, {position: [0.8, "
+		"0.5]}");
+	table_head("two observers of a kind, each of its own half");
+	good &= table_row("packing fraction, left", value(&s, "full_l.fraction"), 4 * pi * r * r / area, 1e-14);
+	good &= table_row("  right", value(&s, "full_r.fraction"), 2 * pi * r * r / area, 1e-14);
+	good &= table_row("contacts per grain, left", value(&s, "touch_l.number"), 0.5, 0);
+	good &= table_row("  right", value(&s, "touch_r.number"), 0, 0);
+	good &= table_row("temperature, left", value(&s, "heat_l.temperature"), 0.25, 1e-15);
+	good &= table_row("  right", value(&s, "heat_r.temperature"), 0.5, 1e-15);
+	good &= table_row("density, left", value(&s, "profile.density_0"), 4 * m / area, 1e-12);
+	good &= table_row("  right", value(&s, "profile.density_1"), 2 * m / area, 1e-12);
+	good &= table_row("  below", value(&s, "rows.density_0"), (2 + 4 * 0.5) * m / area, 1e-12);
+	good &= table_row("  above", value(&s, "rows.density_1"), 4 * 0.5 * m / area, 1e-12);
+	leave(&s);
+	assert_true(good);
+}
+
+/* A wall with the velocity U hits a grain at rest, which leaves with (1 + e) U: the wall has given m (1 + e) U and has done U
+ * times that. Two walls, each with its own observers. */
+static void work_of_two_walls(void **state) {
+	const double speed[] = { 0.2, -0.3 }, e = 0.5, m = 2500 * pi * 1e-4;
+	bool good = true;
+	(void)state;
+	seen s = watch(harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [1, 1]}, time: {end: 1}, "
+		"output: {every: 1},\n"
+		"observe: [energy, {wall_force: {body: left}}, {wall_force: {body: right}}, {wall_torque: {body: "
+		"left}}, {wall_torque: {body: right}}],\n"
+		"bodies: [{plane: {name: left, point: [0, 0], normal: [1, 0], motion: {velocity: [0.2, 0]}}},\n"
+		"  {plane: {name: right, point: [1, 0], normal: [-1, 0], motion: {velocity: [-0.3, 0]}}}],\n"
+		"grains: {material: {density: 2500, radius: {mean: 0.01}}, contact: {linear: {stiffness: 1e5, "
+		"friction: 0, restitution: 0.5}},\n"
+		"  place: [{position: [0.02, 0.5]}, {position: [0.98, 0.5]}]}}\n"));
+	harness_until(s.run, 0.2);
+	look(&s);
+	const double *v = harness_field(s.run, "grain.velocity").real[0], t = quern_run_time(s.run);
+	const char *const force[] = { "wall_force.x", "wall_force_2.x" }, *const work[] = { "wall_torque.work",
+		"wall_torque_2.work" };
+	double all = 0;
+	table_head("two walls that hit a grain each");
+	for (int k = 0; k < 2; k++) {
+		const double given = m * v[k];
+		good &= table_row("velocity over that of the wall", v[k] / speed[k], 1 + e, 0.005);
+		good &= table_row("  impulse over momentum", -value(&s, force[k]) * t / given, 1, 1e-9);
+		good &= table_row("  work over U times momentum", value(&s, work[k]) / (speed[k] * given), 1, 1e-6);
+		all += value(&s, work[k]);
+	}
+	good &= table_row("work of both, as energy has it", -value(&s, "energy.driven") / all, 1, 1e-12);
+	leave(&s);
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(flower), cmocka_unit_test(pyramid),
 		cmocka_unit_test(cut_discs), cmocka_unit_test(cut_spheres), cmocka_unit_test(temperature),
 		cmocka_unit_test(flux_of_grains), cmocka_unit_test(flux_of_a_round), cmocka_unit_test(flux_of_points),
 		cmocka_unit_test(slabs), cmocka_unit_test(slabs_of_points), cmocka_unit_test(slopes),
-		cmocka_unit_test(slope_of_points) };
+		cmocka_unit_test(slope_of_points), cmocka_unit_test(halves), cmocka_unit_test(work_of_two_walls) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""A hybrid in a vessel that is closed all around: its surface is that of a void, if the scene says so. A drum that turns lifts grains and
+continuum as it lifts grains alone."""
+import csv
+import math
+import pathlib
+import statistics
+
+import lab
+import rerun
+
+DRUM = """
+quern: 1
+dimension: 2
+seed: 1
+gravity: [0, -9.81]
+domain: {lower: [-48 mm, -48 mm], upper: [48 mm, 48 mm]}
+time: {end: 0.6 s}
+output: {every: 10 ms}
+grains:
+  material: {density: 2500, radius: {mean: 1 mm, spread: 10 %}}
+  contact: {linear: {stiffness: 5e5, restitution: 0.5, friction: 0.5}}
+  fill: {region: {box: {lower: [-40 mm, -40 mm], upper: [40 mm, 10 mm]}}, settle: true}
+bodies:
+  - cylinder: {name: drum, centre: [0, 0], radius: 40 mm, inside: true, boundary: sticky, motion: {spin: -1 rad/s, about: [0, 0]}}
+continuum: {cell: 4 mm, material: {mu_i: {critical_density: 1950, bulk_modulus: 1e5}}}
+hybrid: {oracle: {packing_fraction: {depth: 14 mm, half_width: 5 mm, voids: true}}}
+observe: [discrete_share, {repose: {from: -30 mm, to: 30 mm}}, {wall_torque: {body: drum}}]
+"""
+# a drum at rest, and all that a scene may say of surfaces
+EVERYTHING = ["--set=bodies.0.cylinder.motion=null", "--set=time.end=10 ms", "--set=output.every=5 ms",
+              "--set=hybrid.oracle.packing_fraction.closed=[upper_y]", "--set=hybrid.oracle.packing_fraction.bodies=[drum]"]
+
+
+def surfaces(scene, place):
+    """Without a surface all becomes continuum; a drum that is surface too keeps more grains than one that is not. What the resolved scene
+    says of it is the same scene."""
+    shares = {}
+    for name, more in {"void": EVERYTHING[:3], "void and drum": EVERYTHING, "none": [*EVERYTHING[:3], "--set=hybrid.oracle.packing_fraction.voids=false"]}.items():
+        said = lab.run(scene, place / name, *more)
+        assert ("packing_fraction finds no surface" in said) == (name == "none"), said
+        shares[name] = lab.summary(place / name)["observers"]["discrete_share"]["share"]["last"]
+        rerun.again(place / name, f"surface: {name}, share of grains {shares[name]:.3f}")
+    assert shares["none"] == 0 and 0.2 < shares["void"] < 0.6 and shares["void"] + 0.1 < shares["void and drum"] < 1, shares
+
+
+def lifted(scene, place):
+    """After a tenth of a turn: slope of the surface over the last 0.1 s, work of the drum."""
+    found = {}
+    for model in ("grains", "all"):
+        lab.run(scene, place / model, f"--set=model={model}")
+        with open(place / model / "series.csv", newline="") as file:
+            rows = [{key.split(" ")[0]: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+        found[model] = (-math.degrees(statistics.mean(row["repose.angle"] for row in rows[-10:])), rows[-1]["wall_torque.work"])
+        print(f"drum, model {model}: the surface leans by {found[model][0]:.1f} degrees, work {found[model][1]:.4f} J")
+    (angle, work), (hybrid_angle, hybrid_work) = found["grains"], found["all"]
+    assert 15 < angle < 30 and abs(hybrid_angle - angle) < 2 and abs(hybrid_work / work - 1) < 0.06
+
+
+if __name__ == "__main__":
+    with lab.workplace() as name:
+        path = pathlib.Path(name) / "drum.yaml"
+        path.write_text(DRUM)
+        for test in (surfaces, lifted):
+            test(path, pathlib.Path(name))
