@@ -402,11 +402,10 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 	const quern_real fall = 2 * sqrt(2 * diameter / g);
 	if ((quern_real)s->substep * s->dt < fall) return false;
 	cloud_sums c;
-	quern_real moving = 0, energy = 0;
+	quern_real energy = 0;
 	if (!cloud_open(&c, s->host, s->run, &grains)) return false;
-	for (uint32_t i = 0; i < grains.n; i++) moving += c.mass[i];
 	CLOUD_ADD(&c, i, 0.5 * cloud_square(&s->use[FILL_VELOCITY], i, s->dim), energy);
-	return energy <= d->rest * moving * g * diameter;
+	return energy <= d->rest * cloud_total(&c) * g * diameter;
 }
 
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */

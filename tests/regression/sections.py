@@ -7,7 +7,7 @@ import subprocess
 import lab
 
 INDEX = {"contact.first", "contact.second", "touch.grain", "touch.body", "grain.fixed", "grain.home", "point.home",
-         "cell.zone", "cell.draws"}  # four bytes; all the rest has eight
+         "cell.zone", "waiting.draw"}  # four bytes; all the rest has eight
 OF_GRAINS = {"contact", "neighbours", "integrator", "packer"}
 OF_CONTINUUM = {"material", "shape", "transfer"}
 OF_HYBRID = {"coupling", "oracle"}
