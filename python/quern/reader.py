@@ -19,6 +19,7 @@ class Reader:
 
     def __init__(self, name: str):
         self.name, self.faults = name, []
+        self.clean = True  # the last mapping had no fault: what is missing in it is not only misspelt
 
     def fault(self, node: yaml.Node, text: str) -> None:
         mark = node.start_mark
@@ -26,9 +27,10 @@ class Reader:
 
     def mapping(self, node: yaml.Node, where: str, known: tuple[str, ...] = ()) -> dict[str, tuple[yaml.Node, yaml.Node]]:
         """Key and value by name; unknown and repeated keys are faults."""
-        found = {}
+        found, before = {}, len(self.faults)
         if not isinstance(node, yaml.MappingNode):
             self.fault(node, f"{where} must be a mapping, KEY: VALUE, not {kind(node)}")
+            self.clean = False
             return found
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode) or not key.value:
@@ -39,7 +41,15 @@ class Reader:
                 self.fault(key, f"{where}: unknown key '{key.value}'{nearest(key.value, known)}")
             else:
                 found[key.value] = (key, value)
+        self.clean = len(self.faults) == before
         return found
+
+    def require(self, node: yaml.Node, found: dict, where: str, keys: dict[str, str]) -> None:
+        """Directly after `mapping`: keys that must be there, each with what it is, or nothing."""
+        if self.clean:
+            for key, what in keys.items():
+                if key not in found:
+                    self.fault(node, f"{where}'{key}' is missing" + (f", {what}" if what else ""))
 
     def text(self, node: yaml.Node, where: str, what: str = "a text") -> str:
         if isinstance(node, yaml.ScalarNode) and node.value:

@@ -68,11 +68,7 @@ def read_range(reader: Reader, node: yaml.Node, where: str, count: str, optional
     """from, to, law and the count of a grid or a sample: (first, last, unit, law, n, others); None if something is wrong."""
     before = len(reader.faults)
     found = reader.mapping(node, where, ("from", "to", "law", count, *optional))
-    if not found and isinstance(node, yaml.MappingNode) and node.value:
-        return None
-    for key in ("from", "to", count):
-        if key not in found and isinstance(node, yaml.MappingNode):
-            reader.fault(node, f"{where}: '{key}' is missing")
+    reader.require(node, found, f"{where}: ", {"from": "", "to": "", count: ""})
     ends = [reader.quantity(found[key][1], f"{where}.{key}") for key in ("from", "to") if key in found]
     law = reader.choice(found["law"][1], f"{where}.law", ("even", "log")) if "law" in found else "even"
     n = reader.whole(found[count][1], f"{where}.{count}", 2 if count == "steps" else 1, MOST_RUNS) if count in found else 0
@@ -81,7 +77,7 @@ def read_range(reader: Reader, node: yaml.Node, where: str, count: str, optional
     (first, unit), (last, other) = ends
     if unit != other:
         reader.fault(found["to"][1], f"{where}: 'from' is in '{unit or 'no unit'}' and 'to' in '{other or 'no unit'}'; write both in one unit")
-    if not first < last:
+    elif not first < last:
         reader.fault(found["to"][1], f"{where}: 'to' must be above 'from'")
     if law == "log" and first <= 0:
         reader.fault(found["from"][1], f"{where}: 'from' must be above 0 where the law is log")
@@ -141,7 +137,7 @@ def read_axis(reader: Reader, at: yaml.Node, node: yaml.Node, name: str) -> Axis
         reader.fault(at, f"{where}: the name of an axis must be a word that no column has already")
     found = reader.mapping(node, where, ("key", *WAYS, "cases"))
     ways = [word for word in found if word != "key"]
-    if not isinstance(node, yaml.MappingNode):
+    if not ways and not reader.clean:
         return Axis(name, ())
     if len(ways) != 1:
         reader.fault(node, f"{where}: give one of list, grid, random or cases" + (f", not {' and '.join(ways)}" if ways else ""))
@@ -151,8 +147,7 @@ def read_axis(reader: Reader, at: yaml.Node, node: yaml.Node, name: str) -> Axis
         if "key" in found:
             reader.fault(found["key"][0], f"{where}: cases have keys of their own; leave 'key' out")
         return Axis(name, tuple(read_cases(reader, value, f"{where}.cases")))
-    if "key" not in found:
-        reader.fault(node, f"{where}: 'key' is missing, the key of the scene that the axis sets")
+    reader.require(node, found, f"{where}: ", {"key": "the key of the scene that the axis sets"})
     key = reader.text(found["key"][1], f"{where}.key", "the path of a key such as continuum.cell") if "key" in found else ""
     if key == "seed":
         reader.fault(found["key"][1], f"{where}.key: seeds are set by 'repeats: {{seeds: ...}}'")
@@ -171,9 +166,8 @@ def read_axes(reader: Reader, node: yaml.Node) -> list[Axis]:
 
 def read_seeds(reader: Reader, node: yaml.Node) -> list[int]:
     found = reader.mapping(node, "repeats", ("seeds",))
+    reader.require(node, found, "repeats: ", {"seeds": "how many or which: 3 or [1, 2, 3]"})
     if "seeds" not in found:
-        if isinstance(node, yaml.MappingNode):
-            reader.fault(node, "repeats: 'seeds' is missing, how many or which: 3 or [1, 2, 3]")
         return []
     value = found["seeds"][1]
     if not isinstance(value, yaml.SequenceNode):
@@ -186,13 +180,11 @@ def read_seeds(reader: Reader, node: yaml.Node) -> list[int]:
 
 def read_measure(reader: Reader, node: yaml.Node) -> Measure | None:
     found = reader.mapping(node, "measure", ("name", "series", "summary", "at"))
-    if not isinstance(node, yaml.MappingNode):
-        return None
+    reader.require(node, found, "measure: ", {"name": ""})
     sources = [word for word in ("series", "summary") if word in found]
-    if "name" not in found:
-        reader.fault(node, "measure: 'name' is missing")
     if len(sources) != 1:
-        reader.fault(node, "measure: give one of series (a column of series.csv) and summary (a path in summary.json)")
+        if reader.clean:
+            reader.fault(node, "measure: give one of series (a column of series.csv) and summary (a path in summary.json)")
         return None
     name = reader.text(found["name"][1], "measure.name", "a word") if "name" in found else ""
     if name and (not re.fullmatch(r"[A-Za-z_]\w*", name) or name in RESERVED):
@@ -218,11 +210,7 @@ def read_measures(reader: Reader, node: yaml.Node, axes: list[Axis]) -> list[Mea
 
 def read_reference(reader: Reader, node: yaml.Node, study: Study) -> None:
     found = reader.mapping(node, "reference", ("name", "set", "follows"))
-    if not isinstance(node, yaml.MappingNode):
-        return
-    for key in ("name", "set"):
-        if key not in found:
-            reader.fault(node, f"reference: '{key}' is missing")
+    reader.require(node, found, "reference: ", {"name": "", "set": "what it sets beside the study's own"})
     if "name" in found:
         study.reference = reader.text(found["name"][1], "reference.name", "a word")
     if "set" in found:
@@ -256,9 +244,7 @@ def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
     study = Study(path, path.stem)
     found = reader.mapping(root, "the study", KEYS)
     parts = {key: value for key, (_, value) in found.items()}
-    for key, cure in (("study", "write 'study: 1'"), ("base", "the scene that all runs begin with")):
-        if key not in parts and isinstance(root, yaml.MappingNode):
-            reader.fault(root, f"'{key}' is missing: {cure}")
+    reader.require(root, found, "", {"study": "write 'study: 1'", "base": "the scene that all runs begin with"})
     if "study" in parts and flow(parts["study"]) != "1":
         reader.fault(parts["study"], f"study must be 1, the only form there is, not {kind(parts['study'])}")
     study.base = read_base(reader, parts["base"], path.parent) if "base" in parts else path

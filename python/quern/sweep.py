@@ -13,6 +13,7 @@ import pathlib
 import shlex
 import signal
 import sys
+from typing import NoReturn
 
 from . import workers
 from .points import Job, jobs_of, program_digests
@@ -22,17 +23,30 @@ from .study import Study, read
 from .table import write_tables
 
 
+class Parser(argparse.ArgumentParser):
+    """Help and faults in the form that the other commands have."""
+
+    def error(self, message: str) -> NoReturn:
+        print(f"quern sweep: {message}\nusage: quern sweep STUDY.yaml [OPTION]...; see quern sweep --help", file=sys.stderr)
+        sys.exit(1)
+
+
 def arguments(words: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="quern sweep", description="Makes the runs of a study and writes DIR/table.csv, a row for each run.")
-    parser.add_argument("study", metavar="STUDY.yaml")
+    parser = Parser(prog="quern sweep", usage="quern sweep STUDY.yaml [OPTION]...", add_help=False,
+                    formatter_class=lambda prog: argparse.HelpFormatter(prog, max_help_position=30, width=200))
+    parser.add_argument("study", metavar="STUDY.yaml", help="what to run; docs/studies.md")
     parser.add_argument("-o", "--output", metavar="DIR", help="the folder of the study; default: out/NAME")
     parser.add_argument("--jobs", type=int, metavar="N", help="runs at a time, instead of what the study says")
     parser.add_argument("--retry", action="store_true", help="make runs again that were refused, failed or hung")
-    parser.add_argument("--table", action="store_true", help="make no run; write the table of those that are recorded")
+    parser.add_argument("--table", action="store_true", help="make no run; write the tables of those that are there")
     parser.add_argument("--only", type=int, metavar="K", help="make run K alone, counted from 1, and write no table")
-    parser.add_argument("--emit", choices=["parallel", "slurm"], help="make no run; print the same work for GNU parallel or a slurm array")
+    parser.add_argument("--emit", metavar="FORM", choices=["parallel", "slurm"], help="make no run; print the same work for GNU parallel or a slurm array")
     parser.add_argument("--quiet", action="store_true", help="no line for each run")
-    return parser.parse_args(words)
+    parser.add_argument("-h", "--help", action="help", help="this text")
+    found = parser.parse_args(words)
+    if found.jobs is not None and found.jobs < 1:
+        parser.error(f"--jobs {found.jobs}: give a whole number above 0")
+    return found
 
 
 def program() -> list[str]:
@@ -72,8 +86,8 @@ def held(folder: pathlib.Path):
         yield
 
 
-def make(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.Namespace) -> int:
-    """Makes what is not recorded; returns how many runs somebody interrupted."""
+def make(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.Namespace, stop: int) -> bool:
+    """Makes what is not recorded; False if somebody interrupted it."""
     digests = program_digests()
     left = {job.key: job for job in jobs if not workers.is_recorded(folder, job, study, digests, options.retry)}
     if not options.quiet and len(left) < len(jobs):
@@ -85,10 +99,10 @@ def make(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.
             word = record["message"].splitlines()[0] if record["message"] else f"{record['cost']['wall']:.1f} s"
             print(f"[{say.done}/{len(left)}] {record['status']}: {job}: {word}", file=sys.stderr, flush=True)
     say.done = 0
-    return workers.run_all(study, list(left.values()), folder, at_a_time(study, options.jobs), digests, say)
+    return workers.run_all(study, list(left.values()), folder, at_a_time(study, options.jobs), digests, say, stop)
 
 
-def sweep(study: Study, options: argparse.Namespace) -> int:
+def sweep(study: Study, options: argparse.Namespace, stop: int) -> int:
     jobs = jobs_of(study)
     folder = pathlib.Path(options.output or pathlib.Path("out") / study.name).resolve()
     if options.emit:
@@ -98,41 +112,40 @@ def sweep(study: Study, options: argparse.Namespace) -> int:
         if not 1 <= options.only <= len(jobs):
             raise QuernError(f"--only {options.only}: the study has runs 1 to {len(jobs)}")
         folder.mkdir(parents=True, exist_ok=True)
-        return 130 if make(study, [jobs[options.only - 1]], folder, options) else 0
+        return 0 if make(study, [jobs[options.only - 1]], folder, options, stop) else 130
     with held(folder):
-        interrupted = 0
-        try:
-            if not options.table:
-                interrupted = make(study, jobs, folder, options)
-        except KeyboardInterrupt:
-            interrupted = 1
+        whole = options.table or make(study, jobs, folder, options, stop)
         rows = write_tables(study, jobs, folder)
-    return conclude(rows, folder, interrupted)
+    return conclude(rows, folder, whole)
 
 
-def conclude(rows: list[dict], folder: pathlib.Path, interrupted: int) -> int:
+def conclude(rows: list[dict], folder: pathlib.Path, whole: bool) -> int:
     """The last lines: how the runs ended, and where the table is."""
     counts = {}
     for row in rows:
         counts[row["status"]] = counts.get(row["status"], 0) + 1
     print(f"{len(rows)} runs: {', '.join(f'{n} {word}' for word, n in sorted(counts.items()))}; {folder / 'table.csv'}")
-    if interrupted:
+    if not whole:
         print("quern sweep: interrupted; the same command goes on", file=sys.stderr)
-    return 130 if interrupted else 0
+    return 0 if whole else 130
 
 
-def interrupt(number, frame) -> None:
-    raise KeyboardInterrupt
+def listen() -> int:
+    """From now on signals that end a program can be read here, a byte each. As exceptions they could come anywhere, and get lost."""
+    stop, note = os.pipe()
+    os.set_blocking(note, False)
+    signal.set_wakeup_fd(note)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) != signal.SIG_IGN:  # as under nohup
+            signal.signal(number, lambda *_: None)
+    return stop
 
 
 def main(words: list[str] | None = None) -> int:
     options = arguments(words)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) != signal.SIG_IGN:  # as under nohup
-            signal.signal(number, interrupt)
     try:
         study = read(pathlib.Path(options.study), options.study)
-        return sweep(study, options)
+        return sweep(study, options, listen())
     except StudyError as faults:
         count = len(str(faults).splitlines())
         print(f"{faults}\nquern sweep: {count} fault{'s' * (count != 1)} in {options.study}", file=sys.stderr)
@@ -143,5 +156,3 @@ def main(words: list[str] | None = None) -> int:
     except OSError as error:
         print(f"quern sweep: error: {error.filename}: {error.strerror}", file=sys.stderr)
         return 4
-    except KeyboardInterrupt:
-        return 130

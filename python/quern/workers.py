@@ -43,7 +43,7 @@ def recorded(folder: pathlib.Path, key: str) -> dict | None:
 def is_recorded(folder: pathlib.Path, job: Job, study: Study, digests: dict[str, str], retry: bool) -> bool:
     """True if the run was made already by the same program and plugins, and nothing says to try again."""
     record = recorded(folder, job.key)
-    if not record or any(digests.get(path) != value for path, value in record["made_by"].items()):
+    if not record or not set(record["made_by"].values()) <= set(digests.values()):
         return False
     if record["status"] == "hung" and study.limit > record["limit"]:
         return False
@@ -128,32 +128,35 @@ def memory_left() -> float:
         return math.inf
 
 
-def wait(active: dict[int, Active]) -> list[int]:
-    """File descriptors of runs that are over, once there is one or a limit has come."""
+def wait(active: dict[int, Active], stop: int) -> list[int]:
+    """File descriptors of runs that are over, or `stop`, once there is one or a limit has come."""
     timeout = max(0.0, min(one.ends for one in active.values()) - time.monotonic())
     poll = select.poll()
-    for fd in active:
+    for fd in (stop, *active):
         poll.register(fd, select.POLLIN)
     return [fd for fd, _ in poll.poll(None if math.isinf(timeout) else math.ceil(timeout * 1000))]
 
 
 def run_all(study: Study, jobs: list[Job], folder: pathlib.Path, at_a_time: int, digests: dict[str, str],
-            say: Callable[[Job, dict], None]) -> int:
-    """Makes the runs; returns how many were interrupted. Another one is started while cores are free, and while memory is left for the
-    largest that there was."""
+            say: Callable[[Job, dict], None], stop: int) -> bool:
+    """Makes the runs; False if they were interrupted, as they are once `stop` can be read. Another one is started while cores are free,
+    and while memory is left for the largest that there was."""
     (folder / "runs").mkdir(exist_ok=True)
-    waiting, active, largest, interrupted = list(reversed(jobs)), {}, 0, 0
+    waiting, active, largest, whole = list(reversed(jobs)), {}, 0, True
     try:
         while waiting or active:
             while waiting and len(active) < at_a_time and (not active or memory_left() > largest):
                 one = start(study, waiting.pop(), folder)
                 active[os.pidfd_open(one.process.pid)] = one
-            for fd in wait(active):
+            over = wait(active, stop)
+            if stop in over:
+                return False
+            for fd in over:
                 one = active.pop(fd)
                 os.close(fd)
                 record = finish(study, one, folder, digests)
                 largest = max(largest, record["cost"]["memory"])
-                interrupted += record["status"] == "interrupted"
+                whole &= record["status"] != "interrupted"
                 say(one.job, record)
             for one in active.values():
                 if time.monotonic() >= one.ends:
@@ -163,4 +166,4 @@ def run_all(study: Study, jobs: list[Job], folder: pathlib.Path, at_a_time: int,
             one.process.kill()
             one.process.wait()
             os.close(fd)
-    return interrupted
+    return whole
