@@ -35,19 +35,24 @@ def scatter(twins: np.ndarray) -> float:
 
 def front(cost: np.ndarray, off: np.ndarray) -> np.ndarray:
     """True for points that no other one beats: none is at most as costly and at most as wrong, and better in one of them."""
-    cheaper = (cost[:, None] <= cost) & (off[:, None] <= off)
-    better = (cost[:, None] < cost) | (off[:, None] < off)
-    return ~np.any(cheaper & better, axis=0)
+    order = np.lexsort((off, cost))
+    c, o = cost[order], off[order]
+    first = np.searchsorted(c, c, "left")  # of those that cost as much
+    before = np.where(first > 0, np.minimum.accumulate(o)[first - 1], np.inf)
+    on = np.empty(len(cost), bool)
+    on[order] = (o == o[first]) & (o[first] < before)
+    return on
 
 
 def share_on_front(costs: list[np.ndarray], runs: list[np.ndarray], twins: list[np.ndarray], resamples: int = 1000, seed: int = 1) -> np.ndarray:
     """For each point, in which share of resamples of its seeds it is on the front. Points of equally many seeds share their draws, so
     that a reference which is off for one is off for all."""
     draws = np.random.Generator(np.random.PCG64(seed)).random((resamples, max(len(cost) for cost in costs)))
-    count = np.zeros(len(costs))
-    for draw in draws:
-        picks = [(draw[:len(cost)] * len(cost)).astype(int) for cost in costs]
-        mean_cost = np.array([np.mean(cost[pick]) for cost, pick in zip(costs, picks)])
-        off = np.array([error(run[pick], twin[pick]) for run, twin, pick in zip(runs, twins, picks)])
-        count += front(mean_cost, off)
-    return count / resamples
+    mean_cost, off = np.empty((2, resamples, len(costs)))
+    for k, (cost, run, twin) in enumerate(zip(costs, runs, twins)):
+        n = len(cost)
+        picks = (draws[:, :n] * n).astype(int)
+        mean_cost[:, k] = np.mean(cost[picks], axis=1)
+        often = np.array([np.bincount(pick, minlength=n) for pick in picks]) / n
+        off[:, k] = np.sqrt(np.mean((often @ (run - twin)) ** 2, axis=1))
+    return np.mean([front(c, o) for c, o in zip(mean_cost, off)], axis=0)

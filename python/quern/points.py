@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """From a study to its runs: what each sets, and the key by which a run that was made before is known again."""
+import contextlib
 import hashlib
 import itertools
 import json
@@ -61,30 +62,31 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def files_named(tree, folder: pathlib.Path) -> dict[str, str]:
-    """Every text in a scene that is the path of a file, with the hash of what is in it."""
-    if isinstance(tree, dict):
-        return {name: value for item in tree.values() for name, value in files_named(item, folder).items()}
-    if isinstance(tree, list):
-        return {name: value for item in tree for name, value in files_named(item, folder).items()}
+def words_of(text: str) -> list[str]:
+    """What YAML says, comments and blanks aside, word by word; text that is none stands for itself. Read as events, since aliases can
+    make a tree larger than any memory."""
     try:
-        return {tree: digest((folder / tree).read_bytes())} if tree and len(tree) < 4096 and (folder / tree).is_file() else {}
-    except (OSError, ValueError):
-        return {}
-
-
-def words_of(text: str):
-    """YAML as lists and dictionaries of its words; text that is none stands for itself."""
-    try:
-        return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
+        events = yaml.parse(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
+        return [f"{type(one).__name__} {getattr(one, 'anchor', None)} {getattr(one, 'style', None)} {getattr(one, 'value', '')}" for one in events]
     except (yaml.YAMLError, RecursionError):
-        return text
+        return [text]
+
+
+def files_named(words: list[str], folder: pathlib.Path) -> dict[str, str]:
+    """Every word that is the path of a file, with the hash of what is in it."""
+    found = {}
+    for word in words:
+        path = word.split(" ", 3)[-1]
+        with contextlib.suppress(OSError, ValueError):
+            if 0 < len(path) < 4096 and (folder / path).is_file():
+                found[path] = digest((folder / path).read_bytes())
+    return found
 
 
 def scene_digest(base: pathlib.Path) -> str:
     """Of what a scene says, not of how: comments do not count."""
-    tree = words_of(base.read_text(errors="replace"))
-    return digest(json.dumps([tree, files_named(tree, base.parent)], sort_keys=True).encode())
+    words = words_of(base.read_text(errors="replace"))
+    return digest(json.dumps([words, files_named(words, base.parent)]).encode())
 
 
 def key_of(study: Study, scene: str, sets: list[str]) -> str:

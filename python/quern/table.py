@@ -8,6 +8,7 @@ import io
 import math
 import pathlib
 import statistics
+from collections.abc import Callable
 
 import h5py
 import numpy as np
@@ -59,16 +60,16 @@ def measured(measure: Measure, series: Series | None, summary: dict) -> tuple[np
     return pick(column), series.units[measure.path]
 
 
-def read_run(study: Study, job: Job, folder: pathlib.Path, units: dict[str, str]) -> tuple[dict, dict[str, np.ndarray]]:
+def read_run(study: Study, job: Job, folder: pathlib.Path, numbers: dict[str, str], units: dict[str, str]) -> tuple[dict, dict[str, np.ndarray]]:
     """The row of a run but for errors, and its measures."""
     record = workers.recorded(folder, job.key) or {"status": "missing", "exit": "", "message": "", "cost": {}}
     row = {"run": job.key, "point": "" if job.model else job.point, "model": job.model, "seed": "" if job.seed is None else job.seed,
            "status": record["status"], "exit": record["exit"], "message": record["message"]}
-    row |= axis_cells(job, axis_numbers(study)) | {f"cost.{name}": record["cost"].get(name, "") for name in COSTS}
-    if record["status"] != "done":
-        return row, {}
+    row |= axis_cells(job, numbers) | {f"cost.{name}": record["cost"].get(name, "") for name in COSTS}
     where, values = folder / "runs" / job.key, {}
     summary = workers.read_json(where / "summary.json")
+    if record["status"] != "done" or not summary:
+        return row, {}
     series = Series(where / "series.csv") if any(measure.source == "series" for measure in study.measures) else None
     row |= {name: summary.get(name, "") for name in RESULTS} | {"scene_hash": summary["provenance"]["scene_hash"]}
     for measure in study.measures:
@@ -84,10 +85,13 @@ def read_run(study: Study, job: Job, folder: pathlib.Path, units: dict[str, str]
 
 # ---- against the reference ----
 
-def twins_of(study: Study, job: Job, runs: list) -> list[tuple[dict, dict, Job]]:
-    """Runs of the reference that a point is compared with."""
-    wanted = {name: label for name, label in job.values if name in study.follows}
-    return [(row, values, twin) for row, values, twin in runs if twin.model and dict(twin.values) == wanted]
+def twins_of(study: Study, runs: list) -> Callable[[Job], list]:
+    """Finds runs of the reference that a point is compared with: those that have its values on the axes that the reference follows."""
+    found: dict[tuple, list] = {}
+    for run in runs:
+        if run[2].model:
+            found.setdefault(run[2].values, []).append(run)
+    return lambda job: found.get(tuple(pair for pair in job.values if pair[0] in study.follows), [])
 
 
 def of_measure(runs: list, name: str) -> dict:
@@ -95,12 +99,12 @@ def of_measure(runs: list, name: str) -> dict:
     return {job.seed: values[name] for _, values, job in runs if name in values}
 
 
-def add_errors(study: Study, runs: list) -> None:
+def add_errors(runs: list, twins_of_job: Callable[[Job], list]) -> None:
     """How far each run is from the mean of the reference."""
     for row, values, job in runs:
         if job.model:
             continue
-        twins = twins_of(study, job, runs)
+        twins = twins_of_job(job)
         for name, own in values.items():
             theirs = [value for value in of_measure(twins, name).values() if len(value) == len(own)]
             if theirs:
@@ -115,14 +119,14 @@ def pairs_of(own: dict, theirs: dict) -> tuple[list, np.ndarray, np.ndarray]:
     return seeds, np.array([own[seed] for seed in seeds]), np.array([theirs[seed] for seed in seeds])
 
 
-def point_row(study: Study, runs: list, group: list) -> tuple[dict, dict]:
+def point_row(study: Study, group: list, twins: list, numbers: dict[str, str]) -> tuple[dict, dict]:
     """The row of a point, and what its place on the fronts is drawn from."""
     first = group[0][2]
     done = [row for row, _, _ in group if row["status"] == "done"]
-    row = {"point": first.point, **axis_cells(first, axis_numbers(study)), "runs": len(group), "done": len(done)}
+    row = {"point": first.point, **axis_cells(first, numbers), "runs": len(group), "done": len(done)}
     costs = {job.seed: r[f"cost.{study.front}"] for r, _, job in group if r["status"] == "done"}
     row["cost.mean"] = statistics.mean(costs.values()) if costs else ""
-    draws, twins = {}, twins_of(study, first, runs)
+    draws = {}
     for measure in study.measures:
         own, theirs = of_measure(group, measure.name), of_measure(twins, measure.name)
         single = [float(value[0]) for value in own.values()] if measure.at != "every" else []
@@ -182,9 +186,9 @@ def write_h5(path: pathlib.Path, tables: dict[str, tuple[dict, list[dict]]]) -> 
     aside.replace(path)
 
 
-def columns_of(study: Study, units: dict[str, str]) -> tuple[dict, dict]:
+def columns_of(study: Study, numbers: dict[str, str], units: dict[str, str]) -> tuple[dict, dict]:
     """Columns of both tables with their units; None: text."""
-    axes = {axis.name: axis_numbers(study).get(axis.name) for axis in study.axes}
+    axes = {axis.name: numbers.get(axis.name) for axis in study.axes}
     runs = {"run": None, "point": "1", "model": None, **axes, "seed": "1", "status": None, "exit": "1", "message": None, "scene_hash": None}
     runs |= {name: UNITS.get(name, "1") for name in RESULTS}
     points = {"point": "1", **axes, "runs": "1", "done": "1"}
@@ -203,16 +207,18 @@ def columns_of(study: Study, units: dict[str, str]) -> tuple[dict, dict]:
 def write_tables(study: Study, jobs: list[Job], folder: pathlib.Path) -> list[dict]:
     """table.csv, points.csv and table.h5 in the folder of the study; returns the rows of the first."""
     units: dict[str, str] = {}
-    runs = [(*read_run(study, job, folder, units), job) for job in jobs]
-    add_errors(study, runs)
+    numbers = axis_numbers(study)
+    runs = [(*read_run(study, job, folder, numbers, units), job) for job in jobs]
+    twins = twins_of(study, runs)
+    add_errors(runs, twins)
     groups: dict[int, list] = {}
     for run in runs:
         if not run[2].model:
             groups.setdefault(run[2].point, []).append(run)
-    points = [point_row(study, runs, group) for group in groups.values()]
+    points = [point_row(study, group, twins(group[0][2]), numbers) for group in groups.values()]
     point_rows, draws = [row for row, _ in points], [own for _, own in points]
     add_fronts(study, point_rows, draws)
-    run_columns, point_columns = columns_of(study, units)
+    run_columns, point_columns = columns_of(study, numbers, units)
     rows = [row for row, _, _ in runs]
     write_csv(folder / "table.csv", run_columns, rows)
     write_csv(folder / "points.csv", point_columns, point_rows)

@@ -36,7 +36,7 @@ def record_path(folder: pathlib.Path, key: str) -> pathlib.Path:
 def recorded(folder: pathlib.Path, key: str) -> dict | None:
     try:
         return json.loads(record_path(folder, key).read_text())
-    except FileNotFoundError:
+    except (FileNotFoundError, ValueError):
         return None
 
 
@@ -104,7 +104,7 @@ def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str
     settling = summary.get("settle_seconds", 0) / summary["wall_seconds"] if summary.get("wall_seconds") else 0
     used = {plugin["file"] for plugin in summary["provenance"]["plugins"]} | {find()} if summary else set(digests)
     record = {"status": word, "exit": "" if active.asked else code if code >= 0 else 128 - code, "message": message,
-              "limit": study.limit, "job": str(active.job), "sets": active.job.sets,
+              "limit": None if math.isinf(study.limit) else study.limit, "job": str(active.job), "sets": active.job.sets,
               "cost": {"wall": wall, "processor": processor, "running": processor * (1 - settling), "memory": usage.ru_maxrss * 1024},
               "made_by": {path: digests.get(path) or digest(pathlib.Path(path).read_bytes()) for path in sorted(used)}}
     if word != "interrupted":
@@ -134,7 +134,7 @@ def wait(active: dict[int, Active], stop: int) -> list[int]:
     poll = select.poll()
     for fd in (stop, *active):
         poll.register(fd, select.POLLIN)
-    return [fd for fd, _ in poll.poll(None if math.isinf(timeout) else math.ceil(timeout * 1000))]
+    return [fd for fd, _ in poll.poll(None if math.isinf(timeout) else math.ceil(min(timeout, 1e6) * 1000))]
 
 
 def run_all(study: Study, jobs: list[Job], folder: pathlib.Path, at_a_time: int, digests: dict[str, str],

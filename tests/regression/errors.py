@@ -30,6 +30,10 @@ def check_by_hand():
     near(errors.error(2 * np.sin(time) + start, 0 * time + start), math.sqrt(2), 1e-12, "a sine of amplitude 2 over time")
     assert math.isnan(errors.standard_error(runs[:1], twins[:1])) and math.isnan(errors.scatter(runs[:1]))
     assert math.isnan(errors.standard_error(twins, twins)) and errors.error(twins, twins) == 0
+    for _ in range(300):  # against every pair, with many that are equal
+        cost, off = draw.integers(0, 6, (2, 9)).astype(float)
+        beaten = [any(c <= cost[k] and o <= off[k] and (c < cost[k] or o < off[k]) for c, o in zip(cost, off)) for k in range(9)]
+        assert errors.front(cost, off).tolist() == [not b for b in beaten], (cost, off)
     assert errors.front(np.array([1, 2, 3, 3, 1.0]), np.array([5, 2, 2, 1, 5.0])).tolist() == [True, True, False, True, True]
 
 
