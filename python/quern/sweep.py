@@ -6,7 +6,6 @@ goes on where it was; runs that it had begun are begun anew, since what they cos
 import argparse
 import contextlib
 import fcntl
-import json
 import math
 import os
 import pathlib

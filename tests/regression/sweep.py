@@ -2,7 +2,6 @@
 """quern sweep: the table of a study, the same to the last digit however often it was killed; runs that fail, hang or are refused; what is
 made again and what is not; sampled axes; errors against a reference; the same work by GNU parallel; what a run costs beside itself."""
 import csv
-import json
 import os
 import pathlib
 import shutil
