@@ -173,7 +173,8 @@ static bool read_grid(quern_run *run, quern_h5 *h, quern_text *why) {
 	if (!good) return fault(why, "blocks", "the grid");
 	for (size_t s = 0; s < run->plan->store.n_sets; s++)
 		if (run->plan->store.sets[s].rows &&
-			quern_store_rows(&run->plan->store, (int)s, (uint32_t)rows * 64) != QUERN_OK)
+			(quern_store_rows(&run->plan->store, (int)s, (uint32_t)rows * 64) != QUERN_OK ||
+				quern_grid_cut(&run->grid, &run->plan->store, (int)s) != QUERN_OK))
 			return fault(why, "memory", run->plan->store.sets[s].name);
 	return true;
 }

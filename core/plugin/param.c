@@ -237,9 +237,10 @@ static void refuse_name(
 	else if (!n) quern_text_add(&cure, "give one this name, or its number here");
 	for (size_t i = 0; i < n && !near; i++)
 		quern_text_add(&cure, "%s%s", i ? ", " : "these have a name: ", names[i]);
-	/* whoever has that name may have stopped at a fault of its own */
-	quern_report_follow(r->report, node->mark, "%s: %s: no %s is called '%s'; %s", owner, row->name,
-		row->text, node->text, quern_text_string(&cure));
+	/* where there was a fault before, whoever has that name may have stopped at it */
+	(quern_report_errors(r->report) ? quern_report_follow : quern_report_add)(r->report, node->mark,
+		"%s: %s: no %s is called '%s'; %s", owner, row->name, row->text, node->text,
+		quern_text_string(&cure));
 	quern_text_finish(&cure);
 	free(names);
 }

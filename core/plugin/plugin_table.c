@@ -194,6 +194,8 @@ static bool use(quern_table_reader *r, const char *of, const quern_use *row, con
 	if (row->rule > QUERN_OWN || ((row->rule == QUERN_SUMS || row->rule == QUERN_MEANS) && !number))
 		return quern_table_refuse(
 			r, "%s: the rule of %s is unknown, or asks for sums of what is no number", of, row->field);
+	if (row->rule && row->access == QUERN_READ)
+		return quern_table_refuse(r, "%s: a rule is for who changes the field: %s is read", of, row->field);
 	if (!is_unit(row->unit) || !is_doc(row->doc))
 		return quern_table_refuse(r, "%s: unit or doc of %s is no plain text", of, row->field);
 	if (row->when && (!is_dotted(row->when, 0) || !quern_param_find(params, row->when)))
@@ -221,6 +223,7 @@ bool quern_table_uses(quern_table_reader *r, const char *of, const quern_use *ro
 	*copy = quern_table_keep(r, (*n + 1) * sizeof **copy);
 	for (size_t i = 0; i < *n; i++) {
 		memcpy(&(*copy)[i], from + i * stride, stride < sizeof **copy ? stride : sizeof **copy);
+		if ((r->table->library.abi & 0xffffu) < 1) (*copy)[i].rule = 0; /* it lies where 2.0 had nothing */
 		if (!use(r, of, &(*copy)[i], params)) return false;
 	}
 	return true;

@@ -120,8 +120,12 @@ static quern_status host_arrange(quern_run *run, const char *set, const uint32_t
 	const int i = quern_store_set(&run->plan->store, set);
 	if (i < 0) return quern_run_stop(run, QUERN_E_FIELD, "%s: no set of that name", set);
 	const quern_status status = quern_store_arrange(&run->plan->store, i, by_place);
-	return status == QUERN_E_MEMORY ? quern_run_stop(run, status, "out of memory for the blocks of %s", set)
-									: status;
+	if (status == QUERN_E_FIELD)
+		return quern_run_stop(
+			run, status, "%s: the order of its blocks does not hold each of them once", set);
+	if (status == QUERN_E_MEMORY)
+		return quern_run_stop(run, status, "out of memory for the blocks of %s", set);
+	return status;
 }
 
 static quern_real host_sum_set(quern_run *run, const char *set, const quern_real *values) {

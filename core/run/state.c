@@ -125,15 +125,9 @@ static bool fault(quern_text *why, const char *what, const char *name) {
 static bool read_places(quern_store *store, hid_t group, int s, uint32_t n) {
 	if (H5Lexists(group, "by_place", H5P_DEFAULT) <= 0) return true;
 	uint32_t *place = malloc((size_t)n * sizeof(uint32_t));
-	bool *seen = calloc(n, sizeof(bool)),
-		 good = place && seen && quern_h5_read(group, "by_place", H5T_NATIVE_UINT32, n, 1, place);
-	for (uint32_t q = 0; q < n && good; q++) {
-		good = place[q] < n && !seen[place[q]];
-		if (good) seen[place[q]] = true;
-	}
-	good = good && quern_store_arrange(store, s, place) == QUERN_OK;
+	const bool good = place && quern_h5_read(group, "by_place", H5T_NATIVE_UINT32, n, 1, place) &&
+					  quern_store_arrange(store, s, place) == QUERN_OK;
 	free(place);
-	free(seen);
 	return good;
 }
 

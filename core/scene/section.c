@@ -355,6 +355,23 @@ static void unbind_slot(const quern_section *section, const quern_slot_use *use,
 	free(bound);
 }
 
+/* Before later slots are filled. A faulty parameter must not reach the solver, which may rely on the ranges of its rows. */
+static void tell_filled(
+	quern_scene *s, quern_section *section, const quern_slot_use *use, size_t errors_before) {
+	if (!use->slot->filled || !section->solver->ready || quern_report_errors(s->report) != errors_before)
+		return;
+	const quern_setup setup = quern_scene_setup(s, section->name);
+	quern_err err = { s->report, section->node, section->mark, section->solver->file->plugin.id };
+	quern_bound *bound = bind_slot(section, use);
+	quern_watch_enter(section->solver->file->plugin.id, "filled");
+	const quern_status status =
+		use->slot->filled(section->solver->self, &setup, bound, (uint32_t)use->n, &err);
+	quern_watch_leave();
+	if (status != QUERN_OK && quern_report_errors(s->report) == errors_before)
+		quern_report_add(s->report, section->mark, "%s: cannot be set up", use->path);
+	unbind_slot(section, use, (char *)bound);
+}
+
 static void section_ready(quern_scene *s, quern_section *section) {
 	if (!section->ops->ready || quern_report_errors(s->report)) return;
 	const quern_setup setup = quern_scene_setup(s, section->name);
@@ -466,6 +483,7 @@ void quern_section_read(quern_scene *s, const quern_plugin_file *file, const que
 		else if (strchr(slot->name, '.')) fill_items(s, section, use);
 		else quern_slot_fill(s, use, quern_node_find(node, slot->name), section->mark);
 		if (!slot->same_as) quern_slot_override(s, section, use);
+		tell_filled(s, section, use, before);
 	}
 	section_ready(s, section);
 }

@@ -203,8 +203,20 @@ quern_status quern_store_partition(quern_store *store, int set, uint32_t n_block
 	return status;
 }
 
+/* Each block once, and no other. */
+static bool is_order(const quern_set_store *s, const uint32_t *by_place) {
+	bool *seen = calloc((size_t)s->n_blocks + 1, sizeof(bool)), good = seen;
+	for (uint32_t q = 0; q < s->n_blocks && good; q++) {
+		good = by_place[q] < s->n_blocks && !seen[by_place[q]];
+		if (good) seen[by_place[q]] = true;
+	}
+	free(seen);
+	return good;
+}
+
 quern_status quern_store_arrange(quern_store *store, int set, const uint32_t *by_place) {
 	quern_set_store *s = &store->sets[set];
+	if (by_place && (!s->n_blocks || !is_order(s, by_place))) return QUERN_E_FIELD;
 	uint32_t *places = by_place ? malloc(((size_t)s->n_blocks + 1) * sizeof(uint32_t)) : NULL;
 	uint32_t *entry = by_place ? malloc(((size_t)s->n + 1) * sizeof(uint32_t)) : NULL, n = 0;
 	if (by_place && (!places || !entry)) return free(places), free(entry), QUERN_E_MEMORY;
@@ -287,6 +299,7 @@ static quern_status drop(quern_store *store, int set, const bool *gone) {
 	uint32_t *places = s->by_place;
 	s->by_place = NULL;
 	quern_status status = quern_store_remap(store, set, n, from, s->n_blocks, block);
+	if (status != QUERN_OK && s->n != n) s->by_place = places, places = NULL; /* nothing has gone */
 	if (status == QUERN_OK && places) status = quern_store_arrange(store, set, places);
 	free(places);
 	free(from);
@@ -348,6 +361,8 @@ quern_status quern_store_remap(
 }
 
 void quern_store_give(quern_store *store, int set, uint32_t from, int32_t to, double part, double share) {
+	const quern_set_store *s = &store->sets[set];
+	if (s->rows || from >= s->n || (to >= 0 && (uint32_t)to >= s->n)) return;
 	for (size_t i = 0; i < store->n_fields; i++) {
 		quern_field *field = &store->fields[i];
 		if (!owns(field, set) || (field->rule != QUERN_SUMS && field->rule != QUERN_MEANS)) continue;

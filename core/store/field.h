@@ -69,7 +69,7 @@ quern_status quern_store_remap(
 /* Rows are transient: they are made to fit and hold zeros. */
 quern_status quern_store_rows(quern_store *, int set, uint32_t n);
 quern_status quern_store_partition(quern_store *, int set, uint32_t n_blocks, const uint32_t *block);
-/* The order of the places of a set's blocks, as quern_host.arrange takes it; it goes when the set is cut anew. */
+/* The order of the places of a set's blocks, as quern_host.arrange takes it; it goes when the set is cut anew. QUERN_E_FIELD: it is none. */
 quern_status quern_store_arrange(quern_store *, int set, const uint32_t *by_place);
 const quern_parts *quern_store_parts(quern_store *, int set);
 /* As quern_host.give. */

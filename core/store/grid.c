@@ -296,7 +296,7 @@ static quern_status carry_cells(const quern_grid *g, const quern_grid *old, quer
 	}
 	const quern_status status = quern_store_remap(store, set, n, from, 0, NULL);
 	free(from);
-	return status == QUERN_OK ? quern_grid_cut(g, store, set) : status;
+	return status;
 }
 
 /* Marks the blocks that were asked for among those that came of it. */
@@ -326,6 +326,7 @@ quern_status quern_grid_cover(quern_grid *g, quern_store *store, uint32_t n, con
 		if (!store->sets[s].grid) continue;
 		status = store->sets[s].rows ? quern_store_rows(store, (int)s, m * CELLS)
 									 : carry_cells(g, &old, store, (int)s);
+		if (status == QUERN_OK) status = quern_grid_cut(g, store, (int)s);
 	}
 	free(old.at);
 	free(old.slot);

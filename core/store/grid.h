@@ -24,8 +24,8 @@ void quern_grid_finish(quern_grid *);
 /* Makes the grid hold exactly these blocks and their neighbours. Sets marked `grid` in the store follow: cells keep
  * their fields, rows are cleared. Blocks outside the domain are ignored. */
 quern_status quern_grid_cover(quern_grid *, quern_store *, uint32_t n, const int32_t (*block)[3]);
-/* Takes the blocks as they are, sorted and complete: a checkpoint's. Cells are not carried. */
+/* Takes the blocks as they are, complete and in whatever order: a checkpoint's. Cells are not carried. */
 quern_status quern_grid_restore(quern_grid *, uint32_t n, const int32_t (*block)[3], const uint8_t *asked);
-/* A set of cells is cut as the grid is. */
+/* A set of cells or of nodes is cut as the grid is. */
 quern_status quern_grid_cut(const quern_grid *, quern_store *, int set);
 int32_t quern_grid_find(const quern_grid *, const int32_t at[3]); /* -1: not allocated */

@@ -342,7 +342,7 @@ static const quern_plan_use *first_use_of(const quern_plan *p, const char *field
 }
 
 static void state_rule(quern_plan *p, quern_field *field, const quern_plan_use *u) {
-	static const char *const names[] = { "keeps", "sums", "means", "own" };
+	static const char *const names[] = { "", "keeps", "sums", "means", "own" };
 	if (u->row->rule && field->rule && u->row->rule != field->rule)
 		quern_report_add(p->scene->report, u->mark,
 			"%s: by the rule of %s it is '%s' where entries are parted or joined, by that of others '%s'",

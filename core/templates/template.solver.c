@@ -154,12 +154,13 @@ static const quern_output sums[] = { { .name = "mass", .unit = "kg", .doc = "Car
 
 static void account(const void *self, const quern_step *s, quern_real *sum) {
 	const flight *p = self;
-	const uint32_t n = s->host->set(s->run, "grain").n;
+	const uint32_t n = s->host->set(s->run, "grain").n, *order = s->host->parts(s->run, "grain")->entry;
 	const quern_real area = 3.141592653589793 * p->radius * p->radius;
 	const quern_real mass = p->density * (s->dim == 2 ? area : 4.0 / 3 * area * p->radius);
 	sum[MASS] = sum[DISCRETE] = n * mass;
-	for (uint32_t i = 0; i < n; i++)
+	for (uint32_t q = 0; q < n; q++) /* by place: a sum must not depend on the numbers of entries */
 		for (uint32_t k = 0; k < s->dim; k++) {
+			const uint32_t i = quern_nth(order, q);
 			const quern_real x = s->use[FILL_POSITION].real[k][i], v = s->use[FILL_VELOCITY].real[k][i];
 			sum[MOMENTUM + k] += mass * v;
 			sum[KINETIC] += 0.5 * mass * v * v;

@@ -185,10 +185,11 @@ enum {
 };
 
 /* Since 2.1: what becomes of a field where an entry is parted into two, or two are joined to one, by quern_host.remap and give. An entry
- * that is new has `initial`, and what an entry that goes has not given away goes with it. */
+ * that is new has `initial`, and what an entry that goes has not given away goes with it. Where nobody states a rule, entries keep. */
 typedef enum {
-	QUERN_KEEPS, /* a part has what the whole had; of joined ones that stays which the one that stays had */
-	QUERN_SUMS,  /* an amount, such as a heat in J: parts share it out, joined ones add up */
+	QUERN_KEEPS =
+		1,      /* a part has what the whole had; of joined ones that stays which the one that stays had */
+	QUERN_SUMS, /* an amount, such as a heat in J: parts share it out, joined ones add up */
 	QUERN_MEANS, /* per mass, such as a strain or a temperature: a part has what the whole had, joined ones the mean by mass */
 	QUERN_OWN /* of the entry itself, such as its age: a part begins with `initial`, and of joined ones the one that stays keeps its own */
 } quern_rule;
@@ -207,7 +208,7 @@ typedef struct quern_use {
 	quern_real initial; /* of a new entry; diagonal of SYMMETRIC and TENSOR */
 	uint8_t access, shape, flags;
 	uint8_t hook; /* which function of the kind touches it (0: the main one) */
-	uint8_t rule; /* since 2.1: quern_rule; one use must state it, and no two different ones */
+	uint8_t rule; /* since 2.1: quern_rule, stated by who changes the field, and by nobody else another one */
 } quern_use;
 
 /* Pointers to the components of a field, by component; NULL where the field does not exist. */
@@ -323,7 +324,7 @@ typedef struct quern_host {
 	/* since 2.1 [stage] Entry `from` of a set gives to entry `to` what its fields' rules say: of amounts the share `part`, which
 	 * it loses; means become those of both, in which it counts for `share`, the mass given over that of both then. To
 	 * QUERN_NO_TARGET: what it gives leaves the set; with a `part` below zero it gets as much, as when it takes mass that is
-	 * like its own from elsewhere. What a solver itself knows of, such as mass and momentum, states no rule. */
+	 * like its own from elsewhere. What a solver itself sees to, such as mass and velocity, it states to be kept. */
 	void (*give)(quern_run *, const char *set, uint32_t from, int32_t to, quern_real part, quern_real share);
 	/* since 2.1 [stage] In the set-up: whether a field holds what another run's state had of it, or whether that run had
 	 * a plugin of this ID; false where nobody can tell, as of a frame's plugins. See quern_solver_ops.from. */

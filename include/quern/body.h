@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* quern/body.h - the kind `body`: geometry only; pose and motion are the host's, so that scripted and free bodies share it */
+/* quern/body.h - the kind `body`: geometry only; pose and motion are the host's, so that scripted and free bodies share it, and so do regions
+ * of fills and sources, which are where a body at rest would be solid: gap <= 0, as far as that is within bounds() */
 #pragma once
 #include <quern/abi.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* quern/packer.h - the kind `packer`: one region, a cell to enrich or a box to fill; regions are visited in a fixed order, so that
- * none sees another's work in progress */
+/* quern/packer.h - the kind `packer`: one region, a cell to enrich or a box to fill; regions that are packed at once, by
+ * several threads, do not see each other's work */
 #pragma once
 #include <quern/abi.h>
 

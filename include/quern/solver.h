@@ -42,6 +42,8 @@ typedef struct quern_set {
 	const char *when;
 } quern_set;
 
+struct quern_bound;
+
 typedef struct quern_slot {
 	const char *name,
 		*doc; /* scene key; "fill.packer": one in every item of the list "fill"; "": the section is the list */
@@ -62,6 +64,10 @@ typedef struct quern_slot {
 	/* since 2.1: "cases", a list among the solver's parameters whose items take, beside their own rows, keys of the plugins here: what
 	 * they are in that case. A key that several of them have is given under a plugin's name: {linear: {friction: 0.1}} */
 	const char *refine;
+	/* since 2.1: [setup] called when the slot has been filled, before those that come after it in the table: what their plugins take
+	 * as a default may be published here. Not called where the section has a fault. May be NULL */
+	quern_status (*filled)(
+		void *self, const struct quern_setup *, const struct quern_bound *, uint32_t n, quern_err *);
 } quern_slot;
 
 /* What a solver holds of a plugin in one of its slots. */

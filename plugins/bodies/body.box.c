@@ -14,7 +14,9 @@ typedef struct {
 
 static const quern_param params[] = { QUERN_PARAM(box, lower, "m", "Lower corner, before any turn.",
 										  .flags = QUERN_REQUIRED),
-	QUERN_PARAM(box, upper, "m", "Upper corner, before any turn.", .flags = QUERN_REQUIRED),
+	QUERN_PARAM(box, upper, "m",
+		"Upper corner, before any turn; may equal the lower one along an axis: a plate without an inside.",
+		.flags = QUERN_REQUIRED),
 	QUERN_PARAM_AS(box, angle, "turn", "rad",
 		"By which it is turned about its middle; counterclockwise, in 3-D seen against the axis.",
 		.flags = QUERN_MAYBE, .min = -1e4, .max = 1e4),
@@ -58,8 +60,8 @@ static quern_status find_turn(box *p, const quern_setup *setup, quern_err *err) 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	const box *p = self;
 	for (uint32_t k = 0; k < setup->dim; k++)
-		if (!(p->upper[k] > p->lower[k]))
-			return setup->host->fail(err, QUERN_E_PARAM, "upper", "must be above lower along axis %u", k);
+		if (!(p->upper[k] >= p->lower[k]))
+			return setup->host->fail(err, QUERN_E_PARAM, "upper", "must not be below lower along axis %u", k);
 	return find_turn(self, setup, err);
 }
 

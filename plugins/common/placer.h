@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* placer - grains placed so far, found by place; answers whether another fits. Stage code: it allocates. */
+/* placer - grains placed so far, found by place; answers whether another fits. One thread may add, several may ask
+ * while nobody adds; it allocates. */
 #pragma once
 #include "../bodies/bodies.h"
 #include <quern/packer.h>

@@ -7,21 +7,6 @@
 
 const char *const quern_source_keeps[] = { "rate", "full", NULL };
 
-static quern_status check_region(
-	const source *p, uint32_t i, bool flat, const quern_setup *setup, quern_err *err) {
-	char param[60];
-	snprintf(param, sizeof param, "source.%u.region.box.upper", i);
-	for (uint32_t k = 0; k < setup->dim; k++) {
-		if (!(p->upper[k] > p->lower[k]) && !(flat && p->upper[k] == p->lower[k]))
-			return setup->host->fail(
-				err, QUERN_E_PARAM, param, "must be above the lower corner; axis %u is not", k);
-		if (p->lower[k] < setup->lower[k] || p->upper[k] > setup->upper[k])
-			return setup->host->fail(
-				err, QUERN_E_PARAM, param, "the region reaches out of the domain along axis %u", k);
-	}
-	return QUERN_OK;
-}
-
 static quern_status check_source(const source *p, uint32_t i, const quern_setup *setup, quern_err *err) {
 	char param[60];
 	const quern_host *host = setup->host;
@@ -41,12 +26,20 @@ static quern_status check_source(const source *p, uint32_t i, const quern_setup 
 	return QUERN_OK;
 }
 
-quern_status quern_sources_check(
-	const quern_list *list, bool flat, const quern_setup *setup, quern_err *err) {
-	const source *p = list->items;
+quern_status quern_sources_check(const quern_list *list, const quern_setup *setup, quern_err *err) {
+	for (uint32_t i = 0; i < list->n; i++)
+		if (check_source(quern_source_at(list, i), i, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	return QUERN_OK;
+}
+
+quern_status quern_sources_place(
+	quern_list *list, const quern_bound *shape, region_use use, const quern_setup *setup, quern_err *err) {
 	for (uint32_t i = 0; i < list->n; i++) {
-		if (check_region(&p[i], i, flat, setup, err) != QUERN_OK) return QUERN_E_PARAM;
-		if (check_source(&p[i], i, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+		source *p = (source *)(void *)((char *)list->items + (size_t)i * list->item_size);
+		char param[60];
+		snprintf(param, sizeof param, "source.%u.region", i);
+		if (quern_region_box(&shape[i], use, setup, param, err, p->lower, p->upper) != QUERN_OK)
+			return QUERN_E_PARAM;
 	}
 	return QUERN_OK;
 }

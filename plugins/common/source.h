@@ -2,23 +2,22 @@
 /* source - a region that pours material: its keys, and how much is due. docs/theory/flow.md */
 #pragma once
 #include "books.h"
+#include "region.h"
 
 enum { SOURCE_BY_RATE, SOURCE_FULL };
 
 typedef struct source {
-	quern_real lower[3], upper[3], velocity[3];
+	quern_real lower[3], upper[3]; /* m, of the box around its region */
+	quern_real velocity[3];
 	quern_real rate, from, until, most; /* kg/s; s; s; kg; NaN: the scene says nothing */
 	int32_t keep, every;
 } source;
 
 extern const char *const quern_source_keeps[];
-/* The keys of an item of a solver's list `source`; without being told it looks for room every EVERY short steps. */
+/* The keys of an item of a solver's list `source`, beside those of its slots; its struct begins with this one. Without being told it
+ * looks for room every EVERY short steps. */
 /* clang-format off */
-#define SOURCE_ROWS(EVERY) \
-	{ QUERN_PARAM_AS(source, lower, "region.box.lower", "m", \
-		"Lower corner of the region in which new centres lie.", \
-		.flags = QUERN_REQUIRED), \
-	QUERN_PARAM_AS(source, upper, "region.box.upper", "m", "Upper corner.", .flags = QUERN_REQUIRED), \
+#define SOURCE_KEYS(EVERY) \
 	QUERN_PARAM(source, velocity, "m/s", "Velocity of what is poured."), \
 	QUERN_PARAM(source, rate, "kg/s", "Mass poured per second; in 2-D of a slab one metre thick.", \
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12), \
@@ -31,12 +30,17 @@ extern const char *const quern_source_keeps[];
 	QUERN_PARAM_AS(source, most, "mass", "kg", "Mass after which it ends; default: none.", \
 		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12), \
 	QUERN_PARAM(source, every, "1", "Short steps between two looks for room.", .def = EVERY, .min = 1, \
-		.max = 1e6, .flags = QUERN_ADVANCED), \
-	QUERN_END_PARAMS }
+		.max = 1e6, .flags = QUERN_ADVANCED)
 /* clang-format on */
 
-/* [setup] Regions in the domain, times in order, a rate where one is needed; `flat`: a region may be as thin as it likes. */
-quern_status quern_sources_check(const quern_list *, bool flat, const quern_setup *, quern_err *);
+static inline const source *quern_source_at(const quern_list *list, uint32_t i) {
+	return (const source *)(const void *)((const char *)list->items + (size_t)i * list->item_size);
+}
+/* [setup] Times in order, and a rate where one is needed. */
+quern_status quern_sources_check(const quern_list *, const quern_setup *, quern_err *);
+/* [setup] Where they are: the shapes of their regions, one by one. */
+quern_status quern_sources_place(
+	quern_list *, const quern_bound *shape, region_use, const quern_setup *, quern_err *);
 /* Whether the source looks for room in this step. */
 bool quern_source_acts(const source *, const quern_step *);
 /* kg that shall have been poured by now; infinite where the region is kept full. Entry i of rows of DUE_USE and LOOKED_USE. */

@@ -111,7 +111,8 @@ static quern_status stop_deep(const forces_shared *sh, const deep_contact *c, co
 quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_column *u = sh->use;
 	deep_contact worst = { .by = 0 }, watched = { .by = 0 };
-	for (uint32_t b = 0; b < n_blocks; b++) {
+	for (uint32_t q = 0; q < n_blocks; q++) {
+		const uint32_t b = quern_nth(sh->by_place, q);
 		if (is_worse(&sh->worst[b], &worst)) worst = sh->worst[b];
 		if (sh->watched[b].by > 0) watched = sh->watched[b];
 	}
@@ -132,8 +133,8 @@ quern_status quern_dem_judge_contacts(const forces_shared *sh, uint32_t n_blocks
 
 quern_status quern_dem_judge_grains(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_step *s = sh->s;
-	for (uint32_t b = 0; b < n_blocks; b++) {
-		const int32_t i = sh->outside[b];
+	for (uint32_t q = 0; q < n_blocks; q++) {
+		const int32_t i = sh->outside[quern_nth(sh->by_place, q)];
 		if (i < 0) continue;
 		for (uint32_t k = 0; k < s->dim; k++) {
 			const quern_real x = sh->use[FORCE_POSITION].real[k][i];

@@ -32,6 +32,7 @@ typedef struct dem {
 	bool features; /* some bodies have several */
 	bool moving;   /* some bodies do */
 	bool outlets, sources;
+	bool blends; /* some sources pour several materials */
 	bool settles;
 	quern_real reach;   /* m, of the laws beyond touching */
 	quern_real largest; /* m, radius of the largest grain that the scene itself brings */
@@ -62,13 +63,25 @@ typedef struct dem_share {
 	quern_real share; /* of the mass */
 } dem_share;
 
-typedef struct dem_fill {
-	quern_real lower[3], upper[3], velocity[3];
-	bool settle, fixed;
+/* Of what grains are: of one material, or of several. */
+typedef struct dem_blend {
 	const char *material;
-	quern_list mix;
+	quern_list mix;                   /* of dem_share */
 	quern_real share[MOST_MATERIALS]; /* of the mass, by material; they add up to 1 */
+} dem_blend;
+
+typedef struct dem_fill {
+	quern_real lower[3], upper[3]; /* m, of the box around its region */
+	quern_real velocity[3];
+	quern_list above;
+	bool settle, fixed;
+	dem_blend of;
 } dem_fill;
+
+typedef struct dem_source {
+	source base;
+	dem_blend of;
+} dem_source;
 
 typedef struct dem_place {
 	quern_real position[3], velocity[3], spin[3], radius;
@@ -79,6 +92,8 @@ typedef struct dem_place {
 
 /* slots, in the order of the solver's table */
 enum {
+	SLOT_REGION,
+	SLOT_SOURCE_REGION,
 	SLOT_CONTACT,
 	SLOT_NEIGHBOURS,
 	SLOT_INTEGRATOR,
@@ -157,8 +172,15 @@ quern_status quern_dem_name_materials(dem *, const quern_setup *, quern_err *);
 quern_status quern_dem_pair_up(
 	dem *, const quern_setup *, const quern_bound *body, uint32_t n_bodies, quern_err *);
 void quern_dem_part(dem *);
-/* m, of all materials that a fill has */
+/* Whether a source brings a material. */
+bool quern_dem_pours(const dem *, uint32_t material);
+/* m, the widest mean of these shares; the widest grain that they may bring, or (NULL) that any material may */
 quern_real quern_dem_widest(const dem *, const quern_real share[MOST_MATERIALS]);
+quern_real quern_dem_most(const dem *, const quern_real *share);
+/* Streams of random numbers for the radii of fills and of sources; behind each comes that of its packers. */
+enum { STREAM_FILLS, STREAM_SOURCES = 2, STREAM_MIX = 4 };
+/* The radius of draw k if it is of material m. */
+quern_real quern_dem_radius(const dem *, uint32_t m, const quern_host *, uint32_t stream, uint64_t k);
 /* The material of the next grain, draw k, where `placed` kg of each are there already: no share is missed by more than a grain. */
 int32_t quern_dem_mix(const dem *, const quern_real share[MOST_MATERIALS],
-	const quern_real placed[MOST_MATERIALS], const quern_host *, uint64_t k);
+	const quern_real placed[MOST_MATERIALS], const quern_host *, uint32_t stream, uint64_t k);

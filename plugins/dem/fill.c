@@ -18,6 +18,8 @@ typedef struct {
 	uint32_t before; /* grains of another run's state, the first of them */
 	uint64_t draws;
 	const dem_fill *item;
+	region region; /* its own */
+	region_side side;
 	quern_real widest; /* mean radius of what it has */
 	quern_real
 		reach; /* m around a cell, of seeds: twice the widest radii of a new grain and of one that is there */
@@ -30,14 +32,6 @@ typedef struct {
 
 static quern_real mass_of(const dem *d, const dem_place *grain) {
 	return quern_radius_mass(grain->radius, d->material[grain->kind].density, d->dim);
-}
-
-/* m, the widest grain that these shares may bring; NULL: that any material may. */
-static quern_real most_of(const dem *d, const quern_real *share) {
-	quern_real most = 0;
-	for (uint32_t k = 0; k < d->n_materials; k++)
-		if (!share || share[k] > 0) most = fmax(most, quern_radius_most(&d->material[k].radii));
-	return most;
 }
 
 static void add(filling *f, const dem_place *grain) {
@@ -57,23 +51,24 @@ static void add(filling *f, const dem_place *grain) {
 }
 
 static void choose_material(filling *f) {
-	const quern_real *share = f->item->share;
+	const quern_real *share = f->item->of.share;
 	f->kind = 0;
-	if (f->item->mix.n) f->kind = quern_dem_mix(f->d, share, f->placed, f->step->host, f->draws);
+	if (f->item->of.mix.n)
+		f->kind = quern_dem_mix(f->d, share, f->placed, f->step->host, STREAM_FILLS, f->draws);
 	else
 		while (!(share[f->kind] > 0)) f->kind++;
 }
 
 static quern_real job_radius(quern_pack_job *job) {
 	const filling *f = job->scene;
-	return quern_radius_draw(&f->d->material[f->kind].radii, job->host, f->draws);
+	return quern_dem_radius(f->d, (uint32_t)f->kind, job->host, STREAM_FILLS, f->draws);
 }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
 	const filling *f = job->scene;
 	for (uint32_t k = 0; k < f->d->dim; k++)
 		if (x[k] < f->lower[k] || (f->last[k] ? x[k] > f->upper[k] : x[k] >= f->upper[k])) return false;
-	return true;
+	return f->side == REGION_AROUND || quern_region_holds(&f->region, x);
 }
 
 static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
@@ -117,20 +112,25 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 	free(seed);
 }
 
-/* Cells of about two diameters, along gravity last, so that the packing grows upwards as it would by pouring. */
-static void fill_region(filling *f, const dem_fill *item, const quern_bound *packer, uint64_t key) {
+/* Cells of about two diameters, along gravity last, so that the packing grows upwards as it would by pouring. Returns how many of
+ * them hold some of the region. */
+static uint32_t fill_region(filling *f, uint32_t i) {
 	const uint32_t dim = f->d->dim;
-	uint32_t count[3] = { 1, 1, 1 };
+	const quern_step *s = f->step;
+	const dem_fill *item = (const dem_fill *)f->d->fill.items + i;
+	const uint64_t key = (uint64_t)(i + 1) << 40;
+	uint32_t count[3] = { 1, 1, 1 }, held = 0;
 	f->item = item;
+	f->region = quern_region_of(s, &s->slot[SLOT_REGION][i], item->lower, item->upper);
+	quern_region_put_above(&f->region, s, &item->above, SLOT_BODIES, f->pose);
 	const dem_fill *fill = f->d->fill.items;
 	quern_real others = 0;
-	for (uint32_t i = 0; i < f->d->fill.n; i++) others = fmax(others, most_of(f->d, fill[i].share));
-	f->widest = quern_dem_widest(f->d, item->share);
-	f->reach = 2 * most_of(f->d, item->share) + 2 * others;
+	for (uint32_t k = 0; k < f->d->fill.n; k++) others = fmax(others, quern_dem_most(f->d, fill[k].of.share));
+	f->widest = quern_dem_widest(f->d, item->of.share);
+	f->reach = 2 * quern_dem_most(f->d, item->of.share) + 2 * others;
 	memset(f->placed, 0, sizeof f->placed);
 	choose_material(f);
-	f->placer.n_bodies =
-		item->fixed ? 0 : f->step->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
+	f->placer.n_bodies = item->fixed ? 0 : s->n_slot[SLOT_BODIES]; /* a rough floor may be let into a plane */
 	for (uint32_t k = 0; k < dim; k++) {
 		const quern_real cells = (item->upper[k] - item->lower[k]) / (4 * f->widest);
 		count[k] = cells > 1 ? (uint32_t)cells : 1;
@@ -145,8 +145,12 @@ static void fill_region(filling *f, const dem_fill *item, const quern_bound *pac
 					f->last[k] = at[k] + 1 == count[k];
 					f->upper[k] = f->last[k] ? item->upper[k] : item->lower[k] + (at[k] + 1) * width;
 				}
-				fill_cell(f, packer, key + ((uint64_t)z * count[1] + y) * count[0] + x);
+				f->side = quern_region_side(&f->region, f->lower, f->upper);
+				if (f->side == REGION_APART) continue;
+				fill_cell(f, &s->slot[SLOT_PACKER][i], key + ((uint64_t)z * count[1] + y) * count[0] + x);
+				held++;
 			}
+	return held;
 }
 
 /* True if the grain lies in the domain. A fixed one may lie beyond it by the domain's own width, any grain along
@@ -277,7 +281,7 @@ static quern_real widest_of(const dem_place *grain, uint32_t n, quern_real most)
 /* The placer's cells hold the widest grain that any source may bring. */
 static quern_status open_placer(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
-	quern_real most = most_of(f->d, NULL);
+	quern_real most = quern_dem_most(f->d, NULL);
 	most = widest_of(f->d->place.items, f->d->place.n, most);
 	most = widest_of(table->grain, table->n, most);
 	for (uint32_t i = 0; i < f->before; i++) most = fmax(most, s->use[FILL_RADIUS].real[0][i]);
@@ -299,7 +303,7 @@ static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 	char param[40];
 	quern_real grains = 1, least = INFINITY;
 	for (uint32_t k = 0; k < d->n_materials; k++)
-		if (item->share[k] > 0) least = fmin(least, d->material[k].radii.mean);
+		if (item->of.share[k] > 0) least = fmin(least, d->material[k].radii.mean);
 	for (uint32_t k = 0; k < d->dim; k++) {
 		const quern_real across = (item->upper[k] - item->lower[k]) / (2 * least);
 		grains *= across > 1 ? across : 1;
@@ -323,6 +327,21 @@ static void add_before(filling *f) {
 	}
 }
 
+/* Where others stand in the way an item may bring nothing; where there is no place for it, it cannot be meant. */
+static quern_status fill_item(filling *f, uint32_t i) {
+	const quern_step *s = f->step;
+	const bool above = ((const dem_fill *)f->d->fill.items)[i].above.n;
+	const uint32_t before = f->n, held = fill_region(f, i);
+	char param[40];
+	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
+	snprintf(param, sizeof param, "fill.%u.%s", i, held ? "above" : "region");
+	if (!held)
+		return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "no place of the domain lies in the region");
+	if (above && f->n == before)
+		return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "no grain of the region has room above that");
+	return QUERN_OK;
+}
+
 static quern_status fill_all(filling *f, const grain_table *table) {
 	const quern_step *s = f->step;
 	const dem *d = f->d;
@@ -333,10 +352,9 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = check_fill(d, s, i);
 	if (status != QUERN_OK) return status;
 	for (int fixed = 1; fixed >= 0; fixed--) /* floors first: what falls must find them */
-		for (uint32_t i = 0; i < d->fill.n; i++)
-			if (item[i].fixed == fixed)
-				fill_region(f, &item[i], &s->slot[SLOT_PACKER][i], (uint64_t)(i + 1) << 40);
-	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
+		for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++)
+			if (item[i].fixed == fixed) status = fill_item(f, i);
+	if (status != QUERN_OK) return status;
 	if (!f->n && !d->source.n)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"no grain has room: is the region too small, or a body in it?");
@@ -368,7 +386,10 @@ static void warn_of_softness(const dem *d, const quern_step *s) {
 
 static quern_status open_books(const dem *d, const quern_step *s) {
 	const quern_status status = d->outlets ? book_open(s, "grain_face", outlet_faces(s)) : QUERN_OK;
-	return status == QUERN_OK && d->sources ? book_open(s, "grain_source", d->source.n) : status;
+	if (status != QUERN_OK || !d->sources) return status;
+	if (d->blends && book_open(s, "grain_share", d->source.n * d->n_materials) != QUERN_OK)
+		return QUERN_E_MEMORY;
+	return book_open(s, "grain_source", d->source.n);
 }
 
 quern_status quern_dem_fill(const void *self, const quern_step *s) {
@@ -403,11 +424,10 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 	const quern_real fall = 2 * sqrt(2 * diameter / g);
 	if ((quern_real)s->substep * s->dt < fall) return false;
 	cloud_sums c;
-	quern_real moving = 0, energy = 0;
+	quern_real energy = 0;
 	if (!cloud_open(&c, s->host, s->run, &grains)) return false;
-	for (uint32_t i = 0; i < grains.n; i++) moving += c.mass[i];
 	CLOUD_ADD(&c, i, 0.5 * cloud_square(&s->use[FILL_VELOCITY], i, s->dim), energy);
-	return energy <= d->rest * moving * g * diameter;
+	return energy <= d->rest * cloud_total(&c) * g * diameter;
 }
 
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */

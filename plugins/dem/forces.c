@@ -244,8 +244,8 @@ quern_status quern_dem_forces(const void *self, const quern_step *s) {
 	if (!grains.n) return QUERN_OK;
 	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);
-	for (uint32_t b = 0; b < grains.n_blocks; b++)
-		if (sh.bad[b] >= 0) return lost(&sh, sh.bad[b]);
+	for (uint32_t q = 0; q < grains.n_blocks; q++)
+		if (sh.bad[quern_nth(sh.by_place, q)] >= 0) return lost(&sh, sh.bad[quern_nth(sh.by_place, q)]);
 	collect(&sh, grains.n_blocks);
 	quern_status status = sh.checks ? quern_dem_judge_grains(&sh, grains.n_blocks) : QUERN_OK;
 	if (status == QUERN_OK && sh.deep) status = quern_dem_judge_contacts(&sh, grains.n_blocks);

@@ -91,7 +91,7 @@ static void expect(const dem *d, lightest *l, uint32_t k) {
 	if (light < l->mass[1]) l->mass[1] = light;
 }
 
-/* By material. Before there are grains, what the distributions may bring; sources bring the first material. */
+/* By material. Before there are grains, what the distributions may bring; and what sources will. */
 static void lightest_grains(const dem *d, const quern_step *s, lightest *of) {
 	bool any = false;
 	for (uint32_t k = 0; k < d->n_materials; k++)
@@ -99,7 +99,7 @@ static void lightest_grains(const dem *d, const quern_step *s, lightest *of) {
 	look_for_lightest(s, of);
 	for (uint32_t k = 0; k < d->n_materials; k++) any = any || isfinite(of[k].mass[0]);
 	for (uint32_t k = 0; k < d->n_materials; k++)
-		if (!any || (!k && d->source.n)) expect(d, &of[k], k);
+		if (!any || quern_dem_pours(d, k)) expect(d, &of[k], k);
 }
 
 static contact_limit limit_of_two(const dem *d, const quern_step *s, const lightest *l, uint32_t k) {

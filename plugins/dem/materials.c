@@ -53,36 +53,37 @@ static quern_status check_name(const dem *d, const quern_setup *setup, uint32_t 
 }
 
 static quern_status read_mix(
-	const dem *d, const quern_setup *setup, dem_fill *fill, const char *param, quern_err *err) {
-	const dem_share *mix = fill->mix.items;
+	const dem *d, const quern_setup *setup, dem_blend *of, const char *param, quern_err *err) {
+	const dem_share *mix = of->mix.items;
 	char at[120];
 	quern_real sum = 0;
-	for (uint32_t i = 0; i < fill->mix.n; i++) {
+	for (uint32_t i = 0; i < of->mix.n; i++) {
 		snprintf(at, sizeof at, "%.60s.mix.%.40s", param, mix[i].name);
 		const int32_t k = quern_dem_material(d, mix[i].name);
 		if (k < 0) return refuse_name(d, setup, err, at, mix[i].name);
-		if (fill->share[k] > 0)
+		if (of->share[k] > 0)
 			return setup->host->fail(err, QUERN_E_PARAM, at, "'%s' stands twice in the mix", mix[i].name);
-		fill->share[k] = mix[i].share;
+		of->share[k] = mix[i].share;
 		sum += mix[i].share;
 	}
 	snprintf(at, sizeof at, "%.60s.mix", param);
 	if (!(fabs(sum - 1) <= 1e-6))
 		return setup->host->fail(
 			err, QUERN_E_PARAM, at, "the shares add up to %g %%, must be 100 %%", 100 * sum);
-	for (uint32_t k = 0; k < d->n_materials; k++) fill->share[k] /= sum;
+	for (uint32_t k = 0; k < d->n_materials; k++) of->share[k] /= sum;
 	return QUERN_OK;
 }
 
-static quern_status name_fill(const dem *d, const quern_setup *setup, uint32_t i, quern_err *err) {
-	dem_fill *fill = (dem_fill *)d->fill.items + i;
+/* `list`, `i`: whose it is. */
+static quern_status name_blend(
+	const dem *d, const quern_setup *setup, dem_blend *of, const char *list, uint32_t i, quern_err *err) {
 	char param[60];
-	snprintf(param, sizeof param, "fill.%u", i);
-	if (fill->mix.n) return read_mix(d, setup, fill, param, err);
-	const int32_t k = quern_dem_material(d, fill->material);
-	snprintf(param, sizeof param, "fill.%u.material", i);
-	if (k < 0) return refuse_name(d, setup, err, param, fill->material);
-	fill->share[k] = 1;
+	snprintf(param, sizeof param, "%s.%u", list, i);
+	if (of->mix.n) return read_mix(d, setup, of, param, err);
+	const int32_t k = quern_dem_material(d, of->material);
+	snprintf(param, sizeof param, "%s.%u.material", list, i);
+	if (k < 0) return refuse_name(d, setup, err, param, of->material);
+	of->share[k] = 1;
 	return QUERN_OK;
 }
 
@@ -116,7 +117,14 @@ quern_status quern_dem_name_materials(dem *d, const quern_setup *setup, quern_er
 	}
 	for (uint32_t k = 0; k < MOST_MATERIALS; k++)
 		for (uint32_t l = 0; l < MOST_MATERIALS; l++) d->pair[k][l] = -1;
-	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = name_fill(d, setup, i, err);
+	dem_fill *fill = d->fill.items;
+	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++)
+		status = name_blend(d, setup, &fill[i].of, "fill", i, err);
+	dem_source *pours = d->source.items;
+	for (uint32_t i = 0; i < d->source.n && status == QUERN_OK; i++) {
+		status = name_blend(d, setup, &pours[i].of, "source", i, err);
+		d->blends = d->blends || pours[i].of.mix.n;
+	}
 	for (uint32_t i = 0; i < d->place.n && status == QUERN_OK; i++) status = name_place(d, setup, i, err);
 	return status == QUERN_OK ? refuse_hybrid(d, setup, err) : status;
 }
@@ -218,22 +226,39 @@ quern_real quern_dem_widest(const dem *d, const quern_real share[MOST_MATERIALS]
 	return most;
 }
 
-static quern_real mass_of_draw(const dem *d, uint32_t k, const quern_host *host, uint64_t draw) {
-	const dem_material *m = &d->material[k];
-	return quern_radius_mass(quern_radius_draw(&m->radii, host, draw), m->density, d->dim);
+bool quern_dem_pours(const dem *d, uint32_t material) {
+	const dem_source *pours = d->source.items;
+	bool any = false;
+	for (uint32_t i = 0; i < d->source.n; i++) any = any || pours[i].of.share[material] > 0;
+	return any;
+}
+
+quern_real quern_dem_most(const dem *d, const quern_real *share) {
+	quern_real most = 0;
+	for (uint32_t k = 0; k < d->n_materials; k++)
+		if (!share || share[k] > 0) most = fmax(most, quern_radius_most(&d->material[k].radii));
+	return most;
+}
+
+quern_real quern_dem_radius(const dem *d, uint32_t m, const quern_host *host, uint32_t stream, uint64_t k) {
+	radius_law law = d->material[m].radii;
+	law.stream += stream;
+	return quern_radius_draw(&law, host, k);
 }
 
 /* Nobody knows beforehand how many grains there will be, so that every beginning of the row must have its shares. Only a material
  * that is not above its own may come next, and is then above by less than one grain. Each of these comes with the probability that
  * makes good what it lacks, in numbers of grains; but one that would lack more than the heaviest grain comes at once. */
 int32_t quern_dem_mix(const dem *d, const quern_real share[MOST_MATERIALS],
-	const quern_real placed[MOST_MATERIALS], const quern_host *host, uint64_t k) {
+	const quern_real placed[MOST_MATERIALS], const quern_host *host, uint32_t stream, uint64_t k) {
 	quern_real mass[MOST_MATERIALS], weight[MOST_MATERIALS];
 	quern_real whole = 0, heaviest = 0, sum = 0, most = -1, u[2];
 	uint32_t first = 0;
 	for (uint32_t m = 0; m < d->n_materials; m++) {
 		whole += placed[m];
-		mass[m] = share[m] > 0 ? mass_of_draw(d, m, host, k) : 0;
+		mass[m] = share[m] > 0 ? quern_radius_mass(
+									 quern_dem_radius(d, m, host, stream, k), d->material[m].density, d->dim)
+							   : 0;
 		heaviest = mass[m] > heaviest ? mass[m] : heaviest;
 	}
 	for (uint32_t m = 0; m < d->n_materials; m++) {
@@ -243,7 +268,7 @@ int32_t quern_dem_mix(const dem *d, const quern_real share[MOST_MATERIALS],
 		if (share[m] > 0 && without > most) most = without, first = m;
 	}
 	if (most > heaviest) return (int32_t)first;
-	host->random(d->stream + 4, k, 0, u); /* after those of the fill, of its packers, and of sources */
+	host->random(d->stream + STREAM_MIX + stream, k, 0, u);
 	quern_real at = u[0] * sum;
 	for (uint32_t m = 0; m < d->n_materials; m++) {
 		if (weight[m] > 0 && at < weight[m]) return (int32_t)m;

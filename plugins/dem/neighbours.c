@@ -63,7 +63,7 @@ static void set_job(listing *l) {
 /* Numbers of blocks that run against the order of their places: an odd factor takes no two to one. */
 static void permute_blocks(uint32_t n, uint64_t *key) {
 	for (uint32_t i = 0; i < n; i++)
-		key[i] = (uint64_t)((uint32_t)(key[i] >> 32) * 2654435761u) << 32 | (uint32_t)key[i];
+		key[i] = (uint64_t)(((uint32_t)(key[i] >> 32) + 12345u) * 2654435761u) << 32 | (uint32_t)key[i];
 }
 
 /* place[b] is the number that block b would have had. */
@@ -74,8 +74,8 @@ static uint32_t *places_of(
 	int32_t *order = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
 	void *work = s->host->memory(s->run, quern_sort_bytes(n));
 	if (!place || !order || !work) return NULL;
-	for (uint32_t b = 0; b < n; b++) place[b] = (uint32_t)(key[from[block[b]]] >> 32) * 244002641u;
-	for (uint32_t b = 0; b < n; b++) place[b] &= 0xffffffffu;
+	for (uint32_t b = 0; b < n; b++)
+		place[b] = (uint32_t)((uint32_t)(key[from[block[b]]] >> 32) * 244002641u - 12345u);
 	quern_sort_order(n, place, NULL, order, work);
 	return (uint32_t *)order;
 }
@@ -402,10 +402,12 @@ static quern_status keep_inside(const listing *l) {
 	const quern_step *s = l->s;
 	const uint32_t n = s->host->set(s->run, "grain").n;
 	const int32_t *fixed = s->use[NEAR_FIXED].index;
+	const uint32_t *order = s->host->parts(s->run, "grain")->entry;
 	for (uint32_t k = 0; k < s->dim; k++) {
 		quern_real *x = s->use[NEAR_POSITION].real[k];
 		const quern_real lower = s->lower[k], upper = s->upper[k];
-		for (uint32_t i = 0; i < n; i++) {
+		for (uint32_t q = 0; q < n; q++) {
+			const uint32_t i = quern_nth(order, q);
 			if (s->periodic[k]) x[i] = quern_brought_back(x[i], lower, upper);
 			else if (outlet_refuses(s, k, x[i]) && !(fixed && fixed[i]))
 				return quern_dem_left(s, s->use[NEAR_ID].id[i], k, x[i]);

@@ -7,7 +7,7 @@ quern_status quern_dem_outlets(const void *self, const quern_step *s) {
 	const quern_column *u = s->use;
 	const outlets o = { .set = "grain",
 		.of = { u[OUT_MASS].real[0], u[OUT_WEIGHT].real[0], u[OUT_FIXED].index,
-			s->host->set(s->run, "grain").n },
+			s->host->set(s->run, "grain").n, "grain" },
 		.position = &u[OUT_POSITION],
 		.velocity = &u[OUT_VELOCITY],
 		.spin = &u[OUT_SPIN],

@@ -8,40 +8,73 @@
 #include <string.h>
 
 typedef struct {
+	quern_spot spot;
+	int32_t kind;
+} poured;
+
+typedef struct {
 	const dem *d;
 	const quern_step *s;
 	const source *item;
+	const dem_blend *of;
+	region region;
 	uint32_t i;      /* number of the source */
-	radius_law law;  /* a stream of draws of its own */
+	int32_t kind;    /* material of the grain that waits */
 	placer placer;   /* what is near the region */
 	quern_real most; /* m, largest radius of that and of new grains */
 	quern_real rest; /* kg still due */
 	uint32_t draws;  /* radii of this source so far */
-	quern_spot *grain;
+	poured *grain;
 	uint32_t n, cap;
 	bool failed;
 } pouring;
 
-/* Draws are numbered by source, so that the radius of its next grain does not depend on what others pour. */
+/* Draws are numbered by source, so that its next grain does not depend on what others pour. */
+static uint64_t draw_of(const pouring *p) { return (uint64_t)p->i << 32 | p->draws; }
+
 static quern_real waiting(const pouring *p) {
-	return quern_radius_draw(&p->law, p->s->host, (uint64_t)p->i << 32 | p->draws);
+	return quern_dem_radius(p->d, (uint32_t)p->kind, p->s->host, STREAM_SOURCES, draw_of(p));
 }
 
-static quern_real mass_of(const pouring *p, quern_real radius) {
-	return quern_radius_mass(radius, p->d->material[0].density, p->s->dim);
+static quern_real mass_of(const pouring *p, int32_t kind, quern_real radius) {
+	return quern_radius_mass(radius, p->d->material[kind].density, p->s->dim);
 }
 
-static bool is_due(const pouring *p) { return p->rest >= mass_of(p, waiting(p)); }
+static bool is_due(const pouring *p) { return p->rest >= mass_of(p, p->kind, waiting(p)); }
+
+/* ---- of which material ---- */
+
+/* kg, by material, with what their last bits do not hold. */
+static quern_real *shares(const pouring *p, uint32_t row) {
+	return p->s->use[row].real[0] + (size_t)p->i * p->d->n_materials;
+}
+
+static void choose_material(pouring *p) {
+	p->kind = 0;
+	if (p->of->mix.n)
+		p->kind = quern_dem_mix(
+			p->d, p->of->share, shares(p, POUR_SHARE_MASS), p->s->host, STREAM_SOURCES, draw_of(p));
+	else
+		while (!(p->of->share[p->kind] > 0)) p->kind++;
+}
+
+/* One of the scene's stages may change the shares: what was poured by others is not held against them. */
+static void begin_mix(const pouring *p) {
+	bool same = true;
+	for (uint32_t k = 0; k < p->d->n_materials; k++)
+		same = same && shares(p, POUR_SHARE)[k] == p->of->share[k];
+	for (uint32_t k = 0; k < p->d->n_materials && !same; k++) {
+		shares(p, POUR_SHARE)[k] = p->of->share[k];
+		shares(p, POUR_SHARE_MASS)[k] = shares(p, POUR_SHARE_REST)[k] = 0;
+	}
+}
 
 /* ---- what a packer may ask ---- */
 
 static quern_real job_radius(quern_pack_job *job) { return waiting(job->scene); }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
-	const source *item = ((const pouring *)job->scene)->item;
-	for (uint32_t k = 0; k < job->dim; k++)
-		if (!(x[k] >= item->lower[k] && x[k] <= item->upper[k])) return false;
-	return true;
+	return quern_region_holds(&((const pouring *)job->scene)->region, x);
 }
 
 static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
@@ -52,14 +85,18 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	pouring *p = job->scene;
 	if (p->n == p->cap) {
 		const uint32_t cap = p->cap ? 2 * p->cap : 256;
-		quern_spot *grown = realloc(p->grain, cap * sizeof *grown);
+		poured *grown = realloc(p->grain, cap * sizeof *grown);
 		if (!grown) return p->failed = true, false;
 		p->grain = grown, p->cap = cap;
 	}
-	p->grain[p->n++] = *spot;
+	const quern_real mass = mass_of(p, p->kind, spot->radius);
+	p->grain[p->n++] = (poured) { *spot, p->kind };
 	quern_placer_add(&p->placer, spot);
-	p->rest -= mass_of(p, spot->radius);
+	p->rest -= mass;
+	if (p->of->mix.n)
+		book_number(&shares(p, POUR_SHARE_MASS)[p->kind], &shares(p, POUR_SHARE_REST)[p->kind], mass);
 	p->draws++;
+	choose_material(p);
 	p->failed = p->failed || p->placer.failed;
 	return !p->failed && is_due(p);
 }
@@ -79,7 +116,7 @@ static int by_id(const void *a, const void *b) {
 
 /* Whether a new grain with its centre in the region may touch it. */
 static bool is_near(const pouring *p, const quern_spot *spot) {
-	const quern_real reach = 1.001 * (spot->radius + quern_radius_most(&p->law));
+	const quern_real reach = 1.001 * (spot->radius + quern_dem_most(p->d, p->of->share));
 	for (uint32_t k = 0; k < p->s->dim; k++) {
 		const quern_real half = 0.5 * (p->item->upper[k] - p->item->lower[k]),
 						 middle = p->item->lower[k] + half;
@@ -125,7 +162,7 @@ static bool gather_near(pouring *p) {
 	if (!near) return false;
 	uint32_t m = grains_near(p, near);
 	m += points_near(p, near + m);
-	p->most = quern_radius_most(&p->law);
+	p->most = quern_dem_most(p->d, p->of->share);
 	for (uint32_t q = 0; q < m; q++) p->most = fmax(p->most, near[q].spot.radius);
 	if (quern_placer_init(&p->placer, s->dim, s->lower, s->upper, s->periodic, p->most) != QUERN_OK ||
 		!quern_placer_bodies(&p->placer, s, SLOT_BODIES, false))
@@ -145,7 +182,7 @@ static void pack(pouring *p, const quern_bound *packer) {
 		return;
 	}
 	quern_pack_job job = { .dim = s->dim,
-		.stream = p->law.stream + 1,
+		.stream = p->d->stream + STREAM_SOURCES + 1,
 		.key = p->i,
 		.counter = (uint64_t)s->step << 24,
 		.host = s->host,
@@ -167,8 +204,8 @@ static void write_grains(const pouring *p, uint32_t old) {
 	const quern_column *u = s->use;
 	const quern_real *v = p->item->velocity;
 	for (uint32_t q = 0; q < p->n; q++) {
-		const quern_spot *g = &p->grain[q];
-		booking b = { .mass = mass_of(p, g->radius), .count = 1 };
+		const quern_spot *g = &p->grain[q].spot;
+		booking b = { .mass = mass_of(p, p->grain[q].kind, g->radius), .count = 1 };
 		for (uint32_t k = 0; k < s->dim; k++) {
 			u[POUR_POSITION].real[k][old + q] = g->x[k];
 			u[POUR_VELOCITY].real[k][old + q] = v[k];
@@ -178,6 +215,7 @@ static void write_grains(const pouring *p, uint32_t old) {
 		}
 		u[POUR_RADIUS].real[0][old + q] = g->radius;
 		u[POUR_MASS].real[0][old + q] = b.mass;
+		if (u[POUR_MATERIAL].index) u[POUR_MATERIAL].index[old + q] = p->grain[q].kind;
 		book_add(&u[POURED_MASS], p->i, s->dim, &b);
 	}
 }
@@ -196,6 +234,8 @@ static quern_status pour_one(pouring *p) {
 	const quern_step *s = p->s;
 	int32_t *draws = &s->use[POUR_DRAWS].index[p->i];
 	p->draws = (uint32_t)*draws;
+	if (p->of->mix.n) begin_mix(p);
+	choose_material(p);
 	p->rest = quern_source_due(p->item, s->time, p->i, &s->use[POUR_DUE]) - s->use[POURED_MASS].real[0][p->i];
 	if (is_due(p)) {
 		p->failed = !gather_near(p);
@@ -211,13 +251,14 @@ static quern_status pour_one(pouring *p) {
 }
 
 quern_status quern_dem_pour(const void *self, const quern_step *s) {
-	pouring p = { .d = self, .s = s, .law = ((const dem *)self)->material[0].radii };
+	pouring p = { .d = self, .s = s };
 	/* as many as the scene itself has, whatever one of its stages says */
 	const uint32_t n = s->host->set(s->run, "grain_source").n;
 	quern_status status = QUERN_OK;
-	p.law.stream += 2; /* after those of the fill and of its packers */
 	for (p.i = 0; p.i < p.d->source.n && p.i < n && status == QUERN_OK; p.i++) {
-		p.item = (const source *)p.d->source.items + p.i;
+		const dem_source *item = (const dem_source *)p.d->source.items + p.i;
+		p.item = &item->base, p.of = &item->of;
+		p.region = quern_region_of(s, &s->slot[SLOT_SOURCE_REGION][p.i], p.item->lower, p.item->upper);
 		p.n = 0;
 		if (quern_source_acts(p.item, s)) status = pour_one(&p);
 	}

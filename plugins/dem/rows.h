@@ -66,6 +66,7 @@ QUERN_USE_ENUM(OUTLET_USES);
 	X(POUR_VELOCITY, "grain.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR) \
 	X(POUR_RADIUS, "grain.radius", "m", QUERN_WRITE, QUERN_SCALAR) \
 	X(POUR_MASS, "grain.mass", "kg", QUERN_WRITE, QUERN_SCALAR) \
+	X(POUR_MATERIAL, MATERIAL_USE(QUERN_WRITE, .flags = 0)) \
 	X(POUR_ID, "grain.id", "1", QUERN_READ, QUERN_ID) \
 	X(POUR_POINT, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_BEFORE) \
 	X(POUR_POINT_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_BEFORE) \
@@ -73,6 +74,12 @@ QUERN_USE_ENUM(OUTLET_USES);
 	BOOK_ROWS(X, POURED, "grain_source", "sources") \
 	X(POUR_DRAWS, "grain_source.draws", "1", QUERN_UPDATE, QUERN_INDEX, .when = "sources", \
 		.doc = "Radii drawn so far.") \
+	X(POUR_SHARE, "grain_share.share", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "blends", \
+		.doc = "Of the mass that the source pours.") \
+	X(POUR_SHARE_MASS, "grain_share.mass", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "blends", \
+		.doc = "Poured of it, by these shares.") \
+	X(POUR_SHARE_REST, "grain_share.mass_rest", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "blends", \
+		.doc = "What the last bit of the mass does not hold.") \
 	X(POUR_WAITING, WAITING_USE("grain_source")) \
 	X(POUR_LATE, LATE_USE("grain_source")) \
 	X(POUR_DUE, DUE_USE("grain_source")) \

@@ -12,19 +12,16 @@ static const quern_param mix_rows[] = { QUERN_PARAM_AS(dem_share, name, "materia
 											.flags = QUERN_REQUIRED),
 	QUERN_PARAM(dem_share, share, "1", "Of the mass.", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1),
 	QUERN_END_PARAMS };
-static const quern_param fill_rows[] = { QUERN_PARAM_AS(dem_fill, lower, "region.box.lower", "m",
-											 "Lower corner of the region of centres.",
-											 .flags = QUERN_REQUIRED),
-	QUERN_PARAM_AS(dem_fill, upper, "region.box.upper", "m",
-		"Upper corner; may equal the lower one along an axis.", .flags = QUERN_REQUIRED),
+#define BLEND_ROWS(T)                                                                                        \
+	QUERN_PARAM_AS(T, of.material, "material", NULL, "Of which material they are; default: the first.",      \
+		.flags = QUERN_MAYBE, .unless = "mix"),                                                              \
+		QUERN_PARAM_AS(T, of.mix, "mix", NULL,                                                               \
+			"Of which materials they are, by share of the mass: {sand: 70 %, steel: 30 %}.",                 \
+			.rows = mix_rows, .item_size = sizeof(dem_share), .text = "material", .max = MOST_MATERIALS)
+static const quern_param fill_rows[] = { REGION_ABOVE(dem_fill),
 	QUERN_PARAM(dem_fill, velocity, "m/s", "Velocity at the start."),
 	QUERN_PARAM(dem_fill, settle, NULL, "Let the grains come to rest before time starts."),
-	QUERN_PARAM(dem_fill, fixed, NULL, "These grains never move: a rough floor."),
-	QUERN_PARAM(dem_fill, material, NULL, "Of which material they are; default: the first.",
-		.flags = QUERN_MAYBE, .unless = "mix"),
-	QUERN_PARAM(dem_fill, mix, NULL,
-		"Of which materials they are, by share of the mass: {sand: 70 %, steel: 30 %}.", .rows = mix_rows,
-		.item_size = sizeof(dem_share), .text = "material", .max = MOST_MATERIALS),
+	QUERN_PARAM(dem_fill, fixed, NULL, "These grains never move: a rough floor."), BLEND_ROWS(dem_fill),
 	QUERN_END_PARAMS };
 static const quern_param place_rows[] = { QUERN_PARAM(
 											  dem_place, position, "m", "Centre.", .flags = QUERN_REQUIRED),
@@ -57,7 +54,7 @@ static const quern_param pair_rows[] = {
 		.rows = word_rows, .item_size = sizeof(dem_word), .flags = QUERN_REQUIRED),
 	QUERN_END_PARAMS
 };
-static const quern_param source_rows[] = SOURCE_ROWS(100);
+static const quern_param source_rows[] = { SOURCE_KEYS(100), BLEND_ROWS(dem_source), QUERN_END_PARAMS };
 static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .unless = "materials"),
 	QUERN_PARAM(dem, materials, NULL,
 		"Several materials, by name: {sand: {density: ..., radius: ...}, ...}. The first stands for all "
@@ -80,8 +77,8 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		"A run whose grains this one starts from, before all others: RUN for its last state, with the history of "
 		"contacts, or RUN:FRAME for what a frame shows.",
 		.flags = QUERN_FILE | QUERN_ONCE),
-	QUERN_PARAM(dem, source, NULL, "Regions that pour grains, of the first material where there are several.",
-		.rows = source_rows, .item_size = sizeof(source)),
+	QUERN_PARAM(
+		dem, source, NULL, "Regions that pour grains.", .rows = source_rows, .item_size = sizeof(dem_source)),
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
 		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
@@ -115,6 +112,9 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(dem, sources, NULL, "Keep books of sources; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, blends, NULL,
+		"Keep what sources have poured of each material; set by itself where one pours a mix.",
+		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
@@ -138,9 +138,29 @@ static const quern_set sets[] = { { .name = "grain",
 		.plural = "grain_sources",
 		.doc = "What each source has poured.",
 		.when = "sources" },
+	{ .name = "grain_share",
+		.plural = "grain_shares",
+		.doc = "What each source has poured of each material, source by source.",
+		.when = "blends" },
 	{ .name = NULL } };
 
+static quern_status place_fills(
+	void *self, const quern_setup *, const quern_bound *shape, uint32_t n, quern_err *);
+static quern_status place_sources(
+	void *self, const quern_setup *, const quern_bound *shape, uint32_t n, quern_err *);
+
+/* Regions first: plugins may take the height of the fill as a default. */
 static const quern_slot slots[] = {
+	{ .name = "fill.region",
+		.kind = &quern_body_kind,
+		.doc = "where centres lie: in the shape of a body, such as {box: {lower: ..., upper: ...}}",
+		.stage = { "dem.fill" },
+		.filled = place_fills },
+	{ .name = "source.region",
+		.kind = &quern_body_kind,
+		.doc = "where new centres lie: in the shape of a body, such as {box: {lower: ..., upper: ...}}",
+		.stage = { "dem.pour" },
+		.filled = place_sources },
 	{ .name = "contact",
 		.kind = &quern_contact_kind,
 		.doc = "a contact law, such as {linear: {stiffness: 1e6 N/m}}; forces of a list add up, [] is none",
@@ -246,28 +266,46 @@ static quern_status refuse_settling(const dem *d, const quern_setup *setup, quer
 	return setup->host->fail(err, QUERN_E_PARAM, param, "%s", why);
 }
 
+/* m, of the fills, or of the domain where there are none. */
+static void publish_height(dem *d, const quern_setup *setup, const fill_height *loose) {
+	const quern_real height = fill_height_all(loose),
+					 gravity = quern_gravity_size(setup->dim, setup->gravity);
+	d->height = height > 0 ? height : setup->upper[loose->axis] - setup->lower[loose->axis];
+	setup->host->publish(setup, "fill.height", "m", d->height);
+	setup->host->publish(setup, "fill.rate", "1/s", height > 0 || d->from ? sqrt(gravity / d->height) : 0);
+}
+
+static quern_status place_fills(
+	void *self, const quern_setup *setup, const quern_bound *shape, uint32_t n, quern_err *err) {
+	dem *d = self;
+	dem_fill *fill = d->fill.items;
+	fill_height loose = fill_height_of(setup);
+	for (uint32_t i = 0; i < n; i++) {
+		const region_use use = fill[i].fixed ? REGION_OF_FIXED : REGION_OF_GRAINS;
+		char param[40];
+		snprintf(param, sizeof param, "fill.%u.region", i);
+		if (quern_region_box(&shape[i], use, setup, param, err, fill[i].lower, fill[i].upper) != QUERN_OK)
+			return QUERN_E_PARAM;
+		if (!fill[i].fixed) fill_height_add(&loose, fill[i].lower, fill[i].upper);
+	}
+	publish_height(d, setup, &loose);
+	return QUERN_OK;
+}
+
+static quern_status place_sources(
+	void *self, const quern_setup *setup, const quern_bound *shape, uint32_t n, quern_err *err) {
+	(void)n;
+	return quern_sources_place(&((dem *)self)->source, shape, REGION_OF_GRAINS, setup, err);
+}
+
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	dem *d = self;
-	fill_height loose = fill_height_of(setup);
 	d->dim = setup->dim;
 	if (quern_dem_name_materials(d, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	const dem_fill *fill = d->fill.items;
 	for (uint32_t i = 0; i < d->fill.n; i++) {
-		for (uint32_t k = 0; k < d->dim; k++) {
-			if (!(fill[i].upper[k] >= fill[i].lower[k]))
-				return setup->host->fail(err, QUERN_E_PARAM, "fill",
-					"the region's upper corner must not be below the lower "
-					"one; axis %u is",
-					k);
-			/* a rough floor may be let into a wall */
-			const quern_real slack = fill[i].fixed ? setup->upper[k] - setup->lower[k] : 0;
-			if (fill[i].lower[k] < setup->lower[k] - slack || fill[i].upper[k] > setup->upper[k] + slack)
-				return setup->host->fail(
-					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
-		}
 		if (quern_too_fast(fill[i].velocity, 1))
 			return setup->host->fail(err, QUERN_E_PARAM, "fill", "the velocity is beyond that of light");
-		if (!fill[i].fixed) fill_height_add(&loose, fill[i].lower, fill[i].upper);
 		d->fixed = d->fixed || fill[i].fixed;
 		d->settles = d->settles || fill[i].settle;
 	}
@@ -276,7 +314,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (!d->fill.n && !d->place.n && !d->file && !d->from && !d->source.n)
 		return setup->host->fail(
 			err, QUERN_E_PARAM, NULL, "no grains: give fill, place, file, from or source");
-	if (quern_sources_check(&d->source, true, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	if (quern_sources_check(&d->source, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	d->outlets = d->outlets || outlets_any(setup->open);
 	d->sources = d->sources || d->source.n;
 	setup->host->publish(setup, "grain.sources", "1", d->source.n);
@@ -286,15 +324,12 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		return refuse_settling(d, setup, err, "there is no gravity: nothing would come to rest by it");
 	setup->host->publish(setup, "grain.settling_rate", "1/s", 0.1 * sqrt(gravity / diameter));
 	setup->host->publish(setup, "grain.diameter", "m", diameter);
+	setup->host->publish(setup, "grain.widest", "m", 2 * quern_dem_most(d, NULL));
 	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
 	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->material[0].density);
 	setup->host->publish(setup, "grain.radius_spread", "1", d->material[0].radii.spread);
 	setup->host->publish(setup, "grain.radius_law", "1", d->material[0].radii.law);
-	const quern_real height = fill_height_all(&loose);
-	d->height = height > 0 ? height : setup->upper[loose.axis] - setup->lower[loose.axis];
-	setup->host->publish(setup, "fill.height", "m", d->height);
-	setup->host->publish(setup, "fill.rate", "1/s", height > 0 || d->from ? sqrt(gravity / d->height) : 0);
 	return QUERN_OK;
 }
 
@@ -363,8 +398,8 @@ static quern_real force_under(
 static bool is_in_bed(const dem *d, uint32_t k) {
 	const dem_fill *fill = d->fill.items;
 	for (uint32_t i = 0; i < d->fill.n; i++)
-		if (!fill[i].fixed && fill[i].share[k] > 0) return true;
-	return k == 0 && (d->source.n || d->n_materials == 1);
+		if (!fill[i].fixed && fill[i].of.share[k] > 0) return true;
+	return quern_dem_pours(d, k) || d->n_materials == 1;
 }
 
 /* How far the softest pair of materials gives way under the fill, were it all of the densest. */
@@ -402,6 +437,17 @@ static void publish_packing(const dem *d, const quern_setup *setup, const quern_
 	setup->host->publish(setup, "grain.critical_density", "kg/m^3", (packing - 0.03) * density);
 }
 
+static quern_status check_above(const dem *d, const quern_setup *setup, uint32_t n_bodies, quern_err *err) {
+	const dem_fill *fill = d->fill.items;
+	quern_status status = QUERN_OK;
+	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) {
+		char param[40];
+		snprintf(param, sizeof param, "fill.%u.above", i);
+		status = quern_region_check_above(&fill[i].above, n_bodies, setup, param, err);
+	}
+	return status;
+}
+
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	dem *d = self;
@@ -412,6 +458,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 		return refuse_order(setup, &law[0], err);
 	const quern_status status = quern_dem_pair_up(d, setup, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err);
 	if (status != QUERN_OK) return status;
+	if (check_above(d, setup, n_slot[SLOT_BODIES], err) != QUERN_OK) return QUERN_E_PARAM;
 	d->features = false;
 	d->moving = n_slot[SLOT_BODIES] && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)

@@ -83,6 +83,8 @@ quern_status quern_hybrid_sort(update *d) {
 		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i, &last);
 	for (uint32_t i = 0; i < d->n_points; i++)
 		d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i, &last);
+	d->moving_grains = moving_grains(s);
+	d->all_points = all_points(s);
 	d->grain_order = s->host->parts(s->run, "grain")->entry;
 	d->point_order = s->host->parts(s->run, "point")->entry;
 	quern_bucket(d->n_grains, d->grain_cell, d->grain_order, d->n_cells, d->grain_begin, d->grain);

@@ -9,15 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A cell that is owed grains, and those that it gets. */
+/* A cell that is owed grains, those that it shall have, and those that find room. */
 typedef struct {
 	const struct enriching *all;
 	uint32_t c;
 	int32_t cell[3];
 	quern_real lower[3], upper[3];
-	quern_real rest; /* kg still owed to it */
+	uint32_t first, wanted; /* numbers of its grains, in `numbers` */
 	new_grain *grain;
-	uint32_t n, cap;
+	uint32_t n;
 	bool failed; /* memory ran out */
 } packed_cell;
 
@@ -28,30 +28,88 @@ typedef struct enriching {
 	uint32_t n;
 	int32_t *by_colour; /* numbers of cells */
 	uint64_t *colour;   /* by cell */
+	int32_t *numbers;   /* of draws: cell after cell */
+	uint32_t n_numbers, cap_numbers;
+	uint32_t waited, taken; /* numbers that waited before; of these, how many are given to a cell now */
+	int32_t fresh;          /* the next number that nobody has had */
 } enriching;
 
 static quern_real mass_of(const hybrid *h, quern_real r) { return quern_radius_mass(r, h->density, h->dim); }
 
-/* The radius of the grain that waits: the same until it is placed, be it in a later update, since one that could be drawn anew
- * would come out small too often. A cell that is new begins with numbers of its own. */
-static quern_real waiting(const update *d, const packed_cell *p) {
-	enum { EACH = 64, MOST = 1 << 25 };
-	int32_t *draws = &d->u[U_DRAWS].index[p->c];
-	if (!*draws) *draws = 1 + EACH * (d->u[U_UPDATES].index[0] % MOST);
-	const uint64_t number = (uint64_t)quern_grid_number(d->g, p->cell) << 32 | (uint32_t)*draws;
-	return quern_radius_draw(&d->h->radii, d->s->host, number);
+static quern_real radius_of(const update *d, int32_t number) {
+	return quern_radius_draw(&d->h->radii, d->s->host, (uint64_t)number);
 }
 
-/* Half a grain over would never be paid back: a grain is placed while more than all of it is owed. */
-static bool is_owed(const update *d, const packed_cell *p) {
-	return p->rest > grain_share(d, p->c) * mass_of(d->h, waiting(d, p));
+/* ---- whose turn it is ---- */
+
+/* A radius that was drawn stays until its grain is placed, wherever: one that was drawn anew for every cell or every update would come
+ * out small too often. Those that found no room wait as entries of a set, and are the next to be given to a cell. */
+static int32_t next_number(const enriching *e) {
+	const update *d = e->d;
+	return e->taken < e->waited ? d->u[U_WAITING].index[e->taken] : e->fresh;
+}
+
+static bool take_number(enriching *e) {
+	if (e->n_numbers == e->cap_numbers) {
+		const uint32_t cap = e->cap_numbers ? 2 * e->cap_numbers : 256;
+		int32_t *grown = realloc(e->numbers, cap * sizeof *grown);
+		if (!grown) return false;
+		e->numbers = grown;
+		e->cap_numbers = cap;
+	}
+	const int32_t number = next_number(e);
+	e->numbers[e->n_numbers++] = number;
+	if (number == e->fresh) e->fresh++;
+	else e->taken++;
+	return true;
+}
+
+/* Half a grain over would never be paid back: a cell gets the next grain while more than all of it is owed. */
+static bool share_out(enriching *e, packed_cell *p) {
+	const update *d = e->d;
+	const quern_real share = grain_share(d, p->c);
+	quern_real rest = d->u[U_GRAIN_OWED].real[0][p->c];
+	p->first = e->n_numbers;
+	for (;; p->wanted++) {
+		const quern_real mass = share * mass_of(d->h, radius_of(d, next_number(e)));
+		if (!(rest > mass)) return true;
+		rest -= mass;
+		if (!take_number(e)) return false;
+	}
+}
+
+/* What waits from now on: what has not been given to any cell, and what has found no room there; first what was drawn first. */
+static int by_number(const void *a, const void *b) {
+	const int32_t one = *(const int32_t *)a, other = *(const int32_t *)b;
+	return (one > other) - (one < other);
+}
+
+static quern_status put_back(const enriching *e) {
+	const update *d = e->d;
+	const quern_step *s = d->s;
+	int32_t *number = s->host->memory(s->run, ((size_t)e->waited + e->n_numbers + 1) * sizeof *number);
+	int32_t *from = s->host->memory(s->run, ((size_t)e->waited + e->n_numbers + 1) * sizeof *from);
+	uint32_t n = 0;
+	if (!number || !from) return QUERN_E_MEMORY;
+	for (uint32_t q = e->taken; q < e->waited; q++) number[n++] = d->u[U_WAITING].index[q];
+	for (uint32_t i = 0; i < e->n; i++)
+		for (uint32_t k = e->cell[i].n; k < e->cell[i].wanted; k++)
+			number[n++] = e->numbers[e->cell[i].first + k];
+	qsort(number, n, sizeof *number, by_number);
+	for (uint32_t q = 0; q < n; q++) from[q] = -1;
+	const quern_status status = s->host->remap(s->run, "waiting", n, from, 0, NULL);
+	for (uint32_t q = 0; q < n && status == QUERN_OK; q++) d->u[U_WAITING].index[q] = number[q];
+	d->u[U_DRAWS].index[0] = e->fresh;
+	return status;
 }
 
 /* ---- what a packer may ask ---- */
 
+/* The grain that waits; a packer that goes on when it has been told to stop gets the last one again. */
 static quern_real job_radius(quern_pack_job *job) {
 	const packed_cell *p = job->scene;
-	return waiting(p->all->d, p);
+	const uint32_t k = p->n < p->wanted ? p->n : p->wanted - 1;
+	return radius_of(p->all->d, p->all->numbers[p->first + k]);
 }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
@@ -75,19 +133,13 @@ static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
 static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	packed_cell *p = job->scene;
 	const update *d = p->all->d;
-	if (p->n == p->cap) {
-		const uint32_t cap = p->cap ? 2 * p->cap : 16;
-		new_grain *grown = realloc(p->grain, cap * sizeof(new_grain));
-		if (!grown) return p->failed = true, false;
-		p->grain = grown;
-		p->cap = cap;
-	}
+	if (p->n == p->wanted) return false;
+	if (!p->grain) p->grain = malloc(p->wanted * sizeof(new_grain));
+	if (!p->grain) return p->failed = true, false;
 	new_grain *g = &p->grain[p->n++];
 	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d, p->c), .cell = (int32_t)p->c };
 	memcpy(g->position, spot->x, sizeof g->position);
-	p->rest -= g->weight * mass_of(d->h, g->radius);
-	d->u[U_DRAWS].index[p->c]++;
-	return is_owed(d, p);
+	return p->n < p->wanted;
 }
 
 /* ---- one cell ---- */
@@ -177,15 +229,27 @@ static bool find_cells(enriching *e) {
 	e->cell = d->s->host->memory(d->s->run, (most + 1) * sizeof *e->cell);
 	if (!e->cell) return false;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
-		packed_cell p = { .all = e, .c = nth_cell(d, q), .rest = owed[nth_cell(d, q)] };
-		if (d->zone[p.c] != QUERN_HYBRID || !(p.rest > 0) || !quern_grid_cell_of(d->g, p.c, p.cell)) continue;
-		if (!is_owed(d, &p)) continue;
+		packed_cell p = { .all = e, .c = nth_cell(d, q) };
+		if (d->zone[p.c] != QUERN_HYBRID || !(owed[p.c] > 0) || !quern_grid_cell_of(d->g, p.c, p.cell))
+			continue;
 		for (uint32_t k = 0; k < d->s->dim; k++) {
 			p.lower[k] = d->g->lower[k] + p.cell[k] * d->g->cell;
 			p.upper[k] = p.lower[k] + d->g->cell;
 		}
 		e->cell[e->n++] = p;
 	}
+	return true;
+}
+
+/* Another cell begins each time, so that no one that has no room keeps grains from others for ever. Cells that get none are
+ * left out. */
+static bool share_out_all(enriching *e) {
+	const uint32_t n = e->n, begin = n ? (uint32_t)e->d->u[U_UPDATES].index[0] % n : 0;
+	for (uint32_t i = 0; i < n; i++)
+		if (!share_out(e, &e->cell[(begin + i) % n])) return false;
+	e->n = 0;
+	for (uint32_t i = 0; i < n; i++)
+		if (e->cell[i].wanted) e->cell[e->n++] = e->cell[i];
 	return true;
 }
 
@@ -276,14 +340,23 @@ static bool gather(enriching *e) {
 	return d->grains;
 }
 
+static quern_status enrich(enriching *e) {
+	const bool good = find_cells(e) && share_out_all(e);
+	if (good && !e->n) return QUERN_OK;
+	if (!good || !colour_cells(e) || !place_obstacles(e) || !enrich_all(e) || !gather(e))
+		return QUERN_E_MEMORY;
+	return put_back(e);
+}
+
 quern_status quern_hybrid_grains(update *d) {
-	enriching e = { .d = d };
-	bool good = find_cells(&e);
-	if (good && !e.n) return QUERN_OK;
-	good = good && colour_cells(&e) && place_obstacles(&e) && enrich_all(&e) && gather(&e);
+	enriching e = {
+		.d = d, .fresh = d->u[U_DRAWS].index[0], .waited = d->s->host->set(d->s->run, "waiting").n
+	};
+	const quern_status status = enrich(&e);
 	for (uint32_t i = 0; i < e.n; i++) free(e.cell[i].grain);
+	free(e.numbers);
 	quern_placer_finish(&e.placer);
-	return good ? QUERN_OK : QUERN_E_MEMORY;
+	return status;
 }
 
 /* ---- the set itself ---- */

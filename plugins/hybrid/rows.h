@@ -19,12 +19,13 @@
 	X(U_GRAIN_HOME, "grain.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update.") \
 	X(U_GRAIN_NORMAL, "grain.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Unit normal of the zone's level set.") \
-	X(U_POINT_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
-	X(U_POINT_VELOCITY, "point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
-	X(U_POINT_MASS, "point.mass", "kg", QUERN_UPDATE, QUERN_SCALAR) \
-	X(U_POINT_VOLUME, "point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR) \
-	X(U_POINT_STRESS, "point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC) \
-	X(U_POINT_WEIGHT, "point.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN) \
+	X(U_POINT_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR, .rule = QUERN_KEEPS) \
+	X(U_POINT_VELOCITY, "point.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR, .rule = QUERN_KEEPS) \
+	X(U_POINT_MASS, "point.mass", "kg", QUERN_UPDATE, QUERN_SCALAR, .rule = QUERN_KEEPS) \
+	X(U_POINT_VOLUME, "point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR, .rule = QUERN_KEEPS) \
+	X(U_POINT_STRESS, "point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, .rule = QUERN_KEEPS) \
+	X(U_POINT_WEIGHT, "point.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN, \
+		.rule = QUERN_KEEPS) \
 	X(U_POINT_HOME, "point.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update.") \
 	X(U_POINT_NORMAL, "point.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Unit normal of the zone's level set.") \
@@ -45,7 +46,9 @@
 	X(U_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, \
 		.doc = "Sum of the contact stress over the samples since the last update.") \
 	X(U_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Samples of the contact stress.") \
-	X(U_DRAWS, "cell.draws", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Number of the radius that waits for room.") \
+	X(U_DRAWS, "total.draws", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Radii drawn for new grains.") \
+	X(U_WAITING, "waiting.draw", "1", QUERN_UPDATE, QUERN_INDEX, \
+		.doc = "Number of the radius of a grain that waits for room.") \
 	X(U_UPDATES, "total.updates", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "Zone updates so far.") \
 	X(U_MASS, "total.mass_initial", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass at the release.") \
 	X(U_DISPLACEMENT, "total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY) \

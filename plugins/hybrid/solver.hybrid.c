@@ -50,7 +50,7 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 static const quern_use uses[] = { QUERN_END_USES };
 
 static const quern_set sets[] = { { .name = "mixture", .doc = "What grains bring to the nodes.", .rows = 8 },
-	{ .name = NULL } };
+	{ .name = "waiting", .doc = "New grains that have not found room yet." }, { .name = NULL } };
 
 static const quern_slot slots[] = {
 	{ .name = "oracle",

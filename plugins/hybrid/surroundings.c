@@ -30,14 +30,13 @@ static void look_at(const update *d, const quern_column *x, const quern_column *
 
 static void look_into(const update *d, uint32_t c, const quern_real at[3], surroundings *sum) {
 	const quern_column *u = d->u;
-	const cloud grains = moving_grains(d->s), points = all_points(d->s);
 	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
 		const uint32_t i = (uint32_t)d->grain[q];
-		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY], cloud_mass(&grains, i), i, at, sum);
+		look_at(d, &u[U_GRAIN_POSITION], &u[U_GRAIN_VELOCITY], cloud_mass(&d->moving_grains, i), i, at, sum);
 	}
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const uint32_t i = (uint32_t)d->point[q];
-		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY], cloud_mass(&points, i), i, at, sum);
+		look_at(d, &u[U_POINT_POSITION], &u[U_POINT_VELOCITY], cloud_mass(&d->all_points, i), i, at, sum);
 	}
 }
 

@@ -25,6 +25,7 @@ typedef struct update {
 	/* by cell: the moving grains and the points in it */
 	uint32_t *grain_begin, *point_begin;
 	int32_t *grain, *point;
+	cloud moving_grains, all_points; /* with the weights that they have now */
 	const uint32_t *grain_order,
 		*point_order; /* of the sets' entries, by the places of their blocks; NULL: their own */
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */

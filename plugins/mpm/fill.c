@@ -4,6 +4,7 @@
 #include "../common/stressed.h"
 #include "lattice.h"
 #include <math.h>
+#include <stdio.h>
 
 /* The axis along which gravity is strongest. */
 static uint32_t steepest(const quern_step *s) {
@@ -13,36 +14,95 @@ static uint32_t steepest(const quern_step *s) {
 	return axis;
 }
 
+/* An item with the places of its lattice: which of them lie in the region, and how many of these lie above each. */
+typedef struct {
+	const mpm_fill *item;
+	lattice lattice;
+	bool *in;
+	uint32_t *over; /* only where there shall be stress */
+	uint32_t n;     /* points */
+} filling;
+
+/* m of material above a place. Where all places above it are filled that is the way to the end of the region's box. */
+static quern_real depth_of(
+	const filling *f, uint32_t i, uint32_t axis, quern_real gravity, const quern_real x[3]) {
+	const lattice *l = &f->lattice;
+	const uint32_t at[3] = { i % l->count[0], i / l->count[0] % l->count[1],
+		i / (l->count[0] * l->count[1]) };
+	const uint32_t levels = gravity < 0 ? l->count[axis] - 1 - at[axis] : at[axis];
+	if (f->over[i] < levels) return (f->over[i] + 0.5) * l->spacing[axis];
+	return gravity < 0 ? f->item->upper[axis] - x[axis] : x[axis] - f->item->lower[axis];
+}
+
 /* That of a layer that goes on sideways: what lies on a place weighs on it along all axes, and pushes across the steepest one
  * by `lateral` of that. */
-static void weigh(const mpm *p, const quern_step *s, const mpm_fill *item, const quern_real x[3],
+static void weigh(const mpm *p, const quern_step *s, const filling *f, uint32_t place, const quern_real x[3],
 	const quern_column *stress, uint32_t i) {
 	static const uint32_t shear[3][3] = { { 0, 3, 5 }, { 3, 1, 4 }, { 5, 4, 2 } };
 	const uint32_t axis = steepest(s);
-	const quern_real g = s->gravity[axis],
-					 depth = g < 0 ? item->upper[axis] - x[axis] : x[axis] - item->lower[axis];
+	const quern_real g = s->gravity[axis], depth = depth_of(f, place, axis, g, x);
 	const quern_real pressure = p->density * fabs(g) * depth;
 	for (uint32_t k = 0; k < p->dim; k++) {
-		stress->real[k][i] = -pressure * (k == axis ? 1 : item->lateral);
+		stress->real[k][i] = -pressure * (k == axis ? 1 : f->item->lateral);
 		if (k == axis || s->gravity[k] == 0) continue;
 		stress->real[p->dim == 2 ? 2 : shear[axis][k]][i] =
 			p->density * s->gravity[k] * (g < 0 ? depth : -depth);
 	}
 }
 
-static void place(const mpm *p, const quern_step *s, const mpm_fill *item, const lattice *l, uint32_t first) {
-	const quern_column *u = s->use;
-	const quern_real volume = lattice_volume(l, p->dim);
-	for (uint32_t i = 0; i < l->n; i++) {
+/* Against gravity, from the end on. */
+static void count_over(const quern_step *s, filling *f) {
+	const uint32_t axis = steepest(s), *count = f->lattice.count;
+	const uint32_t stride = axis == 0 ? 1 : axis == 1 ? count[0] : count[0] * count[1];
+	const bool up = s->gravity[axis] < 0;
+	for (uint32_t k = 0; k < f->lattice.n; k++) {
+		const uint32_t i = up ? f->lattice.n - 1 - k : k, at = i / stride % count[axis];
+		const uint32_t next = up ? i + stride : i - stride;
+		f->over[i] = at == (up ? count[axis] - 1 : 0) ? 0 : f->over[next] + f->in[next];
+	}
+}
+
+/* A place of the lattice is filled if it lies in the region. */
+static quern_status find_places(
+	const mpm *p, const quern_step *s, uint32_t i, const body_pose *pose, filling *f) {
+	const mpm_fill *item = (const mpm_fill *)p->fill.items + i;
+	region where = quern_region_of(s, &s->slot[SLOT_REGION][i], item->lower, item->upper);
+	const bool stressed = item->stress == STRESS_AT_REST;
+	char param[40];
+	quern_region_put_above(&where, s, &item->above, SLOT_BODIES, pose);
+	*f = (filling) { .item = item, .lattice = lattice_of(p, item->lower, item->upper) };
+	f->in = s->host->memory(s->run, (size_t)f->lattice.n + 1);
+	f->over = stressed ? s->host->memory(s->run, ((size_t)f->lattice.n + 1) * sizeof *f->over) : NULL;
+	if (!f->in || (stressed && !f->over)) return QUERN_E_MEMORY;
+	for (uint32_t k = 0; k < f->lattice.n; k++) {
 		quern_real x[3] = { 0 };
-		lattice_place(l, item->lower, i, p->dim, x);
+		lattice_place(&f->lattice, item->lower, k, p->dim, x);
+		f->in[k] = quern_region_holds(&where, x);
+		f->n += f->in[k];
+	}
+	if (stressed) count_over(s, f);
+	if (f->n) return QUERN_OK;
+	snprintf(param, sizeof param, "fill.%u.region", i);
+	return s->host->stop(s->run, QUERN_E_PARAM, param, -1,
+		"no point lies in the region%s: is it thinner than the points are apart, %.2g m?",
+		item->above.n ? " and above that body" : "", p->cell / p->points);
+}
+
+static void place(const mpm *p, const quern_step *s, const filling *f, uint32_t i) {
+	const quern_column *u = s->use;
+	const quern_real volume = lattice_volume(&f->lattice, p->dim);
+	for (uint32_t q = 0; q < f->lattice.n; q++) {
+		quern_real x[3] = { 0 };
+		if (!f->in[q]) continue;
+		lattice_place(&f->lattice, f->item->lower, q, p->dim, x);
 		for (uint32_t k = 0; k < p->dim; k++) {
-			u[FILL_POSITION].real[k][first + i] = x[k];
-			u[FILL_VELOCITY].real[k][first + i] = item->velocity[k];
+			u[FILL_POSITION].real[k][i] = x[k];
+			u[FILL_VELOCITY].real[k][i] = f->item->velocity[k];
 		}
-		u[FILL_MASS].real[0][first + i] = p->density * volume;
-		u[FILL_VOLUME].real[0][first + i] = volume;
-		if (item->stress == STRESS_AT_REST) weigh(p, s, item, x, &u[FILL_STRESS], first + i);
+		u[FILL_MASS].real[0][i] = p->density * volume;
+		u[FILL_VOLUME].real[0][i] = volume;
+		if (f->item->stress == STRESS_AT_REST) weigh(p, s, f, q, x, &u[FILL_STRESS], i);
+		i++;
 	}
 }
 
@@ -113,20 +173,35 @@ static quern_status clip(const quern_step *s, uint32_t *n) {
 
 /* ---- the stage ---- */
 
-static quern_status count_points(const mpm *p, const quern_step *s, uint32_t *total) {
+static quern_status check_count(const mpm *p, const quern_step *s) {
 	const mpm_fill *item = p->fill.items;
 	quern_real wanted = 0;
-	for (uint32_t f = 0; f < p->fill.n; f++) {
-		const lattice l = lattice_of(p, item[f].lower, item[f].upper);
-		wanted += l.wanted;
-		if (wanted > MOST_POINTS) break;
-		*total += l.n;
-	}
+	for (uint32_t f = 0; f < p->fill.n && wanted <= MOST_POINTS; f++)
+		wanted += lattice_of(p, item[f].lower, item[f].upper).wanted;
 	if (wanted > MOST_POINTS)
 		return s->host->stop(s->run, QUERN_E_PARAM, "fill", -1,
 			"asks for about %.2g points, more than %d: make cells larger", wanted, MOST_POINTS);
-	if (*total || p->source.n) return QUERN_OK;
+	if (p->fill.n || p->source.n) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1, "no points: give fill, from or source");
+}
+
+static quern_status place_all(const mpm *p, const quern_step *s, uint32_t *total) {
+	filling *all = s->host->memory(s->run, ((size_t)p->fill.n + 1) * sizeof *all);
+	const body_pose *pose = quern_body_poses_now(s, SLOT_BODIES);
+	if (!all || !pose) return QUERN_E_MEMORY;
+	quern_status status = check_count(p, s);
+	for (uint32_t f = 0; f < p->fill.n && status == QUERN_OK; f++) {
+		status = find_places(p, s, f, pose, &all[f]);
+		*total += all[f].n;
+	}
+	if (status != QUERN_OK) return status;
+	int32_t *from = s->host->memory(s->run, ((size_t)*total + 1) * sizeof(int32_t));
+	if (!from) return QUERN_E_MEMORY;
+	for (uint32_t i = 0; i < *total; i++) from[i] = -1;
+	status = s->host->remap(s->run, "point", *total, from, 0, NULL);
+	for (uint32_t f = 0, first = 0; f < p->fill.n && status == QUERN_OK; first += all[f++].n)
+		place(p, s, &all[f], first);
+	return status == QUERN_OK && *total ? clip(s, total) : status;
 }
 
 static quern_status open_books(const mpm *p, const quern_step *s) {
@@ -137,7 +212,6 @@ static quern_status open_books(const mpm *p, const quern_step *s) {
 /* A hybrid starts from all grains: its oracle decides where points go. */
 quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 	const mpm *p = self;
-	const mpm_fill *item = p->fill.items;
 	uint32_t total = 0;
 	s->use[FILL_UNSORTED].index[0] = 1;
 	if (p->rasterise == RASTERISE_PLAIN && s->use[FILL_AFFINE].real[0])
@@ -147,19 +221,7 @@ quern_status quern_mpm_fill(const void *self, const quern_step *s) {
 	quern_status status = open_books(p, s);
 	if (s->host->has(s->run, "hybrid") || status != QUERN_OK) return status;
 	if (p->from) return quern_mpm_begin(p, s, s->host->set(s->run, "point").n);
-	status = count_points(p, s, &total);
-	if (status != QUERN_OK) return status;
-	int32_t *from = s->host->memory(s->run, ((size_t)total + 1) * sizeof(int32_t));
-	if (!from) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < total; i++) from[i] = -1;
-	status = s->host->remap(s->run, "point", total, from, 0, NULL);
-	if (status != QUERN_OK) return status;
-	for (uint32_t f = 0, first = 0; f < p->fill.n; f++) {
-		const lattice l = lattice_of(p, item[f].lower, item[f].upper);
-		place(p, s, &item[f], &l, first);
-		first += l.n;
-	}
-	status = total ? clip(s, &total) : QUERN_OK;
+	status = place_all(p, s, &total);
 	if (status != QUERN_OK) return status;
 	s->host->log(s->run, 0, "%u points placed", total);
 	const quern_column *u = s->use;

@@ -250,8 +250,8 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	for (uint32_t b = 0; b < w.g->n_blocks; b++) w.bad[b] = -1;
 	if (trips_run(&w.trips, send_one, &w) != QUERN_OK) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, gather_one, &w);
-	for (uint32_t b = 0; b < w.g->n_blocks; b++)
-		if (w.bad[b] >= 0) return lost(&w, w.bad[b]);
+	for (uint32_t q = 0; q < w.g->n_blocks; q++)
+		if (w.bad[quern_nth(w.g->by_place, q)] >= 0) return lost(&w, w.bad[quern_nth(w.g->by_place, q)]);
 	for (uint32_t b = 0; b < w.g->n_blocks; b++)
 		if (w.moved[b]) s->use[GATHER_UNSORTED].index[0] = 1;
 	return QUERN_OK;

@@ -29,11 +29,13 @@ enum { STRESS_NONE, STRESS_AT_REST };
 enum { RASTERISE_AUTO, RASTERISE_PLAIN, RASTERISE_AFFINE };
 
 typedef struct mpm_fill {
-	quern_real lower[3], upper[3], velocity[3], lateral;
+	quern_real lower[3], upper[3]; /* m, of the box around its region */
+	quern_real velocity[3], lateral;
 	int32_t stress;
+	quern_list above;
 } mpm_fill;
 
-enum { SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
+enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
 
 /* Lanes of a node's row (mass, momentum, force) and of its motion (velocity, change, density). */
 QUERN_INLINE uint32_t node_force(uint32_t dim) { return 1 + dim; }

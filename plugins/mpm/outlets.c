@@ -6,7 +6,7 @@
 quern_status quern_mpm_outlets(const void *self, const quern_step *s) {
 	const quern_column *u = s->use;
 	const outlets o = { .set = "point",
-		.of = { u[OUT_MASS].real[0], u[OUT_WEIGHT].real[0], NULL, s->host->set(s->run, "point").n },
+		.of = { u[OUT_MASS].real[0], u[OUT_WEIGHT].real[0], NULL, s->host->set(s->run, "point").n, "point" },
 		.position = &u[OUT_POSITION],
 		.velocity = &u[OUT_VELOCITY],
 		.energy = u[OUT_ENERGY].real[0],

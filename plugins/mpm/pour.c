@@ -10,6 +10,7 @@ typedef struct {
 	const mpm *p;
 	const quern_step *s;
 	const source *item;
+	region region;
 	uint32_t i; /* number of the source */
 	lattice lattice;
 	quern_real mass, radius; /* kg of one point; m, a little less than half the way between places */
@@ -22,7 +23,8 @@ static void begin(pouring *w, uint32_t i) {
 	const uint32_t dim = w->s->dim;
 	quern_real least = INFINITY;
 	w->i = i, w->n = 0;
-	w->item = (const source *)w->p->source.items + i;
+	w->item = quern_source_at(&w->p->source, i);
+	w->region = quern_region_of(w->s, &w->s->slot[SLOT_SOURCE_REGION][i], w->item->lower, w->item->upper);
 	w->lattice = lattice_of(w->p, w->item->lower, w->item->upper);
 	w->mass = w->p->density * lattice_volume(&w->lattice, dim);
 	for (uint32_t k = 0; k < dim; k++) least = fmin(least, w->lattice.spacing[k]);
@@ -76,7 +78,7 @@ static quern_real take_places(pouring *w, quern_real rest) {
 	for (uint32_t q = 0; q < w->lattice.n && rest >= w->mass && !w->placer.failed; q++) {
 		quern_spot spot = { .radius = w->radius };
 		lattice_place(&w->lattice, w->item->lower, (uint32_t)w->way[q], w->s->dim, spot.x);
-		if (!quern_placer_free(&w->placer, &spot)) continue;
+		if (!quern_region_holds(&w->region, spot.x) || !quern_placer_free(&w->placer, &spot)) continue;
 		quern_placer_add(&w->placer, &spot);
 		w->way[w->n++] = w->way[q];
 		rest -= w->mass;

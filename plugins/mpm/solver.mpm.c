@@ -9,16 +9,13 @@
 
 static const char *const stresses[] = { "none", "at_rest", NULL };
 static const char *const rasters[] = { "auto", "plain", "affine", NULL };
-static const quern_param fill_rows[] = { QUERN_PARAM_AS(mpm_fill, lower, "region.box.lower", "m",
-											 "Lower corner of the material.", .flags = QUERN_REQUIRED),
-	QUERN_PARAM_AS(
-		mpm_fill, upper, "region.box.upper", "m", "Upper corner of the material.", .flags = QUERN_REQUIRED),
+static const quern_param fill_rows[] = { REGION_ABOVE(mpm_fill),
 	QUERN_PARAM(mpm_fill, velocity, "m/s", "Velocity at the start."),
 	QUERN_PARAM(mpm_fill, stress, "1", "Stress at the start: none, or that of the weight above.",
 		.choices = stresses),
 	QUERN_PARAM(mpm_fill, lateral, "1", "Horizontal over vertical stress at rest.", .def = 0.6, .max = 10),
 	QUERN_END_PARAMS };
-static const quern_param source_rows[] = SOURCE_ROWS(5);
+static const quern_param source_rows[] = { SOURCE_KEYS(5), QUERN_END_PARAMS };
 static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 										  "Cell of the grid; the domain is a whole number of them.",
 										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
@@ -67,10 +64,27 @@ static const quern_set sets[] = { { .name = "point",
 		.when = "sources" },
 	{ .name = NULL } };
 
-static const quern_slot slots[] = { { .name = "material",
-										.kind = &quern_material_kind,
-										.doc = "the constitutive model",
-										.stage = { "mpm.gather", "mpm.fill" } },
+static quern_status place_fills(
+	void *self, const quern_setup *, const quern_bound *shape, uint32_t n, quern_err *);
+static quern_status place_sources(
+	void *self, const quern_setup *, const quern_bound *shape, uint32_t n, quern_err *);
+
+/* Regions first: plugins may take the height of the fill as a default. */
+static const quern_slot slots[] = { { .name = "source.region",
+										.kind = &quern_body_kind,
+										.doc = "where it pours: in the shape of a body, such as {box: "
+											   "{lower: ..., upper: ...}}",
+										.stage = { "mpm.pour" },
+										.filled = place_sources },
+	{ .name = "fill.region",
+		.kind = &quern_body_kind,
+		.doc = "where material lies: in the shape of a body, such as {box: {lower: ..., upper: ...}}",
+		.stage = { "mpm.fill" },
+		.filled = place_fills },
+	{ .name = "material",
+		.kind = &quern_material_kind,
+		.doc = "the constitutive model",
+		.stage = { "mpm.gather", "mpm.fill" } },
 	{ .name = "shape",
 		.kind = &quern_shape_kind,
 		.doc = "the shape functions",
@@ -140,17 +154,16 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 		.when = "outlets" },
 	{ .name = NULL } };
 
-/* In a hybrid there is none. */
-static quern_status check_sources(mpm *p, const quern_setup *setup, quern_err *err) {
-	const source *item = p->source.items;
-	char param[40];
-	p->outlets = p->outlets || outlets_any(setup->open);
-	p->sources = (p->sources || p->source.n) && !setup->host->keeps(setup, "hybrid");
-	p->stream = setup->stream;
-	if (quern_sources_check(&p->source, false, setup, err) != QUERN_OK) return QUERN_E_PARAM;
-	for (uint32_t i = 0; i < p->source.n; i++) {
+static quern_status place_sources(
+	void *self, const quern_setup *setup, const quern_bound *shape, uint32_t n, quern_err *err) {
+	mpm *p = self;
+	if (quern_sources_place(&p->source, shape, REGION_OF_POINTS, setup, err) != QUERN_OK)
+		return QUERN_E_PARAM;
+	for (uint32_t i = 0; i < n; i++) {
+		const source *item = quern_source_at(&p->source, i);
+		const lattice l = lattice_of(p, item->lower, item->upper);
+		char param[40];
 		snprintf(param, sizeof param, "source.%u", i);
-		const lattice l = lattice_of(p, item[i].lower, item[i].upper);
 		if (l.wanted > MOST_POINTS)
 			return setup->host->fail(err, QUERN_E_PARAM, param,
 				"the region holds about %.2g points, more than %d: make cells larger", l.wanted, MOST_POINTS);
@@ -158,9 +171,33 @@ static quern_status check_sources(mpm *p, const quern_setup *setup, quern_err *e
 	return QUERN_OK;
 }
 
+/* After the sources. */
+static quern_status place_fills(
+	void *self, const quern_setup *setup, const quern_bound *shape, uint32_t n, quern_err *err) {
+	mpm *p = self;
+	mpm_fill *fill = p->fill.items;
+	fill_height loose = fill_height_of(setup);
+	for (uint32_t i = 0; i < n; i++) {
+		char param[40];
+		snprintf(param, sizeof param, "fill.%u.region", i);
+		if (quern_region_box(&shape[i], REGION_OF_POINTS, setup, param, err, fill[i].lower, fill[i].upper) !=
+			QUERN_OK)
+			return QUERN_E_PARAM;
+		fill_height_add(&loose, fill[i].lower, fill[i].upper);
+	}
+	/* where nothing lies at first, what is poured piles up from the domain's end */
+	for (uint32_t i = 0; i < p->source.n && !n; i++)
+		fill_height_add(&loose, setup->lower, quern_source_at(&p->source, i)->upper);
+	if (p->from) fill_height_add(&loose, setup->lower, setup->upper);
+	const quern_real height = fill_height_all(&loose),
+					 gravity = quern_gravity_size(setup->dim, setup->gravity);
+	setup->host->publish(setup, "fill.height", "m", height);
+	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
+	return QUERN_OK;
+}
+
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	mpm *p = self;
-	fill_height loose = fill_height_of(setup);
 	p->dim = setup->dim;
 	p->affine = p->rasterise == RASTERISE_AFFINE;
 	for (uint32_t k = 0; k < p->dim; k++) {
@@ -174,42 +211,31 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	}
 	const mpm_fill *fill = p->fill.items;
 	for (uint32_t i = 0; i < p->fill.n; i++)
-		for (uint32_t k = 0; k < p->dim; k++) {
-			const quern_real extent = fill[i].upper[k] - fill[i].lower[k], slack = 1e-9 * p->cell;
-			if (!(extent > 0))
-				return setup->host->fail(err, QUERN_E_PARAM, "fill",
-					"the region's upper corner must be above the lower one; axis %u is not", k);
-			if (fill[i].lower[k] < setup->lower[k] - slack || fill[i].upper[k] > setup->upper[k] + slack)
-				return setup->host->fail(
-					err, QUERN_E_PARAM, "fill", "the region reaches out of the domain along axis %u", k);
-		}
-	for (uint32_t i = 0; i < p->fill.n; i++) {
 		if (quern_too_fast(fill[i].velocity, 1))
 			return setup->host->fail(err, QUERN_E_PARAM, "fill", "the velocity is beyond that of light");
-		fill_height_add(&loose, fill[i].lower, fill[i].upper);
-	}
-	if (check_sources(p, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	if (p->from && setup->host->keeps(setup, "hybrid"))
 		return setup->host->fail(err, QUERN_E_PARAM, "from",
 			"a hybrid starts from its grains alone: give grains.from a run of grains");
-	/* where nothing lies at first, what is poured piles up from the domain's end */
-	const source *pours = p->source.items;
-	for (uint32_t i = 0; i < p->source.n && !p->fill.n; i++)
-		fill_height_add(&loose, setup->lower, pours[i].upper);
-	if (p->from) fill_height_add(&loose, setup->lower, setup->upper);
-	const quern_real height = fill_height_all(&loose);
-	setup->host->publish(setup, "fill.height", "m", height);
+	p->outlets = p->outlets || outlets_any(setup->open);
+	/* in a hybrid there is none */
+	p->sources = (p->sources || p->source.n) && !setup->host->keeps(setup, "hybrid");
+	p->stream = setup->stream;
+	if (quern_sources_check(&p->source, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
 	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
-	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
-	setup->host->publish(setup, "fill.rate", "1/s", height > 0 ? sqrt(gravity / height) : 0);
 	return QUERN_OK;
 }
 
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	mpm *p = self;
-	(void)n_slot;
+	const mpm_fill *fill = p->fill.items;
+	for (uint32_t i = 0; i < p->fill.n; i++) {
+		char param[40];
+		snprintf(param, sizeof param, "fill.%u.above", i);
+		if (quern_region_check_above(&fill[i].above, n_slot[SLOT_BODIES], setup, param, err) != QUERN_OK)
+			return QUERN_E_PARAM;
+	}
 	if (setup->host->keeps(setup, "grains") && !setup->host->keeps(setup, "hybrid"))
 		return setup->host->fail(err, QUERN_E_PARAM, NULL,
 			"grains and continuum do not feel each other without a section hybrid; add it, or keep one of "
@@ -243,7 +269,7 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 	}
 	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY);
 	for (uint32_t i = 0; i < p->source.n && p->sources; i++) {
-		const quern_real *v = ((const source *)p->source.items)[i].velocity;
+		const quern_real *v = quern_source_at(&p->source, i)->velocity;
 		const quern_real v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 		fastest = v2 > fastest ? v2 : fastest;
 	}

@@ -85,6 +85,10 @@ static double of_box_3d(place p) {
 
 static double of_disc(place p) { return hypot(p.x[0] - 0.1, p.x[1] + 0.2) - 0.7; }
 static double of_drum_2d(place p) { return -of_disc(p); }
+static double of_ball(place p) {
+	return length_of((double[3]) { p.x[0] - 0.1, p.x[1] + 0.2, p.x[2] - 0.3 }) - 0.7;
+}
+static double of_bowl(place p) { return -of_ball(p); }
 static double of_cylinder(place p) { return hypot(p.x[1] + 0.2, p.x[2]) - 0.7; }
 static double of_drum(place p) { return -of_cylinder(p); }
 /* Along (0, 3, 4)/5. */
@@ -163,6 +167,19 @@ static void put_box_3d(cloud *c) {
 }
 static void put_disc(cloud *c) {
 	put_circle(c, (place) { { 0.1, -0.2, 0 } }, (place) { { 1, 0, 0 } }, (place) { { 0, 1, 0 } }, 0.7);
+}
+static void put_ball(cloud *c) {
+	const int n = (int)ceil(0.7 * pi / c->apart) + 1;
+	for (int i = 0; i <= n; i++)
+		put_circle(c, (place) { { 0.1, -0.2, 0.3 + 0.7 * cos(pi * i / n) } }, (place) { { 1, 0, 0 } },
+			(place) { { 0, 1, 0 } }, 0.7 * sin(pi * i / n));
+}
+/* A plate is a box without a thickness. */
+static double of_plate(place p) {
+	return of_sides((double[3]) { p.x[0] - 0.1, p.x[1] + 0.2, p.x[2] - 0.3 }, (double[3]) { 0.6, 0.4, 0 }, 3);
+}
+static void put_plate(cloud *c) {
+	put_face(c, (place) { { -0.5, -0.6, 0.3 } }, (place) { { 0.7, -0.6, 0.3 } }, (place) { { 0, 0.8, 0 } });
 }
 /* As far as places that are asked for can see. */
 static void put_cylinder(cloud *c) {
@@ -261,6 +278,16 @@ static const shape shapes[] = {
 	{ "closed drum", 3,
 		"cylinder: {centre: [0.1, -0.2, 0], radius: 0.7, axis: [0, 3, 4], length: 1, inside: true}",
 		of_closed_drum, put_can, { { 0.3, -0.1, 0.1 } } },
+	{ "sphere in 2-D", 2, "sphere: {centre: [0.1, -0.2], radius: 0.7}", of_disc, put_disc,
+		{ { 0.9, 0.6, 0 } } },
+	{ "hollow sphere in 2-D", 2, "sphere: {centre: [0.1, -0.2], radius: 0.7, inside: true}", of_drum_2d,
+		put_disc, { { 0.3, 0.1, 0 } } },
+	{ "sphere", 3, "sphere: {centre: [0.1, -0.2, 0.3], radius: 0.7}", of_ball, put_ball,
+		{ { 0.5, 0.4, 0.9 } } },
+	{ "hollow sphere", 3, "sphere: {centre: [0.1, -0.2, 0.3], radius: 0.7, inside: true}", of_bowl, put_ball,
+		{ { 0.3, 0.1, 0.2 } } },
+	{ "plate", 3, "box: {lower: [-0.5, -0.6, 0.3], upper: [0.7, 0.2, 0.3]}", of_plate, put_plate,
+		{ { 0.2, 0.1, 0.6 } } },
 	{ "polygon", 2, POLYGON, of_polygon, put_polygon, { { 0, 0.2, 0 } } },
 	{ "polygon, clockwise", 2, NOGYLOP, of_polygon, put_polygon, { { 0.5, -1, 0 } } },
 };

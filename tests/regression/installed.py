@@ -60,3 +60,12 @@ with tempfile.TemporaryDirectory() as name:
     assert "quern greet" in run(here / "moved/bin/quern", "--help")
     assert "did you mean 'greet'?" in run(here / "moved/bin/quern", "gret", status=1)
     print("ok  quern WORD runs quern-WORD")
+    try:
+        import yaml  # noqa: F401
+    except ImportError:
+        print("--  quern sweep is not tried: python3-yaml is not there")
+    else:
+        (here / "study.yaml").write_text(f"study: 1\nbase: {SOURCE}/configs/two_grains.yaml\nset: {{time.end: 1 ms}}\n")
+        said = run(here / "moved/bin/quern", "sweep", here / "study.yaml", "-o", here / "study", "--quiet")
+        assert said.startswith("1 runs: 1 done; "), said
+        print("ok  quern sweep works where it is installed")

@@ -4,6 +4,7 @@
 In a page, an indented line `build/quern ...` is run, with the status that `# status N` behind it says; a block of yaml whose first
 line is `# FILE` is saved, others are planned; a block of python is run; every line of a block of text is found in what the last
 command printed. All of a page happens in one folder, in order. Every link of every page leads somewhere."""
+import json
 import os
 import pathlib
 import re
@@ -12,7 +13,7 @@ import sys
 import tempfile
 
 SOURCE, QUERN = pathlib.Path(os.environ["QUERN_SOURCE"]), pathlib.Path(os.environ["QUERN"])
-PAGES = {"README.md": 10, "docs/tutorial.md": 8, "docs/run_folder.md": 2, "docs/observers.md": 1}
+PAGES = {"README.md": 10, "docs/tutorial.md": 8, "docs/run_folder.md": 2, "docs/python.md": 5, "docs/studies.md": 3, "docs/observers.md": 1}
 PIECE = re.compile(r"^```(yaml|python|text)\n(.*?)^```|^    (build/quern [^\n]*)$", re.M | re.S)
 
 
@@ -24,7 +25,7 @@ class Page:
 
     def run(self, command, status=0):
         done = subprocess.run(command, cwd=self.here, capture_output=True, text=True, shell=isinstance(command, str),
-                              env=os.environ | {"QUERN_CACHE": str(self.here / "cache")})
+                              env=os.environ | {"QUERN_CACHE": str(self.here / "cache"), "PYTHONPATH": str(SOURCE / "python")})
         assert done.returncode == status, f"{self.name}: {command}: status {done.returncode}\n{done.stdout}{done.stderr}"
         self.printed = done.stdout + done.stderr
 
@@ -62,6 +63,21 @@ def play(name, least):
         print(f"ok  {name}: {page.done}")
 
 
+def notebook():
+    """The cells of docs/notebook.ipynb, one after the other."""
+    cells = json.loads((SOURCE / "docs/notebook.ipynb").read_text())["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    assert len(cells) >= 10 and all(not cell["outputs"] for cell in cells if cell["cell_type"] == "code"), "ten cells, kept without output"
+    with tempfile.TemporaryDirectory() as folder:
+        here = pathlib.Path(folder)
+        (here / "configs").symlink_to(SOURCE / "configs")
+        (here / "out").mkdir()
+        environment = os.environ | {"PYTHONPATH": str(SOURCE / "python"), "MPLBACKEND": "svg"}
+        done = subprocess.run([sys.executable, "-c", "\n".join(code)], cwd=here, capture_output=True, text=True, env=environment)
+        assert done.returncode == 0, f"docs/notebook.ipynb:\n{done.stdout}{done.stderr}"
+    print(f"ok  docs/notebook.ipynb: {len(cells)} cells\n{done.stdout}", end="")
+
+
 def links():
     for path in [SOURCE / "README.md", SOURCE / "CONTRIBUTING.md", *(SOURCE / "docs").rglob("*.md")]:
         for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text()):
@@ -84,6 +100,7 @@ def tour():
 
 links()
 tour()
+notebook()
 for page, fewest in PAGES.items():
     play(page, fewest)
 for tool in "reference", "manual":

@@ -20,10 +20,42 @@ COLUMN = lab.SMALL["column"]
 WIDE = [*COLUMN, *lab.sets(
     grains__fill__1__region__box="{lower: [0.001, 0.001], upper: [0.099, 0.07]}", bodies__2__plane__point="[0.1, 0]",
     grains__settle__energy=1e-2, time__end="20 ms")]
+# an observer that sums up over nodes, and one that maps
+NODES = """#include <quern/observer.h>
+typedef struct { int32_t unused; } nodes;
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { { .field = "node.mass", .unit = "kg", .access = QUERN_READ, .shape = QUERN_SCALAR }, QUERN_END_USES };
+static const quern_output outputs[] = { { "sum", "kg", "All.", QUERN_SUM, 0 }, { "in_order", "kg", "All.", QUERN_SUM, 0 }, { .name = NULL } };
+static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out, const quern_host *host, quern_run *run) {
+	const quern_parts *p = host->parts(run, "node");
+	quern_real *mass = host->memory(run, (p->n + 1) * sizeof *mass);
+	(void)self;
+	for (uint32_t i = 0; i < p->n; i++) mass[i] = b->use[0].real[0][8 * i];
+	out[0] = host->sum_set(run, "node", mass);
+	for (uint32_t q = 0; q < p->n; q++) out[1] += mass[quern_nth(p->entry, q)];
+	return QUERN_OK;
+}
+static const quern_observer_ops ops = { .size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole };
+static const quern_plugin plugin = { .size = sizeof plugin, .revision = 1, .dims = QUERN_2D | QUERN_3D, .id = "observer.nodes",
+	.brief = "Nodes.", .instance_size = sizeof(nodes), .params = params, .uses = uses, .ops = &ops };
+QUERN_LIBRARY(plugin, "0", "MIT");
+"""
+# many grains that leave the domain in one step: the message names the first by place
+FALL = """quern: 1
+dimension: 2
+gravity: [0, -9.81]
+domain: {lower: [0, 0], upper: [1, 0.1]}
+time: {end: 0.3}
+grains:
+  material: {density: 2500, radius: {mean: 2 mm}}
+  contact: {linear: {stiffness: 1e5, restitution: 0.5, friction: 0.5}}
+  fill: {region: {box: {lower: [0.01, 0.03], upper: [0.99, 0.03]}}}
+bodies: [segment: {from: [0, 0.02], to: [0.52, 0.02]}]
+"""
 HYBRID = [*flow.HYBRID, f"--set=observe={OBSERVED}, ledger, outflow]"]
 SCENES = {
     "grains and continuum in two dimensions": ("column", [*COLUMN, f"--set=observe={OBSERVED}, ledger]"]),
-    "a wide column, seen by an observer that maps": ("column", [*WIDE, "--set=observe=[mine, mass]"]),
+    "a wide column, seen by an observer that maps": ("column", [*WIDE, "--set=observe=[mine, nodes, mass]"]),
     "in three dimensions": ("column_3d", lab.SMALL["column_3d"]),
     "a source and an open face, two threads": ("column", HYBRID),
     "a floor that moves": ("column", [*COLUMN, "--set=bodies.0.plane.motion={velocity: [0.2, 0]}", f"--set=observe={OBSERVED}, ledger]"]),
@@ -56,6 +88,7 @@ def main():
     permuted = 0
     plugins = tempfile.TemporaryDirectory()
     workshop.compile(workshop.source("observer"), "observer.mine", plugins.name)
+    workshop.compile(NODES, "observer.nodes", plugins.name)
     for what, (name, options) in SCENES.items():
         with lab.workplace() as place:
             here, there = pathlib.Path(place) / "here", pathlib.Path(place) / "there"
@@ -64,6 +97,13 @@ def main():
             lab.same(here, there, what, checkpoint=False)
             assert not is_permuted(here), f"{what}: the blocks of this program are not in order"
             permuted += is_permuted(there)
+    with lab.workplace() as place:
+        scene = pathlib.Path(place) / "fall.yaml"
+        scene.write_text(FALL)
+        said = [lab.run(scene, scene.with_name(name), status=3, program=program) for name, program in (("here", None), ("there", other))]
+        lost = [lab.summary(scene.with_name(name))["message"] for name in ("here", "there")]
+        assert lost[0] == lost[1] and "left the domain" in lost[0], (lost, said)
+        print(f"  {lost[0]}")
     print(f"{permuted} of {len(SCENES)} scenes had blocks in another order")
     assert permuted >= len(SCENES) // 2
 

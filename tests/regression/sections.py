@@ -7,7 +7,7 @@ import subprocess
 import lab
 
 INDEX = {"contact.first", "contact.second", "touch.grain", "touch.body", "grain.fixed", "grain.home", "point.home",
-         "cell.zone", "cell.draws"}  # four bytes; all the rest has eight
+         "cell.zone", "waiting.draw"}  # four bytes; all the rest has eight
 OF_GRAINS = {"contact", "neighbours", "integrator", "packer"}
 OF_CONTINUUM = {"material", "shape", "transfer"}
 OF_HYBRID = {"coupling", "oracle"}
@@ -104,7 +104,8 @@ def continuum_alone():
         assert free != text
         pathlib.Path(place, "bar.yaml").write_text(free)
         bar = Scene(f"{place}/bar")
-    assert solvers_of(bar.ids) == {"mpm"} and not bar.kinds() & (OF_GRAINS | OF_HYBRID | {"body"})
+    assert solvers_of(bar.ids) == {"mpm"} and not bar.kinds() & (OF_GRAINS | OF_HYBRID)
+    assert {id for id in bar.ids if id.startswith("body.")} == {"body.box"}, "the shape of its region alone"
     assert not set(bar.sets) & {"grain", "contact", "touch", "body", "cell", "mixture"}, sorted(bar.sets)
     assert bar.components("point.stress") == 3 and bar.components("point.position") == 2
     print(f"elastic bar: {len(bar.ids)} objects, no grains, no cells; a point has {bar.bytes('point')} bytes")

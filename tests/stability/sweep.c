@@ -18,13 +18,21 @@
 static const double diameter = 2e-3, start = 14e-3;
 enum { CYCLES = 4, STRIDES = 20, STRIDE_UPDATES = 1 }; /* half a diameter per update */
 
-/* The page's limits, which hold for any settled state: the columns of its summary. */
+/* Of a settled state, the worst of all cycles, or the mean of that over states. Which grains come where is chance, and the worst update of
+ * one state scatters by a fifth and more; the mean over states is what can be asked for: the columns of the page's summary. */
+typedef struct swept {
+	double kinetic, lowest, highest, lost, carried,
+		left;    /* lost: diameters of height; left: carried mass off in the end */
+	double rest; /* kinetic energy over m g d in the end */
+} swept;
 typedef struct limits {
 	const char *packer;
-	double kinetic, lowest, highest, lost, carried, left; /* lost: diameters of height */
+	swept most;
 } limits;
-static const limits of_packer[] = { { "two_point_tangent", 0.06, 0.5, 1.7, 2.5, 0.06, 0.015 },
-	{ "random", 0.15, 0.35, 1.8, 4, 0.14, 0.025 } };
+/* the shorter version gives it a fifth of the time to come to rest */
+static const limits of_packer[] = { { "two_point_tangent", { 0.06, 0.5, 1.7, 2.5, 0.06, 0.015, 3e-4 } },
+	{ "random", { 0.15, 0.35, 1.8, 4, 0.14, 0.025, 3e-4 } } };
+static const double rest_of_shorter = 2e-3;
 
 typedef struct book {
 	double kinetic, lowest,
@@ -66,17 +74,16 @@ static void put(
 		harness_count(h->run, "grain"), harness_count(h->run, "point"));
 }
 
-static void judge(const limits *l, const book *b, double lost, double defect) {
-	if (!(b->kinetic < l->kinetic)) fail_msg("%s: kinetic energy %g", l->packer, b->kinetic);
-	if (!(b->lowest > l->lowest && b->highest < l->highest)) fail_msg("%s: the floor feels it", l->packer);
-	if (!(fabs(b->carried) < l->carried)) fail_msg("%s: carried mass %g", l->packer, b->carried);
-	if (!(lost > -0.1 && lost < l->lost)) fail_msg("%s: the column loses %g diameters", l->packer, lost);
-	if (!(defect <= 1e-12)) fail_msg("%s: the ledger is off", l->packer);
+static void take_worst(swept *w, const book *b, double lost) {
+	w->kinetic = fmax(w->kinetic, b->kinetic);
+	w->lowest = fmin(w->lowest, b->lowest);
+	w->highest = fmax(w->highest, b->highest);
+	w->carried = fmax(w->carried, fabs(b->carried));
+	w->lost = fmax(w->lost, lost);
 }
 
-/* Returns the kinetic energy that is left over m g d. */
-static double sweep(const limits *l, int seed) {
-	const char *packer = l->packer;
+static swept sweep(const char *packer, int seed) {
+	swept w = { .lowest = INFINITY, .highest = -INFINITY, .lost = -INFINITY };
 	const held h = held_open(0.04, 0.06, 20, packer, seed);
 	double *depth = harness_param(h.run, "oracle.packing_fraction", "depth");
 	assert_true(fabs(*depth - start) < 1e-12);
@@ -95,15 +102,39 @@ static double sweep(const limits *l, int seed) {
 		}
 		snprintf(when, sizeof when, "cycle %d", cycle);
 		put(&h, packer, seed, when, &b, top, mass);
-		judge(l, &b, (top - held_top(&h)) / diameter, quern_run_carries(h.run, "defect"));
+		take_worst(&w, &b, (top - held_top(&h)) / diameter);
+		if (!(quern_run_carries(h.run, "defect") <= 1e-12)) fail_msg("%s: the ledger is off", packer);
 	}
 	book last = { .lowest = INFINITY, .highest = -INFINITY };
 	for (int i = 0; i < 10 * each; i++) go_on(&h, mass, &last);
 	put(&h, packer, seed, "at rest again", &last, top, mass);
-	if (!(fabs(quern_run_carries(h.run, "mass") / mass - 1) < l->left))
-		fail_msg("%s: carried mass does not come back", packer);
+	w.rest = last.kinetic;
+	w.left = fabs(quern_run_carries(h.run, "mass") / mass - 1);
 	harness_close(h.run);
-	return last.kinetic;
+	return w;
+}
+
+static void add_state(swept *mean, const swept *w, int states) {
+	mean->kinetic += w->kinetic / states;
+	mean->lowest += w->lowest / states;
+	mean->highest += w->highest / states;
+	mean->lost += w->lost / states;
+	mean->carried += w->carried / states;
+	mean->left += w->left / states;
+	mean->rest += w->rest / states;
+}
+
+static void judge(const limits *l, const swept *w) {
+	const swept *m = &l->most;
+	const double rest = beyond_is_long() ? m->rest : rest_of_shorter;
+	if (!(w->kinetic < m->kinetic)) fail_msg("%s: kinetic energy %g", l->packer, w->kinetic);
+	if (!(w->lowest > m->lowest && w->highest < m->highest))
+		fail_msg("%s: the floor feels it, %g to %g", l->packer, w->lowest, w->highest);
+	if (!(w->carried < m->carried)) fail_msg("%s: carried mass %g", l->packer, w->carried);
+	if (!(w->lost > -0.1 && w->lost < m->lost))
+		fail_msg("%s: the column loses %g diameters", l->packer, w->lost);
+	if (!(w->left < m->left)) fail_msg("%s: carried mass does not come back: %g", l->packer, w->left);
+	if (!(w->rest < rest)) fail_msg("%s: it does not come to rest: %g", l->packer, w->rest);
 }
 
 static void zone_swept(void **unused) {
@@ -114,11 +145,12 @@ static void zone_swept(void **unused) {
 		"carried mass, worst | carried mass, last | entries over the mass | ledger | grains, points");
 	for (size_t k = 0; k < 2; k++) {
 		const int states = beyond_is_long() ? 5 : 3;
-		double left = 0;
-		for (int seed = 1; seed <= states; seed++) left += sweep(&of_packer[k], seed) / states;
-		/* the shorter version gives it a fifth of the time, in which one state of three may still breathe */
-		if (!(left < (beyond_is_long() ? 3e-4 : 2e-3)))
-			fail_msg("%s: it does not come to rest", of_packer[k].packer);
+		swept mean = { .kinetic = 0 };
+		for (int seed = 1; seed <= states; seed++) {
+			const swept w = sweep(of_packer[k].packer, seed);
+			add_state(&mean, &w, states);
+		}
+		judge(&of_packer[k], &mean);
 	}
 }
 

@@ -152,8 +152,8 @@ static void conflicts(void **state) {
 		{ .field = "grain.a", .unit = "m", .doc = "x", .access = QUERN_READ, .shape = QUERN_VECTOR },
 		QUERN_END_USES
 	};
-	static const quern_use sums[] = { U("grain.a", QUERN_READ, .rule = QUERN_SUMS), QUERN_END_USES };
-	static const quern_use means[] = { U("grain.a", QUERN_READ, .rule = QUERN_MEANS), QUERN_END_USES };
+	static const quern_use sums[] = { U("grain.a", QUERN_UPDATE, .rule = QUERN_SUMS), QUERN_END_USES };
+	static const quern_use means[] = { U("grain.a", QUERN_ADD, .rule = QUERN_MEANS), QUERN_END_USES };
 	static const quern_use nowhere[] = { U("rock.a", QUERN_READ, .flags = 0), QUERN_END_USES };
 	const quern_stage *w = STAGES("one.write", QUERN_EXCHANGE, writes);
 	(void)state;

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: MIT
+"""A study file: read with the place of everything, and all of its faults at once. docs/studies.md says what may stand in it."""
+import math
+import pathlib
+import random
+import re
+from dataclasses import dataclass, field
+
+import yaml
+
+from .reader import Reader, Sets, StudyError, compose, flow, kind, nearest, read_sets
+
+KEYS = ("study", "name", "base", "set", "axes", "repeats", "reference", "measure", "front", "jobs", "threads", "limit")
+AT = ("last", "first", "mean", "min", "max", "every")
+COSTS = ("processor", "running", "wall")
+SECONDS = {"": 1, "s": 1, "min": 60, "h": 3600, "d": 86400}
+MOST_RUNS = 100_000
+# Columns that every table has.
+RESULTS = ("steps", "substeps", "settle_steps", "time_end", "grains", "points", "mass_defect", "discrete_share", "energy")
+RESERVED = ("run", "point", "model", "seed", "status", "exit", "message", "scene_hash", *RESULTS)
+
+
+@dataclass(frozen=True)
+class Value:
+    """One place on an axis: what to call it, what to set."""
+    label: str
+    sets: Sets
+
+
+@dataclass(frozen=True)
+class Axis:
+    name: str
+    values: tuple[Value, ...]
+    drawn: bool = False  # at random: together with the other axes that are
+
+
+@dataclass(frozen=True)
+class Measure:
+    name: str
+    source: str  # "series" or "summary"
+    path: str
+    at: str
+
+
+@dataclass
+class Study:
+    path: pathlib.Path
+    name: str = ""
+    base: pathlib.Path = pathlib.Path()
+    sets: Sets = ()
+    axes: list[Axis] = field(default_factory=list)
+    seeds: list[int] = field(default_factory=list)
+    reference: str = ""
+    reference_sets: Sets = ()
+    follows: tuple[str, ...] = ()
+    measures: list[Measure] = field(default_factory=list)
+    front: str = "running"
+    jobs: int = 0
+    threads: int = 1
+    limit: float = math.inf
+
+
+def spread(first: float, last: float, law: str, share: float) -> float:
+    return first * (last / first) ** share if law == "log" else first + (last - first) * share
+
+
+def read_range(reader: Reader, node: yaml.Node, where: str, count: str, optional: tuple[str, ...]):
+    """from, to, law and the count of a grid or a sample: (first, last, unit, law, n, others); None if something is wrong."""
+    before = len(reader.faults)
+    found = reader.mapping(node, where, ("from", "to", "law", count, *optional))
+    reader.require(node, found, f"{where}: ", {"from": "", "to": "", count: ""})
+    ends = [reader.quantity(found[key][1], f"{where}.{key}") for key in ("from", "to") if key in found]
+    law = reader.choice(found["law"][1], f"{where}.law", ("even", "log")) if "law" in found else "even"
+    n = reader.whole(found[count][1], f"{where}.{count}", 2 if count == "steps" else 1, MOST_RUNS) if count in found else 0
+    if len(reader.faults) > before:
+        return None
+    (first, unit), (last, other) = ends
+    if unit != other:
+        reader.fault(found["to"][1], f"{where}: 'from' is in '{unit or 'no unit'}' and 'to' in '{other or 'no unit'}'; write both in one unit")
+    elif not first < last:
+        reader.fault(found["to"][1], f"{where}: 'to' must be above 'from'")
+    if law == "log" and first <= 0:
+        reader.fault(found["from"][1], f"{where}: 'from' must be above 0 where the law is log")
+    return (first, last, unit, law, n, found) if len(reader.faults) == before else None
+
+
+def quantity_value(key: str, x: float, unit: str) -> Value:
+    label = f"{x:.12g} {unit}".strip()
+    return Value(label, (f"{key}={label}",))
+
+
+def read_grid(reader: Reader, node: yaml.Node, where: str, key: str) -> list[Value]:
+    got = read_range(reader, node, where, "steps", ())
+    if not got:
+        return []
+    first, last, unit, law, n, _ = got
+    return [quantity_value(key, spread(first, last, law, i / (n - 1)), unit) for i in range(n)]
+
+
+def read_sample(reader: Reader, node: yaml.Node, where: str, key: str) -> list[Value]:
+    got = read_range(reader, node, where, "n", ("seed",))
+    if not got:
+        return []
+    first, last, unit, law, n, found = got
+    seed = reader.whole(found["seed"][1], f"{where}.seed", 0, 2**53) if "seed" in found else 1
+    draw = random.Random(f"{seed} {where}")  # by name, so that a further axis changes none of the others
+    return [quantity_value(key, spread(first, last, law, draw.random()), unit) for _ in range(n)]
+
+
+def read_list(reader: Reader, node: yaml.Node, where: str, key: str) -> list[Value]:
+    values = [Value(flow(item), (f"{key}={flow(item)}",)) for item in reader.items(node, where, "values")]
+    return distinct(reader, node, where, values)
+
+
+def read_cases(reader: Reader, node: yaml.Node, where: str) -> list[Value]:
+    found = reader.mapping(node, where)
+    if isinstance(node, yaml.MappingNode) and not node.value:
+        reader.fault(node, f"{where} must have a case at least, NAME: {{KEY: VALUE}}")
+    return [Value(name, read_sets(reader, value, f"{where}.{name}")) for name, (_, value) in found.items()]
+
+
+def distinct(reader: Reader, node: yaml.Node, where: str, values: list[Value]) -> list[Value]:
+    seen = set()
+    for item, value in zip(node.value, values):
+        if value.label in seen:
+            reader.fault(item, f"{where}: '{value.label}' stands here twice")
+        seen.add(value.label)
+    return values
+
+
+WAYS = {"list": read_list, "grid": read_grid, "random": read_sample}
+
+
+def read_axis(reader: Reader, at: yaml.Node, node: yaml.Node, name: str) -> Axis:
+    where = f"axes.{name}"
+    if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in RESERVED:
+        reader.fault(at, f"{where}: the name of an axis must be a word that no column has already")
+    found = reader.mapping(node, where, ("key", *WAYS, "cases"))
+    ways = [word for word in found if word != "key"]
+    if not ways and not reader.clean:
+        return Axis(name, ())
+    if len(ways) != 1:
+        reader.fault(node, f"{where}: give one of list, grid, random or cases" + (f", not {' and '.join(ways)}" if ways else ""))
+        return Axis(name, ())
+    way, value = ways[0], found[ways[0]][1]
+    if way == "cases":
+        if "key" in found:
+            reader.fault(found["key"][0], f"{where}: cases have keys of their own; leave 'key' out")
+        return Axis(name, tuple(read_cases(reader, value, f"{where}.cases")))
+    reader.require(node, found, f"{where}: ", {"key": "the key of the scene that the axis sets"})
+    key = reader.text(found["key"][1], f"{where}.key", "the path of a key such as continuum.cell") if "key" in found else ""
+    if key == "seed":
+        reader.fault(found["key"][1], f"{where}.key: seeds are set by 'repeats: {{seeds: ...}}'")
+    return Axis(name, tuple(WAYS[way](reader, value, f"{where}.{way}", key)), way == "random")
+
+
+def read_axes(reader: Reader, node: yaml.Node) -> list[Axis]:
+    found = reader.mapping(node, "axes")
+    axes = [read_axis(reader, at, value, name) for name, (at, value) in found.items()]
+    drawn = [axis for axis in axes if axis.drawn and axis.values]
+    for axis in drawn[1:]:
+        if len(axis.values) != len(drawn[0].values):
+            reader.fault(found[axis.name][1], f"axes.{axis.name}: random axes are drawn together: n must be {len(drawn[0].values)}, as of {drawn[0].name}")
+    return axes
+
+
+def read_seeds(reader: Reader, node: yaml.Node) -> list[int]:
+    found = reader.mapping(node, "repeats", ("seeds",))
+    reader.require(node, found, "repeats: ", {"seeds": "how many or which: 3 or [1, 2, 3]"})
+    if "seeds" not in found:
+        return []
+    value = found["seeds"][1]
+    if not isinstance(value, yaml.SequenceNode):
+        return list(range(1, reader.whole(value, "repeats.seeds", 1, 10_000) + 1))
+    seeds = [reader.whole(item, "repeats.seeds", 0, 2**53) for item in reader.items(value, "repeats.seeds", "whole numbers")]
+    if len(set(seeds)) < len(seeds):
+        reader.fault(value, "repeats.seeds: a seed stands here twice")
+    return seeds
+
+
+def read_measure(reader: Reader, node: yaml.Node) -> Measure | None:
+    found = reader.mapping(node, "measure", ("name", "series", "summary", "at"))
+    reader.require(node, found, "measure: ", {"name": ""})
+    sources = [word for word in ("series", "summary") if word in found]
+    if len(sources) != 1:
+        if reader.clean:
+            reader.fault(node, "measure: give one of series (a column of series.csv) and summary (a path in summary.json)")
+        return None
+    name = reader.text(found["name"][1], "measure.name", "a word") if "name" in found else ""
+    if name and (not re.fullmatch(r"[A-Za-z_]\w*", name) or name in RESERVED):
+        reader.fault(found["name"][1], f"measure.name: '{name}' must be a word that no column has already")
+    path = reader.text(found[sources[0]][1], f"measure.{sources[0]}", "a name such as runout.front")
+    at = reader.choice(found["at"][1], "measure.at", AT) if "at" in found else "last"
+    if "at" in found and sources[0] == "summary":
+        reader.fault(found["at"][0], "measure.at: a summary has one value; leave 'at' out")
+    return Measure(name, sources[0], path, at)
+
+
+def read_measures(reader: Reader, node: yaml.Node, axes: list[Axis]) -> list[Measure]:
+    measures, names = [], [axis.name for axis in axes]
+    for item in reader.items(node, "measure", "measures, {name: ..., series: ..., at: last}"):
+        measure = read_measure(reader, item)
+        if measure and measure.name in names:
+            reader.fault(item, f"measure: the name '{measure.name}' is taken already")
+        if measure:
+            names.append(measure.name)
+            measures.append(measure)
+    return measures
+
+
+def read_reference(reader: Reader, node: yaml.Node, study: Study) -> None:
+    found = reader.mapping(node, "reference", ("name", "set", "follows"))
+    reader.require(node, found, "reference: ", {"name": "", "set": "what it sets beside the study's own"})
+    if "name" in found:
+        study.reference = reader.text(found["name"][1], "reference.name", "a word")
+    if "set" in found:
+        study.reference_sets = read_sets(reader, found["set"][1], "reference.set")
+    if "follows" in found:
+        nodes = reader.items(found["follows"][1], "reference.follows", "axes")
+        names = [axis.name for axis in study.axes]
+        for item in nodes:
+            word = reader.text(item, "reference.follows", "the name of an axis")
+            if word and word not in names:
+                reader.fault(item, f"reference.follows: no axis is called '{word}'{nearest(word, names, 'axes: ')}")
+        study.follows = tuple(item.value for item in nodes)
+
+
+def read_limit(reader: Reader, node: yaml.Node) -> float:
+    got = reader.quantity(node, "limit")
+    if got and (got[1] not in SECONDS or got[0] <= 0):
+        reader.fault(node, f"limit must be a time above 0 in s, min, h or d, not '{node.value}'")
+        return math.inf
+    return got[0] * SECONDS[got[1]] if got else math.inf
+
+
+def read_base(reader: Reader, node: yaml.Node, folder: pathlib.Path) -> pathlib.Path:
+    text = reader.text(node, "base", "the path of a scene")
+    if text and not (folder / text).is_file():
+        reader.fault(node, f"base: there is no scene {text}; paths begin at the folder of the study")
+    return folder / text
+
+
+def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
+    study = Study(path, path.stem)
+    found = reader.mapping(root, "the study", KEYS)
+    parts = {key: value for key, (_, value) in found.items()}
+    reader.require(root, found, "", {"study": "write 'study: 1'", "base": "the scene that all runs begin with"})
+    if "study" in parts and flow(parts["study"]) != "1":
+        reader.fault(parts["study"], f"study must be 1, the only form there is, not {kind(parts['study'])}")
+    study.base = read_base(reader, parts["base"], path.parent) if "base" in parts else path
+    study.name = reader.text(parts["name"], "name") if "name" in parts else path.stem
+    study.sets = read_sets(reader, parts["set"], "set") if "set" in parts else ()
+    study.axes = read_axes(reader, parts["axes"]) if "axes" in parts else []
+    study.seeds = read_seeds(reader, parts["repeats"]) if "repeats" in parts else []
+    study.measures = read_measures(reader, parts["measure"], study.axes) if "measure" in parts else []
+    if "reference" in parts:
+        read_reference(reader, parts["reference"], study)
+    if "front" in parts:
+        study.front = reader.choice(parts["front"], "front", COSTS)
+    study.jobs = reader.whole(parts["jobs"], "jobs", 1, 10_000) if "jobs" in parts else 0
+    study.threads = reader.whole(parts["threads"], "threads", 1, 1024) if "threads" in parts else 1
+    study.limit = read_limit(reader, parts["limit"]) if "limit" in parts else math.inf
+    count = math.prod(len(axis.values) for axis in study.axes if not axis.drawn) * max(1, len(study.seeds))
+    count *= max((len(axis.values) for axis in study.axes if axis.drawn), default=1)
+    if count > MOST_RUNS:
+        reader.fault(parts["axes"], f"axes: these are {count} runs; at most {MOST_RUNS} are a study")
+    return study
+
+
+def read(path: pathlib.Path, name: str | None = None) -> Study:
+    """The study in a file; StudyError with all faults, each with its place. `name`: what messages call the file."""
+    reader = Reader(name or str(path))
+    root = compose(path, reader.name)
+    study = read_tree(reader, root, path)
+    if reader.faults:
+        raise StudyError("\n".join(text for _, _, text in sorted(reader.faults)))
+    return study

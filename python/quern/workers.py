@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""The runs of a study at work: started as there is room, ended at their limit, recorded when they are over."""
+import ctypes
+import json
+import math
+import os
+import pathlib
+import select
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .points import Job, digest
+from .program import find, sentence, set_options
+from .study import Study
+
+GRACE = 5.0  # s that a run has to end by itself once its limit is over
+STATUS = {0: "done", 2: "refused", 130: "interrupted"}
+
+
+@dataclass
+class Active:
+    job: Job
+    process: subprocess.Popen
+    began: float
+    ends: float  # when the next signal is due
+    asked: bool = False  # it was asked to end
+
+
+def record_path(folder: pathlib.Path, key: str) -> pathlib.Path:
+    return folder / "runs" / f"{key}.json"
+
+
+def recorded(folder: pathlib.Path, key: str) -> dict | None:
+    try:
+        return json.loads(record_path(folder, key).read_text())
+    except (FileNotFoundError, ValueError):
+        return None
+
+
+def is_recorded(folder: pathlib.Path, job: Job, study: Study, digests: dict[str, str], retry: bool) -> bool:
+    """True if the run was made already by the same program and plugins, and nothing says to try again."""
+    record = recorded(folder, job.key)
+    if not record or not set(record["made_by"].values()) <= set(digests.values()):
+        return False
+    if record["status"] == "hung" and study.limit > record["limit"]:
+        return False
+    if record["status"] == "done":
+        return (folder / "runs" / job.key / "summary.json").exists()
+    return not retry
+
+
+def end_with_parent() -> None:
+    """In the child, before the program takes its place: a sweep that is killed leaves no runs behind that hold their folders."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
+def start(study: Study, job: Job, folder: pathlib.Path) -> Active:
+    runs = folder / "runs"
+    command = [find(), "run", str(study.base.resolve()), "--quiet", "--force", "--threads", str(study.threads),
+               "-o", str(runs / job.key), *set_options(job.sets)]
+    with open(runs / f"{job.key}.err", "wb") as said:
+        process = subprocess.Popen(command, cwd=study.path.parent.resolve(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                   stderr=said, preexec_fn=end_with_parent)
+    now = time.monotonic()
+    return Active(job, process, now, now + study.limit)
+
+
+def remind(active: Active) -> None:
+    """At its limit a run is asked to end, then made to."""
+    active.process.send_signal(signal.SIGKILL if active.asked else signal.SIGTERM)
+    active.asked, active.ends = True, time.monotonic() + GRACE
+
+
+def read_json(path: pathlib.Path) -> dict:
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError):
+        return {}
+
+
+def message_of(active: Active, code: int, said: str, study: Study) -> tuple[str, str]:
+    """Status and sentence of a run that is over."""
+    if active.asked:
+        return "hung", f"not over within its limit of {study.limit:g} s"
+    words = sentence(said) if code else ""
+    if code < 0:
+        words = words or f"ended by signal {-code}, {signal.Signals(-code).name}"
+    return STATUS.get(code, "failed"), words or ("" if code == 0 else f"exit status {code}")
+
+
+def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str, str]) -> dict:
+    """Waits for a run that has ended and records it; one that somebody has interrupted is not recorded."""
+    _, status, usage = os.wait4(active.process.pid, 0)
+    code = active.process.returncode = os.waitstatus_to_exitcode(status)
+    wall, key = time.monotonic() - active.began, active.job.key
+    note = folder / "runs" / f"{key}.err"
+    word, message = message_of(active, code, note.read_text(errors="replace"), study)
+    note.unlink()
+    summary = read_json(folder / "runs" / key / "summary.json") if word == "done" else {}
+    processor = usage.ru_utime + usage.ru_stime
+    settling = summary.get("settle_seconds", 0) / summary["wall_seconds"] if summary.get("wall_seconds") else 0
+    used = {plugin["file"] for plugin in summary["provenance"]["plugins"]} | {find()} if summary else set(digests)
+    record = {"status": word, "exit": "" if active.asked else code if code >= 0 else 128 - code, "message": message,
+              "limit": None if math.isinf(study.limit) else study.limit, "job": str(active.job), "sets": active.job.sets,
+              "cost": {"wall": wall, "processor": processor, "running": processor * (1 - settling), "memory": usage.ru_maxrss * 1024},
+              "made_by": {path: digests.get(path) or digest(pathlib.Path(path).read_bytes()) for path in sorted(used)}}
+    if word != "interrupted":
+        save(record_path(folder, key), json.dumps(record, indent=1))
+    return record
+
+
+def save(path: pathlib.Path, text: str) -> None:
+    """Written aside and renamed: there is the old file or the new one, whole."""
+    aside = path.with_name(f"{path.name}.{os.getpid()}.part")
+    aside.write_text(text)
+    os.replace(aside, path)
+
+
+def memory_left() -> float:
+    """Bytes that another run could take; infinite where the system does not tell."""
+    try:
+        lines = pathlib.Path("/proc/meminfo").read_text().splitlines()
+        return next(float(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
+    except (OSError, StopIteration):
+        return math.inf
+
+
+def wait(active: dict[int, Active], stop: int) -> list[int]:
+    """File descriptors of runs that are over, or `stop`, once there is one or a limit has come."""
+    timeout = max(0.0, min(one.ends for one in active.values()) - time.monotonic())
+    poll = select.poll()
+    for fd in (stop, *active):
+        poll.register(fd, select.POLLIN)
+    return [fd for fd, _ in poll.poll(None if math.isinf(timeout) else math.ceil(min(timeout, 1e6) * 1000))]
+
+
+def run_all(study: Study, jobs: list[Job], folder: pathlib.Path, at_a_time: int, digests: dict[str, str],
+            say: Callable[[Job, dict], None], stop: int) -> bool:
+    """Makes the runs; False if they were interrupted, as they are once `stop` can be read. Another one is started while cores are free,
+    and while memory is left for the largest that there was."""
+    (folder / "runs").mkdir(exist_ok=True)
+    waiting, active, largest, whole = list(reversed(jobs)), {}, 0, True
+    try:
+        while waiting or active:
+            while waiting and len(active) < at_a_time and (not active or memory_left() > largest):
+                one = start(study, waiting.pop(), folder)
+                active[os.pidfd_open(one.process.pid)] = one
+            over = wait(active, stop)
+            if stop in over:
+                return False
+            for fd in over:
+                one = active.pop(fd)
+                os.close(fd)
+                record = finish(study, one, folder, digests)
+                largest = max(largest, record["cost"]["memory"])
+                whole &= record["status"] != "interrupted"
+                say(one.job, record)
+            for one in active.values():
+                if time.monotonic() >= one.ends:
+                    remind(one)
+    finally:
+        for fd, one in active.items():
+            one.process.kill()
+            one.process.wait()
+            os.close(fd)
+    return whole

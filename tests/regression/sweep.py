@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: MIT
+"""quern sweep: the table of a study, the same to the last digit however often it was killed; runs that fail, hang or are refused; what is
+made again and what is not; sampled axes; errors against a reference; the same work by GNU parallel; what a run costs beside itself."""
+import csv
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+
+import lab
+
+try:
+    import yaml
+except ImportError:
+    print("python3-yaml is not there")
+    sys.exit(77)
+
+TWO = lab.scene("two_grains")
+ENERGY = 0.5 * 2 * 2500 * 3.141592653589793 * 0.005 ** 2  # J, of two discs that meet at 1 m/s each
+
+
+ENDLESS = {"time.end": "1e6", "output.every": "1e5", "grains.place.0.velocity": [0, 0], "grains.place.1.velocity": [0, 0]}
+
+
+def write(folder, name, **study):
+    path = folder / f"{name}.yaml"
+    path.write_text(yaml.safe_dump({"study": 1, "base": TWO, **study}, sort_keys=False))
+    return path
+
+
+def words_of(path, out, *options):
+    return [lab.QUERN, "sweep", str(path), "-o", str(out), *options]
+
+
+def sweep(path, out, *options, status=0, **how):
+    done = subprocess.run(words_of(path, out, *options), capture_output=True, text=True, timeout=300, **how)
+    assert done.returncode == status, f"{path.name}: exit status {done.returncode}\n{done.stdout}{done.stderr}"
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.stderr
+
+
+def table(out, name="table"):
+    """Rows by column, names without units."""
+    with open(out / f"{name}.csv") as file:
+        return [{key.split(" [")[0]: value for key, value in row.items()} for row in csv.DictReader(file)]
+
+
+def results(out, name="table"):
+    """What must be the same to the last digit: all but costs."""
+    return [{key: value for key, value in row.items() if not key.startswith("cost.")} for row in table(out, name)]
+
+
+def made(said):
+    return said.count("] done: ")
+
+
+def check_physics(here):
+    """The energy that a collision leaves over its restitution, against e^2; errors against a reference follow from it."""
+    path = write(here, "bounce", set={"time.end": "4 ms", "observe": ["energy"]}, jobs=2, repeats={"seeds": [3, 5]},
+                 axes={"restitution": {"key": "grains.contact.linear.restitution", "grid": {"from": 0.5, "to": 1.0, "steps": 6}}},
+                 reference={"name": "half", "set": {"grains.contact.linear.restitution": 0.5}},
+                 measure=[{"name": "left", "series": "energy.grains"}, {"name": "all", "series": "energy.grains", "at": "every"},
+                          {"name": "mass", "summary": "sums.mass"}, {"name": "most", "series": "energy.grains", "at": "max"}])
+    sweep(path, here / "bounce")
+    rows, points = table(here / "bounce"), table(here / "bounce", "points")
+    assert len(rows) == 14 and len(points) == 6 and [row["model"] for row in rows].count("half") == 2, len(rows)
+    worst = 0
+    for row in rows[2:]:
+        e = float(row["restitution"])
+        worst = max(worst, abs(float(row["left"]) / ENERGY - e * e))
+        assert abs(float(row["left.error"]) - abs(float(row["left"]) - float(rows[0]["left"]))) < 1e-15
+        assert abs(float(row["most"]) / ENERGY - 1) < 1e-12 and abs(float(row["mass"]) / ENERGY - 2) < 1e-12 and row["seed"] in ("3", "5")
+    assert worst < 0.004, worst
+    assert float(points[0]["left.error"]) == 0 == float(points[0]["all.error"]) and points[0]["left.error.standard_error"] == ""
+    for row in points[1:]:
+        e = float(row["restitution"])
+        assert abs(float(row["left.error"]) / ENERGY - (e * e - 0.25)) < 0.01 and float(row["left.error.standard_error"]) == 0
+    # the whole series, by hand
+    with open(here / "bounce/runs" / rows[2]["run"] / "series.csv") as file:
+        assert "energy.grains [J]" in file.readline()
+    own, twin = ([row[3] for row in lab.series(here / "bounce/runs" / run["run"])[1]] for run in (rows[-1], rows[0]))
+    rms = (sum((a - b) ** 2 for a, b in zip(own, twin)) / len(own)) ** 0.5
+    assert abs(float(rows[-1]["all.error"]) / rms - 1) < 1e-12
+    with h5py.File(here / "bounce/table.h5") as file:
+        assert file["runs/left"].attrs["unit"] == "J" and file["runs/left"][5] == float(rows[5]["left"])
+        assert file["runs/status"].asstr()[()].tolist() == ["done"] * 14 and file["points/left.mean"].shape == (6,)
+    print(f"ok  energy left over restitution: {worst:.4f} of all from e^2 at the most; errors against a reference")
+
+
+def check_ends(here):
+    """Runs that are done, refused, fail, crash, hang, and hang deaf: each a row with its sentence."""
+    cases = {"good": {}, "refused": {"time.end": -1}, "fails": {"grains.contact.linear.stiffness": 1, "time.step": "1 ms"},
+             "hangs": ENDLESS}
+    measure = [{"name": "front", "series": "runout.front"}]
+    path = write(here, "ends", set={"time.end": "4 ms"}, axes={"case": {"cases": cases}}, jobs=1, limit="1 s", measure=measure)
+    sweep(path, here / "ends")
+    rows = {row["case"]: row for row in table(here / "ends")}
+    ends = {case: (row["status"], row["exit"]) for case, row in rows.items()}
+    assert ends == {"good": ("done", "0"), "refused": ("refused", "2"), "fails": ("failed", "3"), "hangs": ("hung", "")}, ends
+    assert rows["good"]["message"].startswith("front: the series have no 'runout.front'; they have time, "), rows["good"]
+    assert rows["refused"]["message"] == "--set time.end=-1: error: scene: time.end is -1, must be between 0 and 1e12 s", rows["refused"]
+    assert rows["fails"]["message"].startswith("dem.observe, at t = ") and "too low" in rows["fails"]["message"]
+    assert rows["hangs"]["message"] == "not over within its limit of 1 s" and rows["hangs"]["steps"] == ""
+    assert 1 <= float(rows["hangs"]["cost.wall"]) < 4, rows["hangs"]["cost.wall"]
+    assert "4 of 4 runs are there already" in sweep(path, here / "ends")
+    assert "] failed: " in sweep(path, here / "ends", "--retry")
+    path.write_text(path.read_text().replace("limit: 1 s", "limit: 1.5 s"))
+    assert sweep(path, here / "ends").count("] hung: ") == 1  # more time is a reason to try again
+    deaf = write(here, "deaf", axes={"case": {"cases": {"hangs": cases["hangs"]}}}, limit="1 s")
+    sweep(deaf, here / "deaf", preexec_fn=lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN))
+    row = table(here / "deaf")[0]
+    assert row["status"] == "hung" and 5 < float(row["cost.wall"]) < 12, row
+    print("ok  done, refused, failed, hung, hung and deaf: each a row")
+
+
+def processes(out):
+    """Processes whose command names the folder."""
+    found = []
+    for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_bytes().split(b"\0")
+        except OSError:
+            continue
+        found += [int(path.parent.name)] * any(word.startswith(f"{out}/runs".encode()) for word in words)
+    return found
+
+
+def check_kills(here):
+    """Killed at moments drawn from a seed, a sweep leaves no run behind and comes to the table of one that was not."""
+    path = write(here, "kills", set={"time.end": "10 ms", "observe": ["energy"]}, jobs=2, repeats={"seeds": 2},
+                 axes={"speed": {"key": "grains.place.0.velocity.0", "random": {"from": "1 m/s", "to": "5 m/s", "law": "log", "n": 12}},
+                       "step": {"key": "time.step", "list": ["5e-6", "4e-6"]}},
+                 reference={"name": "fine", "set": {"time.step": "1e-6"}, "follows": ["speed"]},
+                 measure=[{"name": "left", "series": "energy.grains"}])
+    sweep(path, here / "whole", "--jobs", "1")
+    draw, runs = lab.seeded(), here / "killed/runs"
+    for number, kind in enumerate([signal.SIGKILL, signal.SIGINT, signal.SIGTERM] * 2):
+        process = subprocess.Popen(words_of(path, here / "killed"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while len(list(runs.glob("*.json"))) < 10 * number and process.poll() is None:
+            time.sleep(0.002)
+        time.sleep(draw.uniform(0, 0.1))
+        assert process.poll() is None, "the sweep was over before it was killed"
+        lab.stop(process, kind)
+        deadline = time.monotonic() + 5
+        while processes(here / "killed") and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert not processes(here / "killed"), "a run goes on without its sweep"
+    there = len(list((here / "killed/runs").glob("*.json")))
+    said = sweep(path, here / "killed")
+    assert made(said) + there == 72, (there, said)
+    assert results(here / "whole") == results(here / "killed"), "the table differs"
+    # standard errors of two seeds of grains that know no chance are 0, and fronts stand on clocks: the rest is the same too
+    assert results(here / "whole", "points") == results(here / "killed", "points")
+    assert not list((here / "killed").rglob("*.part")) and not list((here / "killed/runs").glob("*.err"))
+    assert all(row["speed"] and row["left.error"] if not row["model"] else True for row in table(here / "whole"))
+    print(f"ok  killed six times with {there} of 72 runs made: the same table")
+
+
+def check_again(here):
+    """What makes a run be made again: what the scene says, a file that it names, another program; not a comment."""
+    shutil.copy(TWO, here / "base.yaml")
+    text = (here / "base.yaml").read_text().split("  place:")
+    (here / "base.yaml").write_text(f"{text[0]}  file: grains.txt\n" + text[1][text[1].index("output:"):])
+    (here / "grains.txt").write_text("x y radius vx vy\n-0.0055 0 0.005 1 0\n0.0055 0 0.005 -1 0\n")
+    path = write(here, "again", base="base.yaml", set={"time.end": "1 ms"}, repeats={"seeds": 2})
+    out = here / "again"
+    assert made(sweep(path, out)) == 2 and made(sweep(path, out)) == 0
+    (here / "base.yaml").write_text("# a word\n" + (here / "base.yaml").read_text())
+    assert made(sweep(path, out)) == 0
+    (here / "base.yaml").write_text((here / "base.yaml").read_text().replace("restitution: 0.5", "restitution: 0.6"))
+    assert made(sweep(path, out)) == 2
+    (here / "grains.txt").write_text((here / "grains.txt").read_text().replace("-1 0", "-2 0"))
+    assert made(sweep(path, out)) == 2
+    other = here / "other"
+    other.mkdir()
+    shutil.copy(lab.QUERN, other / "quern")
+    shutil.copy(pathlib.Path(lab.QUERN).parent / "quern.built", other)
+    (other / "plugins").symlink_to(lab.PLUGINS)
+    moved = {"env": {**os.environ, "QUERN": str(other / "quern")}}
+    assert made(sweep(path, out, **moved)) == 0  # the same program elsewhere
+    with open(other / "quern", "ab") as file:
+        file.write(b"\0")
+    assert made(sweep(path, out, **moved)) == 2
+    shutil.rmtree(out / "runs" / table(out)[0]["run"])
+    assert made(sweep(path, out, **moved)) == 1
+    print("ok  made again for another scene, file, program or a lost folder alone")
+
+
+def check_samples(here):
+    """A sample: the same with a further axis beside it, even in its logarithm, drawn together with another."""
+    wide = {"key": "grains.contact.linear.stiffness", "random": {"from": "1e4 N/m", "to": "1e8 N/m", "law": "log", "n": 400}}
+    one = write(here, "one", axes={"stiffness": wide})
+    two = write(here, "two", axes={"end": {"key": "time.end", "random": {"from": "1 ms", "to": "2 ms", "n": 400, "seed": 9}}, "stiffness": wide})
+    sys.path.insert(0, str(lab.SOURCE / "python"))
+    from quern.points import jobs_of
+    from quern.study import read
+    first, second = ([dict(job.values) for job in jobs_of(read(path))] for path in (one, two))
+    assert [point["stiffness"] for point in first] == [point["stiffness"] for point in second] and len(second) == 400
+    import numpy
+    logs = numpy.log10([float(point["stiffness"].split()[0]) for point in first])
+    # mean and spread of even numbers between 4 and 8, of 400 draws; four standard errors
+    assert abs(logs.mean() - 6) < 4 * (4 / 12 ** 0.5) / 20 and abs(logs.std() / (4 / 12 ** 0.5) - 1) < 0.15, (logs.mean(), logs.std())
+    ends = numpy.array([float(point["end"].split()[0]) for point in second])
+    assert abs(numpy.corrcoef(ends, logs)[0, 1]) < 0.2
+    print(f"ok  samples: mean of the logarithm {logs.mean():.3f} of 6, spread {logs.std():.3f} of {4 / 12 ** 0.5:.3f}")
+
+
+def check_emit(here):
+    path = write(here, "emit", set={"time.end": "1 ms"}, repeats={"seeds": 3}, limit="10 min", jobs=2)
+    sweep(path, here / "own")
+    lines = subprocess.run(words_of(path, here / "theirs", "--emit", "parallel"), capture_output=True, text=True, check=True).stdout
+    assert len(lines.splitlines()) == 3 and not (here / "theirs").exists()
+    script = subprocess.run(words_of(path, here / "theirs", "--emit", "slurm"), capture_output=True, text=True, check=True).stdout
+    assert "#SBATCH --array=1-3%2\n" in script and "#SBATCH --time=11\n" in script and "#SBATCH --cpus-per-task=1\n" in script
+    ways = [["sh", "-c", f"for SLURM_ARRAY_TASK_ID in 1 2 3; do export SLURM_ARRAY_TASK_ID; sh {here}/job.sh || exit; done"]]
+    (here / "job.sh").write_text(script)
+    if shutil.which("parallel"):
+        ways.append(["parallel", "--jobs", "2"])
+    for way in ways:
+        shutil.rmtree(here / "theirs", ignore_errors=True)
+        subprocess.run(way, input=lines, text=True, check=True, timeout=120, env={**os.environ, "HOME": str(here)})
+        assert made(sweep(path, here / "theirs", "--table")) == 0
+        assert results(here / "own") == results(here / "theirs"), way
+    print(f"ok  the same table by {'GNU parallel' if len(ways) > 1 else 'no GNU parallel, which is not there,'} and as a slurm array would")
+
+
+def check_lock(here):
+    path = write(here, "long", set=ENDLESS, limit="20 s")
+    first = subprocess.Popen(words_of(path, here / "long"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    lab.wait_for(here / "long/.sweep.lock", first)
+    while not processes(here / "long"):
+        time.sleep(0.01)
+    assert "another sweep is at work" in sweep(path, here / "long", status=4)
+    first.send_signal(signal.SIGINT)
+    assert first.wait(timeout=20) == 130 and table(here / "long")[0]["status"] == "missing"
+    print("ok  one sweep in a folder; an interrupted one ends with 130 and its table")
+
+
+def check_settled(here):
+    """Points that settle alike settle once: the cache has one state for each seed."""
+    small = dict(one.removeprefix("--set=").split("=", 1) for one in lab.SMALL["column"] if "oracle" not in one)
+    small |= {"grains.fill.1.region.box.upper": "[0.039, 0.08]", "grains.settle.step": "0.05"}  # long enough to be kept
+    path = write(here, "settled", base=lab.scene("column"), set={**{key: yaml.safe_load(value) for key, value in small.items()}, "time.end": "1 ms"},
+                 axes={"depth": {"key": "hybrid.oracle.0.packing_fraction.depth", "list": ["12 mm", "16 mm", "20 mm"]}}, repeats={"seeds": 2}, jobs=1)
+    sweep(path, here / "settled", env={**os.environ, "QUERN_CACHE": str(here / "cache")})
+    rows = table(here / "settled")
+    logs = [(here / "settled/runs" / row["run"] / "log.txt").read_text() for row in rows]
+    assert [row["status"] for row in rows] == ["done"] * 6 and sum("settled already" in log for log in logs) == 4, rows
+    print("ok  six runs of two seeds settle twice")
+
+
+def check_overhead(here):
+    path = write(here, "many", set={"time.end": "1 ms"}, repeats={"seeds": 200}, jobs=1)
+    began = time.monotonic()
+    sweep(path, here / "many", "--quiet")
+    whole = time.monotonic() - began
+    rows = table(here / "many")
+    assert len(rows) == 200 and {row["status"] for row in rows} == {"done"}
+    beside = (whole - sum(float(row["cost.wall"]) for row in rows)) / 200
+    alone = []
+    for number in range(20):
+        began = time.monotonic()
+        lab.run("two_grains", here / f"alone{number}", "--set=time.end=1 ms", f"--set=seed={number}")
+        alone.append(time.monotonic() - began)
+    bare = sum(alone) / len(alone)
+    print(f"ok  200 runs: {1e3 * whole / 200:.1f} ms each, {1e3 * beside:.1f} ms of it beside the run; started by hand a run takes {1e3 * bare:.1f} ms")
+    assert beside < 0.05 and whole / 200 - bare < 0.05, (beside, whole / 200, bare)
+
+
+with lab.workplace() as name:
+    for check in (check_physics, check_ends, check_kills, check_again, check_samples, check_emit, check_lock, check_settled, check_overhead):
+        place = pathlib.Path(name) / check.__name__
+        place.mkdir()
+        check(place)
