@@ -123,6 +123,11 @@ static void provenance(quern_h5 *h, quern_run *run) {
 	quern_h5_integer(h, h->file, "step", run->clock.step);
 	quern_h5_integer(h, h->file, "dimension", run->scene->general.dimension);
 	quern_h5_text(h, h->file, "name", run->scene->general.name);
+	quern_text sections = { 0 };
+	for (size_t i = 0; i < run->scene->n_sections; i++)
+		quern_text_add(&sections, "%s%s ", i ? "" : " ", run->scene->sections[i].name);
+	quern_h5_text(h, h->file, "sections", quern_text_string(&sections));
+	quern_text_finish(&sections);
 	quern_h5_text(h, h->file, "program", "quern " QUERN_VERSION);
 	quern_h5_text(h, h->file, "compiler", QUERN_COMPILER);
 	quern_h5_text(h, h->file, "flags", QUERN_FLAGS);

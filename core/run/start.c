@@ -53,6 +53,13 @@ static bool parameters_hold(starting *s, const quern_node *was, const quern_node
 	return true;
 }
 
+static bool says_section(const quern_start_file *f, const char *name) {
+	char *word = quern_format(" %s ", name);
+	const bool says = strstr(f->sections, word);
+	free(word);
+	return says;
+}
+
 static bool scenes_fit(starting *s) {
 	const quern_node *root = s->file.scene->root;
 	const int32_t dimension = s->run->scene->general.dimension;
@@ -61,14 +68,15 @@ static bool scenes_fit(starting *s) {
 			(long long)s->file.dimension, dimension);
 		return false;
 	}
-	if (!root || root->kind != QUERN_NODE_MAP) return true;
+	const bool known = root && root->kind == QUERN_NODE_MAP;
 	for (const char *const *name = s->section->ops->unlike; name && *name; name++)
-		if (quern_node_find(root, *name)) {
+		if (says_section(&s->file, *name) || (known && quern_node_find(root, *name))) {
 			quern_text_add(&s->why,
 				"it is of a run with a section %s, with which %s shared what it had: start from a run without",
 				*name, s->section->name);
 			return false;
 		}
+	if (!known) return true;
 	quern_node *own = quern_run_tree(s->run);
 	const bool good =
 		parameters_hold(s, quern_node_find(root, s->section->name), quern_node_find(own, s->section->name));
@@ -161,6 +169,19 @@ static bool all_essential(starting *s, hid_t group, int set) {
 	return true;
 }
 
+/* Memory is taken only for what the file does hold. */
+static bool sizes_hold(starting *s, hid_t group, int set, uint32_t n) {
+	const quern_store *store = &s->run->plan->store;
+	for (size_t k = 0; k < store->n_fields; k++) {
+		const quern_field *field = &store->fields[k];
+		if (!is_meant(field, set) || !is_given(s, group, k) ||
+			quern_start_file_holds(&s->file, group, field, n))
+			continue;
+		return quern_text_add(&s->why, "it is damaged: %s does not fit its set", field->name), false;
+	}
+	return true;
+}
+
 static bool read_fields(starting *s, hid_t group, int set, uint32_t n) {
 	quern_store *store = &s->run->plan->store;
 	for (size_t k = 0; k < store->n_fields; k++) {
@@ -228,10 +249,11 @@ static bool take_set(starting *s, int set, bool first) {
 		quern_text_finish(&s->why);
 		quern_text_add(&s->lost, "%sall %s", s->lost.length ? ", " : "", quern_set_plural(&store->sets[set]));
 	}
-	bool good = there || !first;
-	if (there && quern_store_fill(store, set, n) != QUERN_OK)
+	bool good = (there || !first) && (!there || sizes_hold(s, group, set, n));
+	if (there && good && quern_store_fill(store, set, n) != QUERN_OK)
 		good = false, quern_text_add(&s->why, "there is no memory for %u entries", n);
-	else if (there) good = read_fields(s, group, set, n) && number(s, set, next_id) && fields_hold(s, set);
+	else if (there && good)
+		good = read_fields(s, group, set, n) && number(s, set, next_id) && fields_hold(s, set);
 	if (group >= 0) H5Gclose(group);
 	return good;
 }
@@ -273,12 +295,42 @@ static const char **groups_of(const starting *s) {
 	return names;
 }
 
+static bool is_same(const quern_node *a, const quern_node *b) {
+	if (!a || !b || a->kind != b->kind) return a == b;
+	if (a->kind == QUERN_NODE_SCALAR) return !strcmp(a->text, b->text);
+	if (a->n != b->n) return false;
+	for (size_t i = 0; i < a->n; i++)
+		if ((a->kind == QUERN_NODE_MAP && strcmp(a->entries[i].key, b->entries[i].key) != 0) ||
+			!is_same(a->entries[i].value, b->entries[i].value))
+			return false;
+	return true;
+}
+
+/* Whether what stands in the slots of this section that hold a plugin is what stood there in the run. */
+static bool is_as_it_was(const starting *s, const quern_node *own, const char *id) {
+	const quern_node *was =
+		s->file.scene->root ? quern_node_find(s->file.scene->root, s->section->name) : NULL;
+	bool same = was;
+	for (size_t k = 0; k < s->section->n_slots && same; k++) {
+		const quern_slot_use *use = &s->section->slots[k];
+		for (size_t j = 0; j < use->n && same; j++)
+			if (!strcmp(use->filling[j].instance->file->plugin.id, id))
+				same = is_same(quern_node_find(own, use->slot->name), quern_node_find(was, use->slot->name));
+	}
+	return same;
+}
+
 /* Frames do not say who took part. */
 static void note_plugins(starting *s) {
 	bool *knows = s->run->taken + s->run->plan->store.n_fields;
 	const quern_loader *loader = s->run->scene->loader;
-	for (size_t i = 0; i < quern_loader_count(loader) && !s->file.frame; i++)
-		knows[i] = quern_start_file_knows(&s->file, -1, NULL, quern_loader_at(loader, i)->plugin.id);
+	quern_node *root = quern_run_tree(s->run);
+	const quern_node *own = quern_node_find(root, s->section->name);
+	for (size_t i = 0; i < quern_loader_count(loader) && !s->file.frame && own; i++) {
+		const char *id = quern_loader_at(loader, i)->plugin.id;
+		knows[i] = quern_start_file_knows(&s->file, -1, NULL, id) && is_as_it_was(s, own, id);
+	}
+	quern_node_destroy(root);
 }
 
 static quern_status start(quern_run *run, const quern_section *section, const char *path, bool rest) {

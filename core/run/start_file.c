@@ -22,6 +22,15 @@ static bool is_plain_hdf5(const char *path) {
 	return plain;
 }
 
+static bool read_head(quern_start_file *f) {
+	const hid_t file = f->h5.file;
+	char is[32];
+	quern_h5_read_text(file, "sections", f->sections, sizeof f->sections); /* older ones do not say */
+	return quern_h5_read_text(file, "format", is, sizeof is) && !strcmp(is, "quern-frame 1") &&
+		   quern_h5_read_integer(file, "dimension", &f->dimension) &&
+		   quern_h5_read_number(file, "time", &f->time);
+}
+
 typedef struct {
 	const char *path, *const *sets;
 } trial;
@@ -47,6 +56,7 @@ static void try_reading(void *arg) {
 	const trial *t = arg;
 	if (!freopen("/dev/null", "w", stderr)) return;
 	const hid_t file = H5Fopen(t->path, H5F_ACC_RDONLY, H5P_DEFAULT);
+	if (file >= 0) read_head(&(quern_start_file) { .h5 = { .file = file } });
 	for (const char *const *set = t->sets; file >= 0 && *set; set++) {
 		const hid_t group = quern_h5_find(file, *set);
 		if (group < 0) continue;
@@ -65,9 +75,12 @@ static bool can_be_read(const char *path, const char *const *sets, quern_text *w
 	return false;
 }
 
-/* A frame of a run lies in RUN/frames. */
+/* A frame of a run lies in RUN/frames; elsewhere it is a copy, and what lies beside that is another scene. */
 static quern_tree *scene_beside(const char *path, quern_report *report) {
+	static const char own[] = "/frames";
 	const char *slash = strrchr(path, '/');
+	const size_t n = slash ? (size_t)(slash - path) : 0;
+	if (n < sizeof own - 1 || strncmp(slash - (sizeof own - 1), own, sizeof own - 1) != 0) return NULL;
 	char *name = quern_format("%.*s/../scene.yaml", slash ? (int)(slash - path) : 1, slash ? path : ".");
 	quern_tree *tree = access(name, R_OK) ? NULL : quern_tree_read(name, report);
 	free(name);
@@ -75,14 +88,10 @@ static quern_tree *scene_beside(const char *path, quern_report *report) {
 }
 
 static bool open_frame(quern_start_file *f, const char *path, const char *const *sets, quern_text *why) {
-	char is[32];
 	f->frame = true;
 	if (!can_be_read(path, sets, why)) return false;
 	f->h5.file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-	const bool good = f->h5.file >= 0 && quern_h5_read_text(f->h5.file, "format", is, sizeof is) &&
-					  !strcmp(is, "quern-frame 1") &&
-					  quern_h5_read_integer(f->h5.file, "dimension", &f->dimension) &&
-					  quern_h5_read_number(f->h5.file, "time", &f->time);
+	const bool good = f->h5.file >= 0 && read_head(f);
 	if (!good) return quern_text_add(why, "it is no frame of this program, or it is damaged"), false;
 	quern_report *report = quern_report_create();
 	f->scene = scene_beside(path, report);
@@ -150,9 +159,11 @@ static const char *name_of(const quern_field *field) { return strchr(field->name
 
 /* Every set that is shown shows where its entries are or what they point at: any of its fields says how many there are. */
 static herr_t note_rows(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
-	size_t columns;
+	size_t rows, columns;
 	(void)info;
-	return quern_h5_read_size(group, name, arg, &columns);
+	if (!quern_h5_read_size(group, name, &rows, &columns)) return 0;
+	*(size_t *)arg = rows;
+	return 1;
 }
 
 hid_t quern_start_file_set(
@@ -183,6 +194,12 @@ static const char *dataset(const quern_start_file *f, const quern_field *field, 
 bool quern_start_file_has(const quern_start_file *f, hid_t group, const quern_field *field) {
 	char name[64];
 	return H5Lexists(group, dataset(f, field, 0, name), H5P_DEFAULT) > 0;
+}
+
+bool quern_start_file_holds(const quern_start_file *f, hid_t group, const quern_field *field, uint32_t n) {
+	char name[64];
+	size_t rows, columns;
+	return quern_h5_read_size(group, dataset(f, field, 0, name), &rows, &columns) && rows == n;
 }
 
 /* Vectors have three columns in a frame. */

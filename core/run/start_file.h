@@ -8,7 +8,8 @@ typedef struct quern_start_file {
 	quern_h5 h5;
 	bool frame;
 	int64_t dimension;
-	double time; /* s */
+	double time;        /* s */
+	char sections[400]; /* of a frame: sections of its scene, each between blanks; "": it does not say */
 	quern_tree
 		*scene; /* of the run, resolved; of a frame the one beside it: without a root where there is none */
 } quern_start_file;
@@ -22,6 +23,8 @@ void quern_start_file_finish(quern_start_file *);
 hid_t quern_start_file_set(const quern_start_file *, const quern_set_store *, uint32_t *n, int64_t *next_id);
 /* Whether a field stands in its set's group. */
 bool quern_start_file_has(const quern_start_file *, hid_t group, const quern_field *);
+/* Whether it stands there with n entries, as far as can be told without reading them. */
+bool quern_start_file_holds(const quern_start_file *, hid_t group, const quern_field *, uint32_t n);
 /* Reads n entries of it into its columns; false if it is of another type or size. */
 bool quern_start_file_read(const quern_start_file *, hid_t group, const quern_field *, uint32_t n);
 /* Whether a plugin took part in the run, or made the field of the frame. */

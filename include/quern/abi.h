@@ -327,7 +327,7 @@ typedef struct quern_host {
 	 * like its own from elsewhere. What a solver itself sees to, such as mass and velocity, it states to be kept. */
 	void (*give)(quern_run *, const char *set, uint32_t from, int32_t to, quern_real part, quern_real share);
 	/* since 2.1 [stage] In the set-up: whether a field holds what another run's state had of it, or whether that run had
-	 * a plugin of this ID; false where nobody can tell, as of a frame's plugins. See quern_solver_ops.from. */
+	 * a plugin of this ID with the same parameters; false where nobody can tell, as of a frame's plugins. See quern_solver_ops.from. */
 	bool (*taken)(quern_run *, const char *name);
 } quern_host;
 

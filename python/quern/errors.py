@@ -55,4 +55,5 @@ def share_on_front(costs: list[np.ndarray], runs: list[np.ndarray], twins: list[
         mean_cost[:, k] = np.mean(cost[picks], axis=1)
         often = np.array([np.bincount(pick, minlength=n) for pick in picks]) / n
         off[:, k] = np.sqrt(np.mean((often @ (run - twin)) ** 2, axis=1))
-    return np.mean([front(c, o) for c, o in zip(mean_cost, off)], axis=0)
+    share = np.mean([front(c, o) for c, o in zip(mean_cost, off)], axis=0)
+    return np.where([len(cost) > 1 for cost in costs], share, np.nan)  # of one seed there is nothing to resample

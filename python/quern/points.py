@@ -72,14 +72,22 @@ def words_of(text: str) -> list[str]:
         return [text]
 
 
+def file_meant(path: pathlib.Path) -> pathlib.Path:
+    """The file itself; of a run, RUN or RUN:FRAME, its checkpoint or that frame."""
+    run, _, frame = str(path).rpartition(":")
+    if run and frame.isdecimal() and not path.exists():
+        return pathlib.Path(run) / "frames" / f"{int(frame):06d}.h5"
+    return path / "checkpoint.h5" if path.is_dir() else path
+
+
 def files_named(words: list[str], folder: pathlib.Path) -> dict[str, str]:
-    """Every word that is the path of a file, with the hash of what is in it."""
+    """Every word that is the path of a file or of a run, with the hash of what is in it."""
     found = {}
     for word in words:
         path = word.split(" ", 3)[-1]
         with contextlib.suppress(OSError, ValueError):
-            if 0 < len(path) < 4096 and (folder / path).is_file():
-                found[path] = digest((folder / path).read_bytes())
+            if 0 < len(path) < 4096 and file_meant(folder / path).is_file():
+                found[path] = digest(file_meant(folder / path).read_bytes())
     return found
 
 

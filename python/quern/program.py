@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The program quern: where it is, how it is called, what it says when it fails."""
+import json
 import os
 import pathlib
 import re
@@ -32,17 +33,21 @@ def find() -> str:
     raise QuernError("the program quern is not found; name it in the environment variable QUERN, or put its folder into PATH")
 
 
-def spelt(value: Any) -> str:
-    """A value as YAML that stands in one line: what --set takes."""
+def spelt(value: Any, within: bool = False) -> str:
+    """A value as YAML that stands in one line: what --set takes; `within` a list or a mapping some texts need quotes."""
+    if hasattr(value, "tolist"):  # of numpy
+        value = value.tolist()
     if value is None:
         return "null"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {spelt(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, (list, tuple)) or hasattr(value, "tolist") and getattr(value, "ndim", 0):
-        return "[" + ", ".join(spelt(item) for item in value) + "]"
-    return repr(float(value)) if isinstance(value, float) else str(value)
+        return "{" + ", ".join(f"{key}: {spelt(item, True)}" for key, item in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(spelt(item, True) for item in value) + "]"
+    if isinstance(value, str) and within and re.search(r"[,\[\]{}\n]", value):
+        return json.dumps(value)
+    return repr(value) if isinstance(value, float) else str(value)
 
 
 def set_options(sets: Sets | None) -> list[str]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """YAML with the place of everything: faults are collected, each with line and column, and told all at once."""
 import difflib
+import json
 import math
 import re
 
@@ -96,13 +97,15 @@ def nearest(word: str, known, otherwise: str = "keys: ") -> str:
     return f"; did you mean '{near[0]}'?" if near else f"; {otherwise}{', '.join(known)}" if otherwise else ""
 
 
-def flow(node: yaml.Node) -> str:
-    """A value in one line, as --set takes it, its words as they stand in the file."""
+def flow(node: yaml.Node, within: bool = False) -> str:
+    """A value in one line, as --set takes it, its words as they stand in the file; `within` a list or a mapping some need quotes."""
     if isinstance(node, yaml.SequenceNode):
-        return "[" + ", ".join(map(flow, node.value)) + "]"
+        return "[" + ", ".join(flow(item, True) for item in node.value) + "]"
     if isinstance(node, yaml.MappingNode):
-        return "{" + ", ".join(f"{flow(key)}: {flow(value)}" for key, value in node.value) + "}"
-    if node.style in ("'", '"', "|", ">"):
+        return "{" + ", ".join(f"{flow(key, True)}: {flow(value, True)}" for key, value in node.value) + "}"
+    if "\n" in node.value:
+        return json.dumps(node.value)
+    if node.style in ("'", '"', "|", ">") or within and re.search(r"[,\[\]{}]", node.value):
         return "'" + node.value.replace("'", "''") + "'"
     return node.value or "null"
 

@@ -17,7 +17,7 @@ SECONDS = {"": 1, "s": 1, "min": 60, "h": 3600, "d": 86400}
 MOST_RUNS = 100_000
 # Columns that every table has.
 RESULTS = ("steps", "substeps", "settle_steps", "time_end", "grains", "points", "mass_defect", "discrete_share", "energy")
-RESERVED = ("run", "point", "model", "seed", "status", "exit", "message", "scene_hash", *RESULTS)
+RESERVED = ("run", "point", "model", "seed", "status", "exit", "message", "scene_hash", "runs", "done", *RESULTS)
 
 
 @dataclass(frozen=True)
@@ -249,6 +249,8 @@ def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
         reader.fault(parts["study"], f"study must be 1, the only form there is, not {kind(parts['study'])}")
     study.base = read_base(reader, parts["base"], path.parent) if "base" in parts else path
     study.name = reader.text(parts["name"], "name") if "name" in parts else path.stem
+    if "name" in parts and study.name and not re.fullmatch(r"\w[\w.-]*", study.name):
+        reader.fault(parts["name"], f"name: '{study.name}' must be a word of letters, digits, '.', '-' and '_': a folder is called so")
     study.sets = read_sets(reader, parts["set"], "set") if "set" in parts else ()
     study.axes = read_axes(reader, parts["axes"]) if "axes" in parts else []
     study.seeds = read_seeds(reader, parts["repeats"]) if "repeats" in parts else []

@@ -74,14 +74,18 @@ def at_a_time(study: Study, wanted: int | None) -> int:
 
 
 @contextlib.contextmanager
-def held(folder: pathlib.Path):
-    """One sweep at a time works in a folder; the lock is the kernel's and goes with the process."""
+def held(folder: pathlib.Path, key: str = ""):
+    """One sweep at a time works in a folder, or several that make single runs, each run by one of them: whoever wants the same waits. The
+    lock is the kernel's and goes with the process."""
     folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / ".sweep.lock", "w") as file:
+    with open(folder / ".sweep.lock", "w") as file, contextlib.ExitStack() as more:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, (fcntl.LOCK_SH if key else fcntl.LOCK_EX) | fcntl.LOCK_NB)
         except OSError:
             raise QuernError(f"another sweep is at work in {folder}; wait for it, or give another folder by -o", 4) from None
+        if key:
+            (folder / "runs").mkdir(exist_ok=True)
+            fcntl.flock(more.enter_context(open(folder / "runs" / f"{key}.lock", "w")), fcntl.LOCK_EX)
         yield
 
 
@@ -110,8 +114,9 @@ def sweep(study: Study, options: argparse.Namespace, stop: int) -> int:
     if options.only is not None:
         if not 1 <= options.only <= len(jobs):
             raise QuernError(f"--only {options.only}: the study has runs 1 to {len(jobs)}")
-        folder.mkdir(parents=True, exist_ok=True)
-        return 0 if make(study, [jobs[options.only - 1]], folder, options, stop) else 130
+        job = jobs[options.only - 1]
+        with held(folder, job.key):
+            return 0 if make(study, [job], folder, options, stop) else 130
     with held(folder):
         whole = options.table or make(study, jobs, folder, options, stop)
         rows = write_tables(study, jobs, folder)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The runs of a study at work: started as there is room, ended at their limit, recorded when they are over."""
+import contextlib
 import ctypes
 import json
 import math
@@ -59,6 +60,7 @@ def end_with_parent() -> None:
 
 def start(study: Study, job: Job, folder: pathlib.Path) -> Active:
     runs = folder / "runs"
+    record_path(folder, job.key).unlink(missing_ok=True)  # what it says will not be true of what stands there
     command = [find(), "run", str(study.base.resolve()), "--quiet", "--force", "--threads", str(study.threads),
                "-o", str(runs / job.key), *set_options(job.sets)]
     with open(runs / f"{job.key}.err", "wb") as said:
@@ -68,9 +70,10 @@ def start(study: Study, job: Job, folder: pathlib.Path) -> Active:
     return Active(job, process, now, now + study.limit)
 
 
-def remind(active: Active) -> None:
-    """At its limit a run is asked to end, then made to."""
-    active.process.send_signal(signal.SIGKILL if active.asked else signal.SIGTERM)
+def remind(fd: int, active: Active) -> None:
+    """At its limit a run is asked to end, then made to; by its descriptor, since it may just have ended by itself."""
+    with contextlib.suppress(ProcessLookupError):
+        signal.pidfd_send_signal(fd, signal.SIGKILL if active.asked else signal.SIGTERM)
     active.asked, active.ends = True, time.monotonic() + GRACE
 
 
@@ -158,9 +161,9 @@ def run_all(study: Study, jobs: list[Job], folder: pathlib.Path, at_a_time: int,
                 largest = max(largest, record["cost"]["memory"])
                 whole &= record["status"] != "interrupted"
                 say(one.job, record)
-            for one in active.values():
+            for fd, one in active.items():
                 if time.monotonic() >= one.ends:
-                    remind(one)
+                    remind(fd, one)
     finally:
         for fd, one in active.items():
             one.process.kill()

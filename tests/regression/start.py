@@ -214,6 +214,20 @@ def changes(place):
     assert numpy.abs(a - b).max() < 1e-12 * numpy.abs(b).max()
 
 
+def stiffens(place):
+    """The same material with another stiffness makes its state anew: the stress is that of the run, and nothing jumps."""
+    text = started(layer(2, PLASTIC), "plastic", 0.0625, "[0, -10]")
+    text, count = re.subn(r"bulk_modulus: (\w+)", lambda found: f"bulk_modulus: {2 * float(found[1]):g}", text)
+    assert count == 1, text
+    lab.run(write(place, "stiffer", text), place / "stiffer", "--set=output.every=1 ms", "--set=time.end=2 ms")
+    assert "the state of material.drucker_prager follows from the stress alone" in (place / "stiffer" / "log.txt").read_text()
+    was = numpy.abs(table(lab.frames(place / "plastic")[-1], "points", "stress")).max()
+    for frame in lab.frames(place / "stiffer")[:2]:
+        now = numpy.abs(table(frame, "points", "stress")).max()
+        print(f"twice as stiff: the largest stress is {now / was:.3f} of that of the run at {frame.name}")
+        assert 0.9 < now / was < 1.1, "the stress has jumped"
+
+
 def becomes_hybrid(place):
     """A hybrid starts from grains that a run of grains has left, and keeps its ledger closed."""
     column = [*lab.SMALL["column"], "--set=time.end=5 ms"]
@@ -223,6 +237,15 @@ def becomes_hybrid(place):
     print(f"hybrid: {found['grains']} grains and {found['points']} points, mass {found['mass_defect']:.2g}")
     assert found["points"] > 0 and abs(found["mass_defect"]) < 1e-12
     said = lab.run("column", place / "again", *column, f"--set=grains.from={place / 'hybrid'}", "--set=grains.fill=null", status=2)
+    assert "it is of a run with a section hybrid" in said, said
+    # from a frame, whose copy lies beside the hybrid's own scene; and a hybrid's own frame, wherever it lies
+    frame = f"--set=grains.from={place / 'grains'}:0"
+    lab.run("column", place / "shown", *column, frame, "--set=grains.fill=null")
+    lab.run(place / "shown" / "scene.yaml", place / "shown_again")
+    lab.same(place / "shown", place / "shown_again", "a hybrid from a frame, once more from its own scene", checkpoint=False)
+    copy = place / "moved.h5"
+    shutil.copy(lab.frames(place / "hybrid")[-1], copy)
+    said = lab.run("column", place / "again", *column, f"--set=grains.from={copy}", "--set=grains.fill=null", status=2)
     assert "it is of a run with a section hybrid" in said, said
 
 
@@ -356,5 +379,5 @@ def hostile(place):
 
 if __name__ == "__main__":
     with lab.workplace() as name:
-        for test in (grains_tilt, layers_tilt, lasts, history_counts, changes, becomes_hybrid, is_fast, what_does_not_fit, hostile):
+        for test in (grains_tilt, layers_tilt, lasts, history_counts, changes, stiffens, becomes_hybrid, is_fast, what_does_not_fit, hostile):
             test(pathlib.Path(name))
