@@ -70,7 +70,7 @@ static bool can_be_read(const char *path, const char *const *sets, quern_text *w
 	trial t = { path, sets };
 	if (quern_child_is_one()) return true;
 	const quern_child how = quern_child_run(try_reading, &t, SECONDS);
-	if (how.end != QUERN_CHILD_CRASHED && how.end != QUERN_CHILD_LATE) return true;
+	if (how.end == QUERN_CHILD_DONE || how.end == QUERN_CHILD_NONE) return true;
 	quern_text_add(why, "it is damaged: the library that reads it does not come to an end");
 	return false;
 }
