@@ -1,59 +1,107 @@
 # SPDX-License-Identifier: MIT
 """How far a setting ends from its reference, how sure that is, and which settings are worth their cost.
 
-A measure is one number a run or a row of numbers over time; below, `runs` and `twins` have a row for each seed, the same seeds, and
-a column for each time. What is judged is the mean over seeds, since single runs of grains differ by chance."""
+A measure is one number a run or a row of numbers, over time or over places; below, `runs` and `twins` have a row for each seed, the same
+seeds, and a column for each number. What is judged is the mean over seeds, since single runs of grains differ by chance.
+
+By `kind`, the size of a difference d from a reference R is
+- rms: the root of the mean square of d, of one number its amount;
+- relative: that over the same of R;
+- share: the sum of |d| over the sum of |R|;
+- distance: the largest |d|, which between distribution functions is Kolmogorov and Smirnov's."""
 import numpy as np
 
+KINDS = ("rms", "relative", "share", "distance")
+SHARES = ("relative", "share")  # of the reference
+RESAMPLES = 1000
+AT_ONCE = 2_000_000  # numbers of resamples that are held in memory together
 
-def norm(difference: np.ndarray) -> float:
-    """Root of the mean square over time; of one number its amount."""
-    return float(np.sqrt(np.mean(difference ** 2, axis=-1)))
+
+def size(x: np.ndarray, kind: str) -> np.ndarray:
+    """Of each row."""
+    if kind == "share":
+        return np.sum(np.abs(x), axis=-1)
+    return np.max(np.abs(x), axis=-1) if kind == "distance" else np.sqrt(np.mean(x ** 2, axis=-1))
 
 
-def error(runs: np.ndarray, twins: np.ndarray) -> float:
+def slope(x: np.ndarray, kind: str) -> np.ndarray:
+    """How fast the size of a row grows with each of its numbers."""
+    if kind == "share":
+        return np.sign(x)
+    if kind == "distance":
+        return np.where(np.arange(len(x)) == np.argmax(np.abs(x)), np.sign(x), 0)
+    return x / (len(x) * size(x, kind))
+
+
+def norm(difference: np.ndarray, reference: np.ndarray, kind: str) -> np.ndarray:
+    """Of each row; NaN for a share of a reference that is 0."""
+    if kind not in SHARES:
+        return size(difference, kind)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = size(difference, kind) / size(reference, kind)
+    return np.where(np.isfinite(found), found, np.nan)
+
+
+def error(runs: np.ndarray, twins: np.ndarray, kind: str = "rms") -> float:
     """Norm of the difference of the means."""
-    return norm(np.mean(runs - twins, axis=0))
+    return float(norm(np.mean(runs - twins, axis=0), np.mean(twins, axis=0), kind))
 
 
-def standard_error(runs: np.ndarray, twins: np.ndarray) -> float:
-    """Of that error, to first order: each seed moves it by the mean over time of (mean difference)(its own deviation) over the
-    error. Pairs of one seed began alike, so that what they have in common falls out. NaN for one seed, or with no difference at all."""
+def standard_error(runs: np.ndarray, twins: np.ndarray, kind: str = "rms") -> float:
+    """Of that error, to first order: each seed moves it by its own deviation from the mean difference, along the slope of the norm; and
+    where the error is a share, by its twin's deviation from the reference's mean as well. Pairs of one seed began alike, so that what
+    they have in common falls out. NaN for one seed, or with no difference at all."""
     pairs = runs - twins
     n, mean = len(pairs), np.mean(pairs, axis=0)
-    size = norm(mean)
-    if n < 2 or size == 0:
+    if n < 2 or size(mean, kind) == 0:
         return float("nan")
-    moved = np.mean((pairs - mean) * mean, axis=-1) / size
+    moved = np.sum((pairs - mean) * slope(mean, kind), axis=-1)
+    if kind in SHARES:
+        reference = np.mean(twins, axis=0)
+        whole = size(reference, kind)
+        if whole == 0:
+            return float("nan")
+        moved = (moved - size(mean, kind) / whole * np.sum((twins - reference) * slope(reference, kind), axis=-1)) / whole
     return float(np.std(moved, ddof=1) / np.sqrt(n))
 
 
-def scatter(twins: np.ndarray) -> float:
-    """How much runs of the reference differ among themselves: their standard deviation over seeds, its norm over time."""
-    return norm(np.std(twins, axis=0, ddof=1)) if len(twins) > 1 else float("nan")
+def scatter(twins: np.ndarray, kind: str = "rms") -> float:
+    """How much runs of the reference differ among themselves: their standard deviation over seeds, its norm."""
+    return float(norm(np.std(twins, axis=0, ddof=1), np.mean(twins, axis=0), kind)) if len(twins) > 1 else float("nan")
 
 
 def front(cost: np.ndarray, off: np.ndarray) -> np.ndarray:
-    """True for points that no other one beats: none is at most as costly and at most as wrong, and better in one of them."""
-    order = np.lexsort((off, cost))
+    """True for points that no other one beats: none is at most as costly and at most as wrong, and better in one of them. What is NaN is
+    unknown: such a point is not there, and beats none."""
+    on = np.zeros(len(cost), bool)
+    known = np.flatnonzero(~(np.isnan(cost) | np.isnan(off)))
+    order = known[np.lexsort((off[known], cost[known]))]
     c, o = cost[order], off[order]
     first = np.searchsorted(c, c, "left")  # of those that cost as much
     before = np.where(first > 0, np.minimum.accumulate(o)[first - 1], np.inf)
-    on = np.empty(len(cost), bool)
     on[order] = (o == o[first]) & (o[first] < before)
     return on
 
 
-def share_on_front(costs: list[np.ndarray], runs: list[np.ndarray], twins: list[np.ndarray], resamples: int = 1000, seed: int = 1) -> np.ndarray:
-    """For each point, in which share of resamples of its seeds it is on the front. Points of equally many seeds share their draws, so
-    that a reference which is off for one is off for all."""
-    draws = np.random.Generator(np.random.PCG64(seed)).random((resamples, max(len(cost) for cost in costs)))
-    mean_cost, off = np.empty((2, resamples, len(costs)))
-    for k, (cost, run, twin) in enumerate(zip(costs, runs, twins)):
-        n = len(cost)
-        picks = (draws[:, :n] * n).astype(int)
-        mean_cost[:, k] = np.mean(cost[picks], axis=1)
-        often = np.array([np.bincount(pick, minlength=n) for pick in picks]) / n
-        off[:, k] = np.sqrt(np.mean((often @ (run - twin)) ** 2, axis=1))
-    share = np.mean([front(c, o) for c, o in zip(mean_cost, off)], axis=0)
+def share_on_front(seeds: list[list], costs: list[np.ndarray], runs: list[np.ndarray], twins: list[np.ndarray], kind: str = "rms",
+                   resamples: int = RESAMPLES, seed: int = 1) -> np.ndarray:
+    """For each point, in which share of resamples of the seeds it is on the front. `seeds`: those of each point, in the order of its
+    rows. All points share the draws, so that a reference which is off for one is off for all; a point that lacks a seed goes without it, and is not
+    there in a resample that has none of its seeds."""
+    every = list(dict.fromkeys(one for own in seeds for one in own))
+    draws = np.random.Generator(np.random.PCG64(seed)).integers(0, len(every), (resamples, len(every)))
+    often = np.array([np.bincount(pick, minlength=len(every)) for pick in draws], dtype=float)
+    mean_cost, off = np.full((2, resamples, len(costs)), np.nan)
+    for k, (own, cost, run, twin) in enumerate(zip(seeds, costs, runs, twins)):
+        weight = often[:, [every.index(one) for one in own]]
+        there = np.flatnonzero(weight.sum(axis=1))
+        weight = weight[there] / weight[there].sum(axis=1, keepdims=True)
+        mean_cost[there, k] = weight @ cost
+        step = max(1, AT_ONCE // run.shape[1])
+        for a in range(0, len(there), step):
+            some = weight[a:a + step]
+            off[there[a:a + step], k] = norm(some @ (run - twin), some @ twin, kind)
+    on = np.array([front(c, o) for c, o in zip(mean_cost, off)])
+    known = ~np.isnan(mean_cost)
+    share = on.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     return np.where([len(cost) > 1 for cost in costs], share, np.nan)  # of one seed there is nothing to resample

@@ -45,7 +45,7 @@ def jobs_of(study: Study) -> list[Job]:
     """The runs of the reference, then those of the points, seeds innermost: they settle for those that come after."""
     scene = scene_digest(study.base)
     found = []
-    parts = [(study.reference, combinations(study, list(study.follows)))] if study.reference else []
+    parts = [(study.reference, combinations(study, list(study.follows)))] if study.reference and not study.closed else []
     for model, points in [*parts, ("", combinations(study))]:
         for number, point in enumerate(points):
             for seed in study.seeds or [None]:

@@ -11,6 +11,15 @@ QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?:\s*([A-Za-
 Sets = tuple[str, ...]  # key=value, as --set takes it
 
 
+def number_label(label: str) -> tuple[float, str] | None:
+    """Number and unit of a label, such as 8 mm; None of a word. A blank stands between the two: 2D is a word."""
+    match = re.fullmatch(r"(\S+)(?: (\S.*))?", label)
+    number = match and QUANTITY.fullmatch(match[1])
+    if not number or number[2] or not math.isfinite(float(number[1])):
+        return None
+    return float(number[1]), match[2] or "1"
+
+
 class StudyError(Exception):
     """All faults of a study, a line each."""
 
@@ -110,12 +119,16 @@ def flow(node: yaml.Node, within: bool = False) -> str:
     return node.value or "null"
 
 
+def is_path(key: str) -> bool:
+    return not re.search(r"[=\s]|^\.|\.$|\.\.", key)
+
+
 def read_sets(reader: Reader, node: yaml.Node, where: str) -> Sets:
     sets = []
     for key, (at, value) in reader.mapping(node, where).items():
         if key == "seed":
             reader.fault(at, f"{where}: seeds are set by 'repeats: {{seeds: ...}}'")
-        elif re.search(r"[=\s]|^\.|\.$|\.\.", key):
+        elif not is_path(key):
             reader.fault(at, f"{where}: '{key}' is no path of a key such as time.end")
         else:
             sets.append(f"{key}={flow(value)}")

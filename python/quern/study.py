@@ -8,16 +8,14 @@ from dataclasses import dataclass, field
 
 import yaml
 
-from .reader import Reader, Sets, StudyError, compose, flow, kind, nearest, read_sets
+from .closed import Closed, read_closed
+from .measure import RESERVED, Measure, read_measures
+from .reader import Reader, Sets, StudyError, compose, flow, is_path, kind, nearest, number_label, read_sets
 
 KEYS = ("study", "name", "base", "set", "axes", "repeats", "reference", "measure", "front", "jobs", "threads", "limit")
-AT = ("last", "first", "mean", "min", "max", "every")
-COSTS = ("processor", "running", "wall")
+FRONTS = ("processor", "running", "wall")
 SECONDS = {"": 1, "s": 1, "min": 60, "h": 3600, "d": 86400}
 MOST_RUNS = 100_000
-# Columns that every table has.
-RESULTS = ("steps", "substeps", "settle_steps", "time_end", "grains", "points", "mass_defect", "discrete_share", "energy")
-RESERVED = ("run", "point", "model", "seed", "status", "exit", "message", "scene_hash", "runs", "done", *RESULTS)
 
 
 @dataclass(frozen=True)
@@ -33,13 +31,11 @@ class Axis:
     values: tuple[Value, ...]
     drawn: bool = False  # at random: together with the other axes that are
 
-
-@dataclass(frozen=True)
-class Measure:
-    name: str
-    source: str  # "series" or "summary"
-    path: str
-    at: str
+    @property
+    def unit(self) -> str | None:
+        """Of the values, if all are numbers in one unit; None of words."""
+        found = [number_label(value.label) for value in self.values]
+        return found[0][1] if found and all(found) and len({one[1] for one in found}) == 1 else None
 
 
 @dataclass
@@ -53,6 +49,7 @@ class Study:
     reference: str = ""
     reference_sets: Sets = ()
     follows: tuple[str, ...] = ()
+    closed: Closed | None = None  # the reference, if it is a closed form
     measures: list[Measure] = field(default_factory=list)
     front: str = "running"
     jobs: int = 0
@@ -151,6 +148,8 @@ def read_axis(reader: Reader, at: yaml.Node, node: yaml.Node, name: str) -> Axis
     key = reader.text(found["key"][1], f"{where}.key", "the path of a key such as continuum.cell") if "key" in found else ""
     if key == "seed":
         reader.fault(found["key"][1], f"{where}.key: seeds are set by 'repeats: {{seeds: ...}}'")
+    elif not is_path(key):
+        reader.fault(found["key"][1], f"{where}.key: '{key}' is no path of a key such as continuum.cell")
     return Axis(name, tuple(WAYS[way](reader, value, f"{where}.{way}", key)), way == "random")
 
 
@@ -178,39 +177,13 @@ def read_seeds(reader: Reader, node: yaml.Node) -> list[int]:
     return seeds
 
 
-def read_measure(reader: Reader, node: yaml.Node) -> Measure | None:
-    found = reader.mapping(node, "measure", ("name", "series", "summary", "at"))
-    reader.require(node, found, "measure: ", {"name": ""})
-    sources = [word for word in ("series", "summary") if word in found]
-    if len(sources) != 1:
-        if reader.clean:
-            reader.fault(node, "measure: give one of series (a column of series.csv) and summary (a path in summary.json)")
-        return None
-    name = reader.text(found["name"][1], "measure.name", "a word") if "name" in found else ""
-    if name and (not re.fullmatch(r"[A-Za-z_]\w*", name) or name in RESERVED):
-        reader.fault(found["name"][1], f"measure.name: '{name}' must be a word that no column has already")
-    path = reader.text(found[sources[0]][1], f"measure.{sources[0]}", "a name such as runout.front")
-    at = reader.choice(found["at"][1], "measure.at", AT) if "at" in found else "last"
-    if "at" in found and sources[0] == "summary":
-        reader.fault(found["at"][0], "measure.at: a summary has one value; leave 'at' out")
-    return Measure(name, sources[0], path, at)
-
-
-def read_measures(reader: Reader, node: yaml.Node, axes: list[Axis]) -> list[Measure]:
-    measures, names = [], [axis.name for axis in axes]
-    for item in reader.items(node, "measure", "measures, {name: ..., series: ..., at: last}"):
-        measure = read_measure(reader, item)
-        if measure and measure.name in names:
-            reader.fault(item, f"measure: the name '{measure.name}' is taken already")
-        if measure:
-            names.append(measure.name)
-            measures.append(measure)
-    return measures
-
-
 def read_reference(reader: Reader, node: yaml.Node, study: Study) -> None:
-    found = reader.mapping(node, "reference", ("name", "set", "follows"))
-    reader.require(node, found, "reference: ", {"name": "", "set": "what it sets beside the study's own"})
+    found = reader.mapping(node, "reference", ("name", "set", "csv", "follows"))
+    way = {"set": "what it sets beside the study's own, or csv, the file of a closed form"} if "csv" not in found else {}
+    reader.require(node, found, "reference: ", {"name": "", **way})
+    if "set" in found and "csv" in found:
+        reader.fault(found["csv"][0], "reference: a closed form makes no runs; leave out 'set' or 'csv'")
+        return
     if "name" in found:
         study.reference = reader.text(found["name"][1], "reference.name", "a word")
     if "set" in found:
@@ -223,6 +196,9 @@ def read_reference(reader: Reader, node: yaml.Node, study: Study) -> None:
             if word and word not in names:
                 reader.fault(item, f"reference.follows: no axis is called '{word}'{nearest(word, names, 'axes: ')}")
         study.follows = tuple(item.value for item in nodes)
+    if "csv" in found and not reader.faults:
+        units = {axis.name: axis.unit for axis in study.axes}
+        study.closed = read_closed(reader, found["csv"][1], study.path.parent, study.measures, units, study.follows)
 
 
 def read_limit(reader: Reader, node: yaml.Node) -> float:
@@ -254,11 +230,11 @@ def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
     study.sets = read_sets(reader, parts["set"], "set") if "set" in parts else ()
     study.axes = read_axes(reader, parts["axes"]) if "axes" in parts else []
     study.seeds = read_seeds(reader, parts["repeats"]) if "repeats" in parts else []
-    study.measures = read_measures(reader, parts["measure"], study.axes) if "measure" in parts else []
+    study.measures = read_measures(reader, parts["measure"], [axis.name for axis in study.axes]) if "measure" in parts else []
     if "reference" in parts:
         read_reference(reader, parts["reference"], study)
     if "front" in parts:
-        study.front = reader.choice(parts["front"], "front", COSTS)
+        study.front = reader.choice(parts["front"], "front", FRONTS)
     study.jobs = reader.whole(parts["jobs"], "jobs", 1, 10_000) if "jobs" in parts else 0
     study.threads = reader.whole(parts["threads"], "threads", 1, 1024) if "threads" in parts else 1
     study.limit = read_limit(reader, parts["limit"]) if "limit" in parts else math.inf

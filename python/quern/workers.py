@@ -34,11 +34,16 @@ def record_path(folder: pathlib.Path, key: str) -> pathlib.Path:
     return folder / "runs" / f"{key}.json"
 
 
+RECORD = {"status": str, "exit": (int, str), "message": str, "cost": dict, "made_by": dict, "limit": (int, float, type(None))}
+
+
 def recorded(folder: pathlib.Path, key: str) -> dict | None:
-    try:
-        return json.loads(record_path(folder, key).read_text())
-    except (FileNotFoundError, ValueError):
+    """What is known of a run that is over; None if there is no record, or one that is damaged."""
+    record = read_json(record_path(folder, key))
+    if not all(isinstance(record.get(name, ()), kind) for name, kind in RECORD.items()):
         return None
+    whole = all(isinstance(cost, (int, float)) for cost in record["cost"].values())
+    return record if whole and all(isinstance(one, str) for one in record["made_by"].values()) else None
 
 
 def is_recorded(folder: pathlib.Path, job: Job, study: Study, digests: dict[str, str], retry: bool) -> bool:
@@ -78,10 +83,12 @@ def remind(fd: int, active: Active) -> None:
 
 
 def read_json(path: pathlib.Path) -> dict:
+    """Empty where there is no such file, or no mapping in it."""
     try:
-        return json.loads(path.read_text())
-    except (OSError, ValueError):
+        tree = json.loads(path.read_text())
+    except (OSError, ValueError, RecursionError):
         return {}
+    return tree if isinstance(tree, dict) else {}
 
 
 def message_of(active: Active, code: int, said: str, study: Study) -> tuple[str, str]:
