@@ -57,8 +57,11 @@ def unlike(own: Reading, other: Reading) -> str:
 
 def risen(reading: Reading, places: np.ndarray, side: str) -> np.ndarray:
     """The distribution function: the share that is at most as large as each place, or smaller (`left`)."""
+    if reading.shares is not None and side == "left":  # read from its end, so that a step is seen from below
+        below = 1 - np.interp(-places, -reading.values[::-1], 1 - reading.shares[::-1], left=0, right=1)
+        return np.where(places <= reading.values[0], 0, below)
     if reading.shares is not None:
-        return np.interp(places, reading.values, reading.shares, left=0, right=1)
+        return np.where(places >= reading.values[-1], 1, np.interp(places, reading.values, reading.shares, left=0))
     return np.searchsorted(reading.values, places, side) / len(reading.values)
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What a run left, or leaves just now: frames, series, summary, scene. docs/run_folder.md says what lies where."""
+import contextlib
 import csv
 import functools
 import json
@@ -117,12 +118,21 @@ class Series:
     its unit."""
 
     def __init__(self, path: pathlib.Path):
-        text = path.read_text()
-        text = text[:text.rfind("\n") + 1]  # of a run at work the last row may not be whole
-        header, *rows = csv.reader(text.splitlines()) if text else [[]]
-        found = [re.fullmatch(r"(.*?) \[(.*)\]", word) for word in header]
-        self.units = {match[1]: match[2] for match in found if match}
-        numbers = np.array(rows, dtype=float).reshape(len(rows), len(header))
+        try:
+            text = path.read_text()
+            text = text[:text.rfind("\n") + 1]  # of a run at work the last row may not be whole
+            header, *rows = csv.reader(text.splitlines()) if text else [[]]
+        except (OSError, UnicodeDecodeError, csv.Error) as why:
+            raise QuernError(f"{path} cannot be read: {getattr(why, 'strerror', None) or 'it is no table of text'}", 4) from None
+        found = [re.fullmatch(r"(.*?)(?: \[(.*)\])?", word) for word in header]
+        self.units = {match[1]: match[2] or "1" for match in found}
+        for line, row in enumerate(rows, 2):
+            if len(row) != len(self.units):
+                raise QuernError(f"{path}, line {line}: {len(row)} cells, and the header names {len(self.units)} columns", 4)
+        try:
+            numbers = np.array(rows, dtype=float).reshape(len(rows), len(self.units))
+        except ValueError as why:
+            raise QuernError(f"{path}: {why}", 4) from None
         self._columns = dict(zip(self.units, numbers.T))
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -189,11 +199,27 @@ class Run:
 def _is_held(lock: pathlib.Path) -> bool:
     """True if a run holds its folder. Asked of the kernel's list: to try the lock could refuse a run that begins just then."""
     try:
-        inode = str(lock.stat().st_ino)
-        locks = pathlib.Path("/proc/locks").read_text()
+        file, locks = lock.stat(), pathlib.Path("/proc/locks").read_text()
     except OSError:
         return False
-    return any(words[1] == "FLOCK" and words[5].split(":")[2] == inode for words in map(str.split, locks.splitlines()))
+    return any(_holds(line.split(), file) for line in locks.splitlines())
+
+
+def _holds(words: list[str], file: os.stat_result) -> bool:
+    """Whether a line of /proc/locks is of this file. It names device and inode; where the device is another one than `stat` tells, as on
+    btrfs, it counts if the process has the file open."""
+    if len(words) < 6 or words[1] != "FLOCK":
+        return False
+    major, minor, inode = words[5].split(":")
+    if int(inode) != file.st_ino:
+        return False
+    if (int(major, 16), int(minor, 16)) == (os.major(file.st_dev), os.minor(file.st_dev)):
+        return True
+    for link in pathlib.Path(f"/proc/{words[4]}/fd").glob("*"):
+        with contextlib.suppress(OSError):
+            if os.path.samestat(link.stat(), file):
+                return True
+    return False
 
 
 def read_scene(text: str) -> dict[str, Any]:

@@ -217,14 +217,14 @@ def read_base(reader: Reader, node: yaml.Node, folder: pathlib.Path) -> pathlib.
 
 
 def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
-    study = Study(path, path.stem)
+    study = Study(path)
     found = reader.mapping(root, "the study", KEYS)
     parts = {key: value for key, (_, value) in found.items()}
     reader.require(root, found, "", {"study": "write 'study: 1'", "base": "the scene that all runs begin with"})
     if "study" in parts and flow(parts["study"]) != "1":
         reader.fault(parts["study"], f"study must be 1, the only form there is, not {kind(parts['study'])}")
     study.base = read_base(reader, parts["base"], path.parent) if "base" in parts else path
-    study.name = reader.text(parts["name"], "name") if "name" in parts else path.stem
+    study.name = reader.text(parts["name"], "name") if "name" in parts else re.sub(r"[^\w.-]+", "_", path.stem).strip(".-") or "study"
     if "name" in parts and study.name and not re.fullmatch(r"\w[\w.-]*", study.name):
         reader.fault(parts["name"], f"name: '{study.name}' must be a word of letters, digits, '.', '-' and '_': a folder is called so")
     study.sets = read_sets(reader, parts["set"], "set") if "set" in parts else ()

@@ -9,6 +9,7 @@ import fcntl
 import math
 import os
 import pathlib
+import re
 import shlex
 import signal
 import sys
@@ -20,6 +21,9 @@ from .program import QuernError
 from .reader import StudyError
 from .study import Study, read
 from .table import write_tables
+
+
+HUNG = 124  # exit status of --only if the run was not over within its limit
 
 
 class Parser(argparse.ArgumentParser):
@@ -54,6 +58,10 @@ def program() -> list[str]:
 
 def emit(study: Study, folder: pathlib.Path, count: int, form: str) -> str:
     """The study as work for another program: a command for each run, then `--table` gathers."""
+    paths = [*program(), str(study.path.resolve()), str(folder.resolve())]
+    for path in paths:
+        if re.search(r"[\0-\x1f\x7f]", path):
+            raise QuernError(f"--emit: the path {path!r} has a character that a line of commands cannot hold; give files and folder other names")
     command = shlex.join(program() + [str(study.path.resolve()), "-o", str(folder.resolve())])
     if form == "parallel":
         return "".join(f"{command} --quiet --only {k + 1}\n" for k in range(count))
@@ -102,7 +110,8 @@ def make(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.
             word = record["message"].splitlines()[0] if record["message"] else f"{record['cost']['wall']:.1f} s"
             print(f"[{say.done}/{len(left)}] {record['status']}: {job}: {word}", file=sys.stderr, flush=True)
     say.done = 0
-    return workers.run_all(study, list(left.values()), folder, at_a_time(study, options.jobs), digests, say, stop)
+    return workers.run_all(study, list(left.values()), folder, at_a_time(study, options.jobs), digests, say, stop,
+                           workers.largest_known(jobs, folder))
 
 
 def sweep(study: Study, options: argparse.Namespace, stop: int) -> int:
@@ -116,11 +125,18 @@ def sweep(study: Study, options: argparse.Namespace, stop: int) -> int:
             raise QuernError(f"--only {options.only}: the study has runs 1 to {len(jobs)}")
         job = jobs[options.only - 1]
         with held(folder, job.key):
-            return 0 if make(study, [job], folder, options, stop) else 130
+            return status_of(workers.recorded(folder, job.key)) if make(study, [job], folder, options, stop) else 130
     with held(folder):
         whole = options.table or make(study, jobs, folder, options, stop)
         rows = write_tables(study, jobs, folder)
     return conclude(rows, folder, whole)
+
+
+def status_of(record: dict | None) -> int:
+    """The exit status of a single run, for the program that asked for it: that of the run itself, or as `timeout` has it."""
+    if not record or record["status"] == "done":
+        return 0 if record else 4
+    return HUNG if record["status"] == "hung" else int(record["exit"] or 1)
 
 
 def conclude(rows: list[dict], folder: pathlib.Path, whole: bool) -> int:

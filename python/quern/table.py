@@ -67,7 +67,7 @@ def read_run(study: Study, job: Job, folder: pathlib.Path, numbers: dict[str, st
         try:
             readings[measure.name] = taken(measure, run, summary)
         except DAMAGE as why:
-            note(row, f"{measure.name}: {sentence_of(why)}")
+            note(row, f"{measure.name}: {sentence_of(why).replace(f'{run.folder}/', '')}")
             continue
         if measure.single:
             row["cost." * (measure.source == "cost") + measure.name] = float(readings[measure.name].values[0])

@@ -18,6 +18,7 @@ from .program import find, sentence, set_options
 from .study import Study
 
 GRACE = 5.0  # s that a run has to end by itself once its limit is over
+NO_FILES = 4  # exit status of a run that could not read or write a file
 STATUS = {0: "done", 2: "refused", 130: "interrupted"}
 
 
@@ -47,15 +48,15 @@ def recorded(folder: pathlib.Path, key: str) -> dict | None:
 
 
 def is_recorded(folder: pathlib.Path, job: Job, study: Study, digests: dict[str, str], retry: bool) -> bool:
-    """True if the run was made already by the same program and plugins, and nothing says to try again."""
+    """True if the run was made already by the same program and plugins, and nothing says to try again, as a disk that was full does."""
     record = recorded(folder, job.key)
     if not record or not set(record["made_by"].values()) <= set(digests.values()):
         return False
     if record["status"] == "hung" and study.limit > record["limit"]:
         return False
     if record["status"] == "done":
-        return (folder / "runs" / job.key / "summary.json").exists()
-    return not retry
+        return bool(read_json(folder / "runs" / job.key / "summary.json"))
+    return not retry and record["exit"] != NO_FILES
 
 
 def end_with_parent() -> None:
@@ -101,6 +102,20 @@ def message_of(active: Active, code: int, said: str, study: Study) -> tuple[str,
     return STATUS.get(code, "failed"), words or ("" if code == 0 else f"exit status {code}")
 
 
+def running_of(summary: dict, processor: float) -> float:
+    """Processor time from the release on: it does not matter who has settled. Of a run that does not tell it, by the share of the clock."""
+    if "processor_seconds" in summary and "settle_processor_seconds" in summary:
+        return summary["processor_seconds"] - summary["settle_processor_seconds"]
+    whole = summary.get("wall_seconds")
+    return processor * (1 - summary.get("settle_seconds", 0) / whole) if whole else processor
+
+
+def used_by(summary: dict, digests: dict[str, str]) -> set[str]:
+    """The program and the plugins that a run has used; all that there are if it does not tell."""
+    plugins = summary.get("provenance", {}).get("plugins")
+    return {plugin["file"] for plugin in plugins} | {find()} if plugins is not None else set(digests)
+
+
 def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str, str]) -> dict:
     """Waits for a run that has ended and records it; one that somebody has interrupted is not recorded."""
     _, status, usage = os.wait4(active.process.pid, 0)
@@ -111,12 +126,10 @@ def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str
     note.unlink()
     summary = read_json(folder / "runs" / key / "summary.json") if word == "done" else {}
     processor = usage.ru_utime + usage.ru_stime
-    settling = summary.get("settle_seconds", 0) / summary["wall_seconds"] if summary.get("wall_seconds") else 0
-    used = {plugin["file"] for plugin in summary["provenance"]["plugins"]} | {find()} if summary else set(digests)
     record = {"status": word, "exit": "" if active.asked else code if code >= 0 else 128 - code, "message": message,
               "limit": None if math.isinf(study.limit) else study.limit, "job": str(active.job), "sets": active.job.sets,
-              "cost": {"wall": wall, "processor": processor, "running": processor * (1 - settling), "memory": usage.ru_maxrss * 1024},
-              "made_by": {path: digests.get(path) or digest(pathlib.Path(path).read_bytes()) for path in sorted(used)}}
+              "cost": {"wall": wall, "processor": processor, "running": running_of(summary, processor), "memory": usage.ru_maxrss * 1024},
+              "made_by": {path: digests.get(path) or digest(pathlib.Path(path).read_bytes()) for path in sorted(used_by(summary, digests))}}
     if word != "interrupted":
         save(record_path(folder, key), json.dumps(record, indent=1))
     return record
@@ -129,13 +142,28 @@ def save(path: pathlib.Path, text: str) -> None:
     os.replace(aside, path)
 
 
-def memory_left() -> float:
-    """Bytes that another run could take; infinite where the system does not tell."""
+def kilobytes(path: str, word: str) -> float:
+    """A line of a file of /proc, in bytes; NaN where the system does not tell."""
     try:
-        lines = pathlib.Path("/proc/meminfo").read_text().splitlines()
-        return next(float(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
+        lines = pathlib.Path(path).read_text().splitlines()
+        return next(float(line.split()[1]) * 1024 for line in lines if line.startswith(word))
     except (OSError, StopIteration):
-        return math.inf
+        return math.nan
+
+
+def has_room(active: dict[int, Active], largest: float) -> bool:
+    """True if another run as large as any has memory, once those at work have grown as large too. What they hold already is no longer
+    available. Where the system does not tell, there is room."""
+    held = [kilobytes(f"/proc/{one.process.pid}/status", "VmRSS:") for one in active.values()]
+    largest = max(largest, *(own for own in held if not math.isnan(own)), 0)
+    to_come = sum(max(0, largest - own) for own in held if not math.isnan(own))
+    return not kilobytes("/proc/meminfo", "MemAvailable:") < to_come + largest
+
+
+def largest_known(jobs: list[Job], folder: pathlib.Path) -> float:
+    """The most memory that a run of the study has taken, as far as that is recorded."""
+    records = (recorded(folder, job.key) for job in jobs)
+    return max((record["cost"].get("memory", 0) for record in records if record), default=0)
 
 
 def wait(active: dict[int, Active], stop: int) -> list[int]:
@@ -148,14 +176,14 @@ def wait(active: dict[int, Active], stop: int) -> list[int]:
 
 
 def run_all(study: Study, jobs: list[Job], folder: pathlib.Path, at_a_time: int, digests: dict[str, str],
-            say: Callable[[Job, dict], None], stop: int) -> bool:
+            say: Callable[[Job, dict], None], stop: int, largest: float = 0) -> bool:
     """Makes the runs; False if they were interrupted, as they are once `stop` can be read. Another one is started while cores are free,
-    and while memory is left for the largest that there was."""
+    and while memory is left for the largest that there was, `largest` bytes in earlier ones."""
     (folder / "runs").mkdir(exist_ok=True)
-    waiting, active, largest, whole = list(reversed(jobs)), {}, 0, True
+    waiting, active, whole = list(reversed(jobs)), {}, True
     try:
         while waiting or active:
-            while waiting and len(active) < at_a_time and (not active or memory_left() > largest):
+            while waiting and len(active) < at_a_time and (not active or has_room(active, largest)):
                 one = start(study, waiting.pop(), folder)
                 active[os.pidfd_open(one.process.pid)] = one
             over = wait(active, stop)

@@ -91,6 +91,9 @@ def check_distance():
     near(distance(np.array([0.3, 0.4])), 0.6, 1e-15, "distance of 0.3 and 0.4 from the even law")  # above the larger one
     near(distance(np.array([0.7, 0.8])), 0.7, 1e-15, "of 0.7 and 0.8")  # below the smaller one
     near(distance(np.array([1, 1, 2, 3.0]), Reading(np.array([1, 2, 2, 3.0]), "m")), 0.25, 1e-15, "of 1, 1, 2, 3 from 1, 2, 2, 3")
+    steps = Reading(np.array([1, 1, 2, 2.0]), "m", shares=np.array([0, 0.5, 0.5, 1]))
+    assert distance(np.array([1, 2.0]), steps) == 0 and distance(np.array([2, 2.0]), steps) == 0.5 == distance(np.array([1, 1.0]), steps)
+    near(distance(np.array([1, 2.0]), Reading(np.array([1, 2.0]), "m", shares=np.array([0.25, 1]))), 0.5, 1e-15, "a step, and a slope beneath a step")
     found = np.array([distance(draw.random(400)) for _ in range(4000)]) * math.sqrt(400)
     near(np.mean(found), math.sqrt(math.pi / 2) * math.log(2), 0.03, "mean of sqrt(n) times the distance")
     above = 2 * sum((-1) ** (k - 1) * math.exp(-2 * (k * 1.2) ** 2) for k in range(1, 9))
