@@ -85,15 +85,14 @@ def check_header(units: dict[str, str | None], measures: dict[str, Measure], axe
         elif name not in measures and name not in BESIDE:
             tell(f"line 1: '{name}' is no measure{nearest(name, measures, 'measures: ')}")
         elif unit is None or unit != BESIDE.get(name, unit):
-            tell(f"line 1: the unit of '{name}' is missing; write '{name} [{BESIDE.get(name, 'm')}]'" if unit is None else
+            tell(f"line 1: the unit of '{name}' is missing; write it behind the name, as in 'front [m]'" if unit is None else
                  f"line 1: '{name}' is in '{unit}', must be in '{BESIDE[name]}'")
     for name in follows:
         if name not in units:
             tell(f"line 1: a column '{name}' is missing, since 'follows' names it")
-    found = [measures[name] for name in units if name in measures]
-    if not found:
+    if all(name in BESIDE or name in axes for name in units):
         tell(f"line 1: no column is a measure; measures: {', '.join(measures) or 'none'}")
-    for measure in found:
+    for measure in (measures[name] for name in units if name in measures):
         beside = "share" if measure.distribution else "time" if measure.at == "every" else ""
         if beside and beside not in units:
             tell(f"line 1: a column '{beside} [{BESIDE[beside]}]' is missing, which '{measure.name}' needs")

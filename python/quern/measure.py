@@ -105,7 +105,7 @@ def check_words(reader: Reader, found: dict, measure: Measure) -> None:
     if "of" in found and measure.source != "frame":
         refuse("of", "only what is taken from a frame is made of many; leave 'of' out")
     if "norm" in found and (measure.single or measure.distribution):
-        refuse("norm", "Kolmogorov and Smirnov's distance is taken; leave 'norm' out" if measure.distribution else
+        refuse("norm", "of a distribution it is Kolmogorov and Smirnov's distance; leave 'norm' out" if measure.distribution else
                "one number has no norm; write 'relative: yes' for a share of the reference")
     if "relative" in found and (measure.distribution or measure.norm == "share"):
         refuse("relative", "this error is a share already; leave 'relative' out")

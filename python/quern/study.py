@@ -251,5 +251,5 @@ def read(path: pathlib.Path, name: str | None = None) -> Study:
     root = compose(path, reader.name)
     study = read_tree(reader, root, path)
     if reader.faults:
-        raise StudyError("\n".join(text for _, _, text in sorted(reader.faults)))
+        raise StudyError("\n".join(text for _, _, text in sorted(reader.faults, key=lambda fault: fault[:2])))
     return study

@@ -107,6 +107,31 @@ def check_on_the_way(here):
     print(f"ok  running with {seen[0][1]} frames, interrupted, killed, a row without its end")
 
 
+def check_locks(here):
+    """A lock of another device's file of that number is another file's; where devices are named otherwise, the process tells."""
+    from quern.runs import _holds
+    here.mkdir()
+    with open(here / "file", "w") as held:
+        file = os.fstat(held.fileno())
+
+        def words(device, process=1, kind="FLOCK"):
+            return ["1:", kind, "ADVISORY", "WRITE", str(process), f"{device}:{file.st_ino}", "0", "EOF"]
+        own = f"{os.major(file.st_dev):02x}:{os.minor(file.st_dev):02x}"
+        assert _holds(words(own), file) and not _holds(words(own, kind="POSIX"), file) and not _holds(["1:", "->", *words(own)[1:]], file)
+        assert not _holds(words("ff:ff", 999999999), file) and _holds(words("ff:ff", os.getpid()), file)
+        assert not _holds([*words(own)[:5], f"{own}:1", "0", "EOF"], file) and not _holds([], file)
+    path = here / "series.csv"
+    for text, said in (("time [s],step\n0,1\n2,3\n", ""), ("a [m],b [m]\n1\n", "series.csv, line 2: 1 cells, and the header names 2 columns"),
+                       ("a [m]\nx\n", "could not convert string to float: 'x'"), ("", ""), ("a [m],a [s]\n1,2\n", "line 2: 2 cells, and the header names 1")):
+        path.write_text(text)
+        if said:
+            assert said in str(raises(quern.QuernError, quern.runs.Series, path)), text
+        else:
+            series = quern.runs.Series(path)
+            assert not text or series["step"].tolist() == [1, 3] and series.units["step"] == "1" and len(series) == 2
+    print("ok  locks by device and file; series of any form")
+
+
 def check_run(here):
     """quern.run: sets of both forms, and what it says when a scene is refused, a run fails, a folder is taken."""
     scene = lab.SOURCE / "configs/two_grains.yaml"
@@ -152,3 +177,4 @@ with lab.workplace() as name:
     check_on_the_way(place)
     check_run(place)
     check_lazy(place)
+    check_locks(place / "locks")

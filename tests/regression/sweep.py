@@ -272,8 +272,80 @@ def check_overhead(here):
     assert beside < 0.05 and whole / 200 - bare < 0.05, (beside, whole / 200, bare)
 
 
+def check_only(here):
+    """A single run ends with the status of the run, so that a cluster sees what failed."""
+    cases = {"good": {}, "refused": {"time.end": -1}, "fails": {"grains.contact.linear.stiffness": 1, "time.step": "1 ms"}, "hangs": ENDLESS}
+    path = write(here, "single", set={"time.end": "4 ms"}, axes={"case": {"cases": cases}}, limit="1 s")
+    for k, status in enumerate((0, 2, 3, 124)):
+        for _ in range(2):  # made, and there already
+            sweep(path, here / "single", "--only", str(k + 1), "--quiet", status=status)
+    sweep(path, here / "single", "--only", "5", status=1)
+    print("ok  --only ends with the status of its run")
+
+
+def check_full(here):
+    """A run that a full disk ended is made again by the next sweep."""
+    (here / "wrapped").write_text(f'#!/bin/sh\n[ "$1" = run ] && [ -e {here}/full ] && echo "quern: error: no space left" >&2 && exit 4\nexec {lab.QUERN} "$@"\n')
+    (here / "wrapped").chmod(0o755)
+    (here / "full").touch()
+    path, env = write(here, "disk", set={"time.end": "1 ms"}, repeats={"seeds": 2}), {**os.environ, "QUERN": str(here / "wrapped")}
+    sweep(path, here / "disk", env=env)
+    assert [(row["status"], row["exit"], row["message"]) for row in table(here / "disk")] == [("failed", "4", "no space left")] * 2
+    (here / "full").unlink()
+    assert made(sweep(path, here / "disk", env=env)) == 2
+    print("ok  a run that found the disk full is tried again")
+
+
+def check_memory(here):
+    """Runs that have begun and not yet grown count as large as the largest."""
+    sys.path.insert(0, str(lab.SOURCE / "python"))
+    from quern import workers
+    from quern.points import jobs_of
+    from quern.study import read
+    sleepers = [subprocess.Popen(["sleep", "20"]) for _ in range(2)]
+    active = {one.pid: workers.Active(None, one, 0, 0) for one in sleepers}
+    resident, available = workers.kilobytes(f"/proc/{sleepers[0].pid}/status", "VmRSS:"), workers.kilobytes("/proc/meminfo", "MemAvailable:")
+    assert 1e5 < resident < 1e7 < available, (resident, available)
+    assert workers.has_room(active, 0) and workers.has_room(active, available / 4)
+    assert not workers.has_room(active, available / 2.5)  # two that have yet to grow, and a third
+    assert workers.has_room({}, available / 2.5)
+    for one in sleepers:
+        one.kill()
+        one.wait()
+    path = write(here, "memory", set={"time.end": "1 ms"}, repeats={"seeds": 2})
+    sweep(path, here / "memory")
+    most = max(float(row["cost.memory"]) for row in table(here / "memory"))
+    assert workers.largest_known(jobs_of(read(path)), here / "memory") == most > 1e6
+    # processor time from the release on, exactly where a run tells it
+    assert workers.running_of({"processor_seconds": 9.0, "settle_processor_seconds": 4.0, "wall_seconds": 1, "settle_seconds": 1}, 99.0) == 5
+    assert workers.running_of({"wall_seconds": 8.0, "settle_seconds": 2.0}, 4.0) == 3 and workers.running_of({}, 4.0) == 4
+    print("ok  memory of runs that have just begun is kept free")
+
+
+def check_names(here):
+    """Blanks in paths and names; a line break cannot stand in a list of commands; 2D is a word, 2 mm a number."""
+    folder = here / "a folder, with 'blanks'"
+    folder.mkdir()
+    axes = {"dimension": {"cases": {"2D": {}, "3D": {"time.end": "2 ms"}}}, "end": {"key": "time.step", "list": ["1e-6 s", "2e-6 s"]}}
+    path = write(folder, "my study", set={"time.end": "1 ms"}, axes=axes)
+    subprocess.run([lab.QUERN, "sweep", path.name, "--jobs", "1"], cwd=folder, check=True, capture_output=True, timeout=100)
+    text = (folder / "out/my_study/table.csv").read_text()
+    assert "dimension,end [s],seed" in text and ",2D,1e-06," in text, text
+    for form in ("parallel", "slurm"):
+        lines = subprocess.run(words_of(path, folder / "o u t", "--emit", form), capture_output=True, text=True, check=True).stdout
+        last = lines.splitlines()[-1] if form == "parallel" else lines
+        subprocess.run(["sh", "-c", last], check=True, env={**os.environ, "SLURM_ARRAY_TASK_ID": "4"}, timeout=100)
+        assert len(list((folder / "o u t/runs").glob("*.json"))) == 1
+    broken = folder / "two\nlines"
+    assert "a character that a line of commands cannot hold" in sweep(path, broken, "--emit", "slurm", status=1)
+    (folder / "...yaml").write_text(path.read_text())
+    said = subprocess.run([lab.QUERN, "sweep", "...yaml", "--table"], cwd=folder, capture_output=True, text=True, timeout=100)
+    assert said.returncode == 0 and (folder / "out/study/table.csv").exists(), said
+    print("ok  blanks and line breaks in names, words that begin with a number")
+
+
 with lab.workplace() as name:
-    for check in (check_physics, check_ends, check_kills, check_again, check_samples, check_emit, check_lock, check_settled, check_overhead):
+    for check in (check_physics, check_ends, check_kills, check_again, check_samples, check_emit, check_only, check_full, check_memory, check_names, check_lock, check_settled, check_overhead):
         place = pathlib.Path(name) / check.__name__
         place.mkdir()
         check(place)
