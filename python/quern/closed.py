@@ -70,7 +70,8 @@ def header_of(cells: list[str], tell: Tell) -> dict[str, str | None]:
     return units
 
 
-def check_header(units: dict[str, str | None], measures: dict[str, Measure], axes: dict[str, str | None], follows: tuple[str, ...], tell: Tell) -> None:
+def check_header(units: dict[str, str | None], measures: dict[str, Measure], axes: dict[str, str | None], follows: tuple[str, ...],
+                 tell: Tell) -> None:
     """Every column a measure with its unit, an axis that is followed, or beside one of these."""
     for name, unit in units.items():
         if name in follows:
@@ -123,7 +124,9 @@ def check_group(rows: list[dict], measure: Measure, lines: list[int], tell: Tell
         if beside and beside not in row:
             tell(f"line {lines[k]}: '{name}' is without its {beside}")
             return
-        if beside and before and not (row[beside] > before[beside] if beside == "time" else row[beside] >= before[beside] and row[name] >= before[name]):
+        rises = not before or not beside or (row[beside] > before[beside] if beside == "time" else
+                                             row[beside] >= before[beside] and row[name] >= before[name])
+        if not rises:
             tell(f"line {lines[k]}: {'times' if beside == 'time' else 'values and shares'} must rise from row to row")
             return
         if beside == "share" and not 0 <= row["share"] <= 1:

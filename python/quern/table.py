@@ -160,9 +160,10 @@ def add_fronts(study: Study, rows: list[dict], pairs: list[dict[str, Pairs]], co
 def vector_of(study: Study, measure: Measure, group: list[Ran], lookup: Lookup, n: int) -> dict[str, np.ndarray]:
     """Of a point: mean over its seeds and the standard error of that, mean and scatter of the reference over the same seeds."""
     found = {name: np.full(n, np.nan) for name in ("mean", "standard_error", "reference", "scatter")}
-    own = np.array([run.readings[measure.name].values for run in group if measure.name in run.readings and len(run.readings[measure.name].values) == n])
+    own = [run.readings[measure.name].values for run in group if measure.name in run.readings]
+    own = np.array([values for values in own if len(values) == n])
     pairs = pairs_of(measure, group, lookup)
-    theirs = pairs.reference if pairs and pairs.reference.shape[1] == n else own[:0]
+    theirs = pairs.reference if pairs and pairs.reference.shape[1] == n else ()
     for rows, mean, spread, share in ((own, "mean", "standard_error", len(own)), (theirs, "reference", "scatter", 1)):
         if len(rows):
             found[mean] = np.mean(rows, axis=0)

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: MIT
 """quern sweep: the table of a study, the same to the last digit however often it was killed; runs that fail, hang or are refused; what is
 made again and what is not; sampled axes; errors against a reference; the same work by GNU parallel; what a run costs beside itself."""
+import contextlib
 import csv
+import math
 import os
 import pathlib
+import pwd
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -24,6 +28,7 @@ TWO = lab.scene("two_grains")
 ENERGY = 0.5 * 2 * 2500 * 3.141592653589793 * 0.005 ** 2  # J, of two discs that meet at 1 m/s each
 
 
+SOFT = {"grains.contact.linear.stiffness": 1, "time.step": "1 ms"}  # fails
 ENDLESS = {"time.end": "1e6", "output.every": "1e5", "grains.place.0.velocity": [0, 0], "grains.place.1.velocity": [0, 0]}
 
 
@@ -94,7 +99,7 @@ def check_physics(here):
 
 def check_ends(here):
     """Runs that are done, refused, fail, crash, hang, and hang deaf: each a row with its sentence."""
-    cases = {"good": {}, "refused": {"time.end": -1}, "fails": {"grains.contact.linear.stiffness": 1, "time.step": "1 ms"},
+    cases = {"good": {}, "refused": {"time.end": -1}, "fails": SOFT,
              "hangs": ENDLESS}
     measure = [{"name": "front", "series": "runout.front"}]
     path = write(here, "ends", set={"time.end": "4 ms"}, axes={"case": {"cases": cases}}, jobs=1, limit="1 s", measure=measure)
@@ -272,9 +277,86 @@ def check_overhead(here):
     assert beside < 0.05 and whole / 200 - bare < 0.05, (beside, whole / 200, bare)
 
 
+SLURM = """ClusterName=quern
+SlurmctldHost={host}(127.0.0.1)
+SlurmUser={user}
+SlurmdUser={user}
+AuthType=auth/none
+CredType=cred/none
+SlurmctldPort={controller}
+SlurmdPort={node}
+StateSaveLocation={here}/state
+SlurmdSpoolDir={here}/spool
+SlurmctldPidFile={here}/slurmctld.pid
+SlurmdPidFile={here}/slurmd.pid
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SchedulerParameters=sched_interval=1,batch_sched_delay=0
+MpiDefault=none
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cores}
+PartitionName=all Nodes=ALL Default=YES State=UP
+"""
+
+
+@contextlib.contextmanager
+def slurm(here):
+    """A cluster of this machine alone, as long as the block lasts; gives its environment, or None if it does not come up."""
+    with socket.socket() as one, socket.socket() as other:
+        one.bind(("127.0.0.1", 0))
+        other.bind(("127.0.0.1", 0))
+        ports = {"controller": one.getsockname()[1], "node": other.getsockname()[1]}
+    names = {"host": socket.gethostname().split(".")[0], "user": pwd.getpwuid(os.getuid()).pw_name, "cores": os.cpu_count()}
+    for name in ("state", "spool"):
+        (here / name).mkdir()
+    (here / "slurm.conf").write_text(SLURM.format(here=here, **names, **ports))
+    env = {**os.environ, "SLURM_CONF": str(here / "slurm.conf")}
+    with open(here / "said", "w") as said:
+        parts = [subprocess.Popen([program, "-D"], env=env, stdout=said, stderr=said) for program in ("slurmctld", "slurmd")]
+    try:
+        deadline = time.monotonic() + 10
+        while "idle" not in subprocess.run(["sinfo", "-h", "-o", "%T"], env=env, capture_output=True, text=True).stdout:
+            time.sleep(0.1)
+            if time.monotonic() > deadline or any(part.poll() is not None for part in parts):
+                break
+        else:
+            deadline = math.inf
+        yield env if deadline == math.inf else None
+    finally:
+        for part in reversed(parts):
+            part.terminate()
+            part.wait(timeout=20)
+
+
+def check_slurm(here):
+    """Six runs, one of which fails, as an array of jobs of a slurm that runs on this machine alone."""
+    if not all(shutil.which(program) for program in ("slurmctld", "slurmd", "sbatch", "sinfo", "scontrol")):
+        print("    slurm is not there, and not tried")
+        return
+    cases = {"soft": {**SOFT, "time.end": "4 ms"}, "short": {}, "long": {"time.end": "2 ms"}}
+    path = write(here, "array", set={"time.end": "1 ms"}, axes={"case": {"cases": cases}}, repeats={"seeds": 2}, limit="1 min")
+    sweep(path, here / "own")
+    with slurm(here) as env:
+        if not env:
+            print(f"    slurm is there, but does not come up:\n{(here / 'said').read_text()[-2000:]}")
+            return
+        script = subprocess.run(words_of(path, here / "theirs", "--emit", "slurm"), capture_output=True, text=True, check=True).stdout
+        subprocess.run(["sbatch"], input=script, text=True, check=True, cwd=here, env=env, capture_output=True)
+        began, runs = time.monotonic(), here / "theirs/runs"
+        while len(list(runs.glob("*.json"))) < 6 or subprocess.run(["squeue", "-h"], env=env, capture_output=True, text=True).stdout:
+            time.sleep(0.2)
+            assert time.monotonic() < began + 60, f"{list(runs.glob('*.json'))}\n{(here / 'said').read_text()}"
+        told = subprocess.run(["scontrol", "show", "job", "-o"], env=env, capture_output=True, text=True, check=True).stdout
+    ends = {int(line.split("ArrayTaskId=")[1].split()[0]): line.split("ExitCode=")[1].split()[0] for line in told.splitlines()}
+    assert ends == {1: "3:0", 2: "3:0", 3: "0:0", 4: "0:0", 5: "0:0", 6: "0:0"}, told
+    assert "6 of 6 runs are there already" in sweep(path, here / "theirs") and results(here / "own") == results(here / "theirs")
+    print(f"ok  the same table by slurm in {time.monotonic() - began:.1f} s; it sees which runs failed")
+
+
 def check_only(here):
     """A single run ends with the status of the run, so that a cluster sees what failed."""
-    cases = {"good": {}, "refused": {"time.end": -1}, "fails": {"grains.contact.linear.stiffness": 1, "time.step": "1 ms"}, "hangs": ENDLESS}
+    cases = {"good": {}, "refused": {"time.end": -1}, "fails": SOFT, "hangs": ENDLESS}
     path = write(here, "single", set={"time.end": "4 ms"}, axes={"case": {"cases": cases}}, limit="1 s")
     for k, status in enumerate((0, 2, 3, 124)):
         for _ in range(2):  # made, and there already
@@ -345,7 +427,7 @@ def check_names(here):
 
 
 with lab.workplace() as name:
-    for check in (check_physics, check_ends, check_kills, check_again, check_samples, check_emit, check_only, check_full, check_memory, check_names, check_lock, check_settled, check_overhead):
+    for check in (check_physics, check_ends, check_kills, check_again, check_samples, check_emit, check_slurm, check_only, check_full, check_memory, check_names, check_lock, check_settled, check_overhead):
         place = pathlib.Path(name) / check.__name__
         place.mkdir()
         check(place)
