@@ -14,14 +14,14 @@ import numpy as np
 KINDS = ("rms", "relative", "share", "distance")
 SHARES = ("relative", "share")  # of the reference
 RESAMPLES = 1000
-AT_ONCE = 2_000_000  # numbers of resamples that are held in memory together
+AT_ONCE = 200_000  # numbers of resamples that are held together, few enough to stay in a processor's cache
 
 
 def size(x: np.ndarray, kind: str) -> np.ndarray:
     """Of each row."""
     if kind == "share":
         return np.sum(np.abs(x), axis=-1)
-    return np.max(np.abs(x), axis=-1) if kind == "distance" else np.sqrt(np.mean(x ** 2, axis=-1))
+    return np.maximum(np.max(x, axis=-1), -np.min(x, axis=-1)) if kind == "distance" else np.sqrt(np.mean(x ** 2, axis=-1))
 
 
 def slope(x: np.ndarray, kind: str) -> np.ndarray:
@@ -97,10 +97,11 @@ def share_on_front(seeds: list[list], costs: list[np.ndarray], runs: list[np.nda
         there = np.flatnonzero(weight.sum(axis=1))
         weight = weight[there] / weight[there].sum(axis=1, keepdims=True)
         mean_cost[there, k] = weight @ cost
-        step = max(1, AT_ONCE // run.shape[1])
+        step, pairs = max(1, AT_ONCE // run.shape[1]), run - twin
         for a in range(0, len(there), step):
             some = weight[a:a + step]
-            off[there[a:a + step], k] = norm(some @ (run - twin), some @ twin, kind)
+            reference = some @ twin if kind in SHARES else pairs  # which is not looked at
+            off[there[a:a + step], k] = norm(some @ pairs, reference, kind)
     on = np.array([front(c, o) for c, o in zip(mean_cost, off)])
     known = ~np.isnan(mean_cost)
     share = on.sum(axis=0) / np.maximum(known.sum(axis=0), 1)

@@ -4,6 +4,7 @@
 Columns that begin with `cost.` were measured with a clock, and what follows from them; all others are results, the same to the last
 digit however the study came about."""
 import csv
+import functools
 import io
 import math
 import pathlib
@@ -48,6 +49,11 @@ def results_of(row: dict, summary: dict) -> dict:
     return found | {"scene_hash": digest or ""}
 
 
+class Kept(Run):
+    """A run that is over: its series are read once for all measures."""
+    series = functools.cached_property(Run.series.fget)
+
+
 def read_run(study: Study, job: Job, folder: pathlib.Path, numbers: dict[str, str]) -> Ran:
     """The row of a run but for errors, and its measures; damage is said in its message."""
     record = workers.recorded(folder, job.key) or {"status": "missing", "exit": "", "message": "", "cost": {}}
@@ -57,7 +63,7 @@ def read_run(study: Study, job: Job, folder: pathlib.Path, numbers: dict[str, st
     readings: dict[str, Reading] = {}
     if record["status"] != "done":
         return Ran(row, readings, job)
-    run = Run(folder / "runs" / job.key)
+    run = Kept(folder / "runs" / job.key)
     summary = workers.read_json(run.folder / "summary.json")
     if not summary:
         note(row, "summary.json is missing or damaged; sweep again with --retry")

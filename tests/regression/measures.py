@@ -106,6 +106,54 @@ def check_two_grains(here):
     print(f"ok  measures of two grains: share of the profile {share:.4f}, relative loss {points[0]['left.error'][:6]} (1 - e^2 = 0.75)")
 
 
+def check_frames(here):
+    """Fields of a frame of a column whose floor is of fixed grains, against the file; a component of points; fields that are not there."""
+    small = dict(one.removeprefix("--set=").split("=", 1) for one in lab.SMALL["column"])
+    measures = [{"name": f"radius_{of}", "frame": "grain.radius", "of": of} for of in ("mean", "deviation", "min", "max", "sum", "count")]
+    measures += [{"name": "down", "frame": "grain.velocity.y", "of": "mean", "at": "first"}, {"name": "stress", "frame": "point.stress.1", "of": "min"},
+                 {"name": "colour", "frame": "grain.colour", "of": "mean"}, {"name": "velocity", "frame": "grain.velocity", "of": "mean"},
+                 {"name": "part", "frame": "grain.radius.x", "of": "mean"}, {"name": "share", "summary": "discrete_share", "per": "mass_initial"},
+                 {"name": "still", "summary": "steps", "per": "sums.left"}, {"name": "nothing", "summary": "sums.heat"}, {"name": "word", "summary": "name"},
+                 {"name": "columns", "series": "runout.front_*"}]
+    sweep(write(here, "frames", base=lab.scene("column"), set={**{key: yaml.safe_load(value) for key, value in small.items()}, "time.end": "5 ms"},
+                measure=measures), here / "frames")
+    row, units = table(here / "frames")
+    row, run = row[0], here / "frames/runs" / row[0]["run"]
+    first, last = (h5py.File(run / f"frames/00000{k}.h5") for k in (0, 1))
+    fixed = last["grains/fixed"][()] != 0
+    radius = last["grains/radius"][()][~fixed]
+    assert fixed.any() and float(row["radius_count"]) == len(radius), row
+    for of, wanted in (("mean", radius.mean()), ("deviation", radius.std()), ("min", radius.min()), ("max", radius.max()), ("sum", radius.sum())):
+        near(row[f"radius_{of}"], wanted, 1e-12, of)
+    near(row["down"], first["grains/velocity"][()][first["grains/fixed"][()] == 0, 1].mean(), 1e-9, "mean velocity")
+    near(row["stress"], last["points/stress"][()][:, 1].min(), 1e-15, "stress")
+    near(row["share"], lab.summary(run)["discrete_share"] / lab.summary(run)["mass_initial"], 1e-15, "a number per number")
+    assert units["share"] == "1/kg" and units["stress"] == "Pa" and units["radius_count"] == "1", units
+    said = row["message"]
+    for words in ("still: 'sums.left' is 0: nothing can be divided by it", "colour: 000001.h5 has no 'grain.colour'; it has ", "velocity: grain.velocity is a vector; name a component, such as grain.velocity.x",
+                  "part: grain.radius has no component 'x'", "nothing: summary.json has no 'sums.heat'", "word: name of summary.json is no number",
+                  "columns: the series have no 'runout.front_*'; they have time, "):
+        assert words in said, (words, said)
+    print(f"ok  fields of a frame: {len(radius)} grains that are not fixed, {fixed.sum()} that are")
+
+
+def check_paths():
+    """Keys of a summary that hold dots: the longest that fits, then shorter ones."""
+    sys.path.insert(0, str(lab.SOURCE / "python"))
+    from quern.measure import number_of, unit_over
+    tree = {"a": {"b": {"c": 1}, "b.c": 2, "b.d": {"e": 3}, "unit": "m"}, "a.b": {"f": {"unit": "s", "value": 4}}, "list": [5, {"g.h": 6}], "momentum": [7, 8]}
+    for path, wanted in (("a.b.c", (2, "m")), ("a.b.d.e", (3, "m")), ("a.b.f", (4, "s")), ("list.0", (5, "1")), ("list.1.g.h", (6, "1")),
+                         ("momentum.1", (8, "kg m/s"))):
+        assert number_of(tree, path) == wanted, (path, number_of(tree, path))
+    for path in ("a", "a.b", "a.x", "list.2", "list.-1", "list", "a.b.c.d", "", "a..b"):
+        try:
+            raise AssertionError(f"{path}: {number_of(tree, path)}")
+        except (KeyError, ValueError):
+            pass
+    assert [unit_over(*units) for units in (("s", "1"), ("1", "kg"), ("J", "kg m/s"))] == ["s", "1/kg", "J/(kg m/s)"]
+    print("ok  paths of a summary")
+
+
 def check_closed_form(here):
     """A closed form as the reference: two discs that move apart at e, the energy that e leaves, speeds that are all the same."""
     (here / "theory.csv").write_text(f"""e,left [J],apart [m/s],time [s],all [J],speeds [m/s],share [1],slabs [kg/m^3]
@@ -269,7 +317,8 @@ def check_damage(here):
 
 with lab.workplace() as name:
     os.environ["QUERN_CACHE"] = ""
-    for check in (check_two_grains, check_closed_form, check_closed_scatter, check_damage):
+    check_paths()
+    for check in (check_frames, check_two_grains, check_closed_form, check_closed_scatter, check_damage):
         place = pathlib.Path(name) / check.__name__
         place.mkdir()
         check(place)
