@@ -66,7 +66,7 @@ def read_run(study: Study, job: Job, folder: pathlib.Path, numbers: dict[str, st
     run = Kept(folder / "runs" / job.key)
     summary = workers.read_json(run.folder / "summary.json")
     if not summary:
-        note(row, "summary.json is missing or damaged; sweep again with --retry")
+        note(row, "summary.json is missing or damaged; the next sweep makes the run again")
         return Ran(row, readings, job)
     row |= results_of(row, summary)
     for measure in study.measures:

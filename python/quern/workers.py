@@ -142,7 +142,7 @@ def save(path: pathlib.Path, text: str) -> None:
     os.replace(aside, path)
 
 
-def kilobytes(path: str, word: str) -> float:
+def proc_bytes(path: str, word: str) -> float:
     """A line of a file of /proc, in bytes; NaN where the system does not tell."""
     try:
         lines = pathlib.Path(path).read_text().splitlines()
@@ -154,10 +154,10 @@ def kilobytes(path: str, word: str) -> float:
 def has_room(active: dict[int, Active], largest: float) -> bool:
     """True if another run as large as any has memory, once those at work have grown as large too. What they hold already is no longer
     available. Where the system does not tell, there is room."""
-    held = [kilobytes(f"/proc/{one.process.pid}/status", "VmRSS:") for one in active.values()]
+    held = [proc_bytes(f"/proc/{one.process.pid}/status", "VmRSS:") for one in active.values()]
     largest = max(largest, *(own for own in held if not math.isnan(own)), 0)
     to_come = sum(max(0, largest - own) for own in held if not math.isnan(own))
-    return not kilobytes("/proc/meminfo", "MemAvailable:") < to_come + largest
+    return not proc_bytes("/proc/meminfo", "MemAvailable:") < to_come + largest
 
 
 def largest_known(jobs: list[Job], folder: pathlib.Path) -> float:
