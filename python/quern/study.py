@@ -177,7 +177,9 @@ def read_seeds(reader: Reader, node: yaml.Node) -> list[int]:
     return seeds
 
 
-def read_reference(reader: Reader, node: yaml.Node, study: Study) -> None:
+def read_reference(reader: Reader, node: yaml.Node, study: Study, sound: bool) -> None:
+    """`sound`: axes and measures have no fault, so that a closed form can be held against them."""
+    before = len(reader.faults)
     found = reader.mapping(node, "reference", ("name", "set", "csv", "follows"))
     way = {"set": "what it sets beside the study's own, or csv, the file of a closed form"} if "csv" not in found else {}
     reader.require(node, found, "reference: ", {"name": "", **way})
@@ -196,7 +198,7 @@ def read_reference(reader: Reader, node: yaml.Node, study: Study) -> None:
             if word and word not in names:
                 reader.fault(item, f"reference.follows: no axis is called '{word}'{nearest(word, names, 'axes: ')}")
         study.follows = tuple(item.value for item in nodes)
-    if "csv" in found and not reader.faults:
+    if "csv" in found and sound and len(reader.faults) == before:
         units = {axis.name: axis.unit for axis in study.axes}
         study.closed = read_closed(reader, found["csv"][1], study.path.parent, study.measures, units, study.follows)
 
@@ -228,11 +230,12 @@ def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
     if "name" in parts and study.name and not re.fullmatch(r"\w[\w.-]*", study.name):
         reader.fault(parts["name"], f"name: '{study.name}' must be a word of letters, digits, '.', '-' and '_': a folder is called so")
     study.sets = read_sets(reader, parts["set"], "set") if "set" in parts else ()
+    before = len(reader.faults)
     study.axes = read_axes(reader, parts["axes"]) if "axes" in parts else []
-    study.seeds = read_seeds(reader, parts["repeats"]) if "repeats" in parts else []
     study.measures = read_measures(reader, parts["measure"], [axis.name for axis in study.axes]) if "measure" in parts else []
     if "reference" in parts:
-        read_reference(reader, parts["reference"], study)
+        read_reference(reader, parts["reference"], study, len(reader.faults) == before)
+    study.seeds = read_seeds(reader, parts["repeats"]) if "repeats" in parts else []
     if "front" in parts:
         study.front = reader.choice(parts["front"], "front", FRONTS)
     study.jobs = reader.whole(parts["jobs"], "jobs", 1, 10_000) if "jobs" in parts else 0

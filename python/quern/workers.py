@@ -52,7 +52,7 @@ def is_recorded(folder: pathlib.Path, job: Job, study: Study, digests: dict[str,
     record = recorded(folder, job.key)
     if not record or not set(record["made_by"].values()) <= set(digests.values()):
         return False
-    if record["status"] == "hung" and study.limit > record["limit"]:
+    if record["status"] == "hung" and study.limit > (record["limit"] or 0):
         return False
     if record["status"] == "done":
         return bool(read_json(folder / "runs" / job.key / "summary.json"))
