@@ -47,6 +47,11 @@ static int by_value(const void *a, const void *b) {
 	return (x > y) - (x < y);
 }
 
+double quern_render_quantile(double *values, size_t n, double share) {
+	qsort(values, n, sizeof(double), by_value);
+	return n ? values[(size_t)(share * (double)(n - 1))] : 0;
+}
+
 /* Values that can be drawn. */
 static bool has_colour(double value) { return fabs(value) <= RENDER_MOST_VALUE; }
 
@@ -109,34 +114,56 @@ static bool takes_prefix(const char *unit) {
 	return false;
 }
 
-static void set_label(render_range *range, const render_frame *f) {
+/* The unit in which numbers up to `size` are shown, and the factor from SI to it. */
+static double choose_unit(double size, const char *si, char *unit, size_t room) {
 	static const char *const prefixes[] = { "n", "µ", "m", "", "k", "M", "G" };
-	const double size = fmax(fabs(range->low), fabs(range->high));
 	const int third = size >= 0.1 && size < 1 ? 0 : (int)floor(log10(size * 1.0001) / 3);
-	const bool prefix = takes_prefix(f->unit) && third >= -3 && third <= 3;
-	char unit[64] = "";
-	const char *name = f->field;
-	range->factor = 1;
-	if (prefix) snprintf(unit, sizeof unit, "%s", prefixes[third + 3]), range->factor = pow(1000, -third);
+	const bool prefix = takes_prefix(si) && third >= -3 && third <= 3;
+	double by = 1;
+	*unit = 0;
+	if (prefix) snprintf(unit, room, "%s", prefixes[third + 3]), by = pow(1000, -third);
 	else if (size >= 1e4 || size < 1e-3) {
 		const int power = (int)floor(log10(size * 1.0001));
 		char factor[16];
 		snprintf(factor, sizeof factor, "10^%d ", power);
-		add_unit(unit, sizeof unit, factor);
-		range->factor = pow(10, -power);
+		add_unit(unit, room, factor);
+		by = pow(10, -power);
 	}
-	if (strcmp(f->unit, "1") != 0) add_unit(unit, sizeof unit, f->unit);
+	if (strcmp(si, "1") != 0) add_unit(unit, room, si);
+	return by;
+}
+
+void quern_render_quantity(char *out, size_t size, double value, const char *si) {
+	char unit[64];
+	const double factor = choose_unit(value, si, unit, sizeof unit);
+	snprintf(out, size, "%.3g%s%s", value * factor, *unit ? " " : "", unit);
+}
+
+static void set_label(render_range *range, const render_frame *f) {
+	char unit[64];
+	const char *name = f->field;
+	range->factor = choose_unit(fmax(fabs(range->low), fabs(range->high)), f->unit, unit, sizeof unit);
 	size_t n = (size_t)snprintf(range->label, sizeof range->label, f->signs ? "%s" : "|%s|", name);
 	for (size_t i = 0; i < n; i++)
 		if (range->label[i] == '.' || range->label[i] == '_') range->label[i] = ' ';
 	if (*unit) snprintf(range->label + n, sizeof range->label - n, " (%s)", unit);
 }
 
-render_range quern_render_range_of(const render_frame *f) {
+/* As they are wished; only what lies beyond is the frame's. */
+static void fix_ends(render_range *range, const double *all, size_t n, const double wished[2]) {
+	range->low = wished[0], range->high = wished[1];
+	range->step = quern_render_round_step((range->high - range->low) / 3);
+	range->below = n && all[0] < range->low;
+	range->above = n && all[n - 1] > range->high;
+}
+
+render_range quern_render_range_of(const render_frame *f, const render_wish *wish) {
 	render_range range = { .high = 1, .step = 0.2, .factor = 1 };
 	size_t n;
 	double *all = gather(f, &n);
-	if (n) set_ends(&range, all, n, f->signs);
+	range.empty = !n || all[0] == all[n - 1];
+	if (wish->has_range) fix_ends(&range, all, n, wish->range);
+	else if (n) set_ends(&range, all, n, f->signs);
 	if (*f->field) set_label(&range, f);
 	free(all);
 	return range;

@@ -33,9 +33,7 @@ static bool frames_of(const char *folder, int64_t *first, int64_t *last) {
 
 /* ---- columns ---- */
 
-/* Any numbers become doubles; NULL if the dataset is missing, of another length, not of numbers, or larger than what
- * memory there is: a damaged file may say that it holds anything. */
-static double *read_table(hid_t group, const char *name, size_t rows, size_t *columns) {
+double *quern_render_table(hid_t group, const char *name, size_t rows, size_t *columns) {
 	size_t n;
 	if (!quern_h5_read_size(group, name, &n, columns) || n != rows || !*columns) return NULL;
 	double *table =
@@ -54,7 +52,7 @@ static double *read_table(hid_t group, const char *name, size_t rows, size_t *co
 static double *read_column(hid_t group, const char *name, render_cloud *cloud) {
 	size_t columns = 0;
 	if (!cloud->n || H5Lexists(group, name, H5P_DEFAULT) <= 0) return NULL;
-	double *table = read_table(group, name, cloud->n, &columns);
+	double *table = quern_render_table(group, name, cloud->n, &columns);
 	cloud->unreadable |= !table || columns != 1;
 	return table;
 }
@@ -65,7 +63,7 @@ static void read_positions(hid_t group, render_cloud *cloud) {
 	if (group < 0 || H5Lexists(group, "position", H5P_DEFAULT) <= 0) return;
 	double *table = NULL;
 	if (quern_h5_read_size(group, "position", &rows, &columns) && columns == 3)
-		table = read_table(group, "position", rows, &columns);
+		table = quern_render_table(group, "position", rows, &columns);
 	cloud->unreadable = !table;
 	for (size_t i = 0; table && i < 3 * rows; i++) cloud->unreadable |= !(fabs(table[i]) <= RENDER_FAR);
 	if (cloud->unreadable) {
@@ -177,10 +175,18 @@ static void make_legible(char *text) {
 	}
 }
 
+/* Of a dataset, so that it can be printed. */
+static void read_unit(hid_t group, const char *name, char *out, size_t size) {
+	const hid_t set = H5Dopen2(group, name, H5P_DEFAULT);
+	if (!quern_h5_read_text(set, "unit", out, size)) snprintf(out, size, "1");
+	make_legible(out);
+	H5Dclose(set);
+}
+
 /* True if the group has the field and its values were taken. */
 static bool take_values(hid_t group, const wanted_field *w, render_cloud *cloud, render_frame *f) {
 	size_t columns;
-	double *table = cloud->n ? read_table(group, w->name, cloud->n, &columns) : NULL;
+	double *table = cloud->n ? quern_render_table(group, w->name, cloud->n, &columns) : NULL;
 	if (!table || (w->component >= 0 && columns == 1) || w->component >= (int)columns ||
 		!strcmp(w->name, "position")) {
 		free(table);
@@ -195,36 +201,55 @@ static bool take_values(hid_t group, const wanted_field *w, render_cloud *cloud,
 		cloud->value[i] = columns == 1 ? row[0] : w->component >= 0 ? row[w->component] : sqrt(square);
 	}
 	f->signs = columns == 1 || w->component >= 0;
-	const hid_t set = H5Dopen2(group, w->name, H5P_DEFAULT);
-	if (!quern_h5_read_text(set, "unit", f->unit, sizeof f->unit)) snprintf(f->unit, sizeof f->unit, "1");
-	make_legible(f->unit);
-	H5Dclose(set);
+	read_unit(group, w->name, f->unit, sizeof f->unit);
 	free(table);
 	return true;
 }
 
+static bool take_vectors(hid_t group, const wanted_field *w, render_cloud *cloud, render_frame *f) {
+	size_t columns;
+	double *table = cloud->n ? quern_render_table(group, w->name, cloud->n, &columns) : NULL;
+	if (!table || columns != 3 || w->component >= 0 || !strcmp(w->name, "position")) {
+		free(table);
+		return false;
+	}
+	cloud->vector = (double(*)[3])(void *)table;
+	read_unit(group, w->name, f->vector_unit, sizeof f->vector_unit);
+	return true;
+}
+
+typedef struct {
+	quern_text list;
+	size_t columns; /* 0: any number of them */
+} field_list;
+
 static herr_t note_field(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
-	quern_text *list = arg;
+	field_list *of = arg;
+	quern_text *list = &of->list;
 	char path[128] = "";
 	size_t rows, columns;
 	(void)info;
 	H5Iget_name(group, path, sizeof path);
 	if (!strcmp(name, "position") || !quern_h5_read_size(group, name, &rows, &columns)) return 0;
+	if (of->columns && columns != of->columns) return 0;
 	quern_text_add(list, "%s%.*s.%s", list->length ? ", " : "", (int)strlen(path) - 2, path + 1, name);
 	return 0;
 }
 
-static int no_such_field(const hid_t group[3], const char *field, const char *path, quern_text *why) {
-	quern_text list = { 0 };
+static int no_such_field(
+	const hid_t group[3], const char *field, const char *path, bool vectors, quern_text *why) {
+	field_list of = { .columns = vectors ? 3 : 0 };
 	for (int k = 0; k < 3; k++)
-		if (group[k] >= 0) H5Literate(group[k], H5_INDEX_NAME, H5_ITER_INC, NULL, note_field, &list);
-	quern_text_add(
-		why, "%s has no field '%s' that could be drawn; it has %s", path, field, quern_text_string(&list));
-	quern_text_finish(&list);
+		if (group[k] >= 0) H5Literate(group[k], H5_INDEX_NAME, H5_ITER_INC, NULL, note_field, &of);
+	quern_text_add(why, "%s has no %s '%s' that could be drawn; it has %s", path,
+		vectors ? "vectors" : "field", field, of.list.length ? quern_text_string(&of.list) : "none");
+	quern_text_finish(&of.list);
 	return QUERN_EXIT_USAGE;
 }
 
-static bool colour_by(render_frame *f, const hid_t group[3], const char *field) {
+/* Takes what colours the frame, or its arrows, from all sets that are meant. */
+static bool take_field(render_frame *f, const hid_t group[3], const char *field,
+	bool (*take)(hid_t, const wanted_field *, render_cloud *, render_frame *), char name[64]) {
 	render_cloud *cloud[3] = { &f->grains, &f->points, &f->cells };
 	static const char *const sets[3] = { "grain", "point", "cell" };
 	const wanted_field w = parse_field(field);
@@ -232,10 +257,20 @@ static bool colour_by(render_frame *f, const hid_t group[3], const char *field) 
 	for (int k = 0; k < 3; k++) {
 		/* cells hide what is in them: only where they are asked for */
 		const bool wanted = *w.set ? !strcmp(w.set, sets[k]) : k < 2;
-		if (wanted && group[k] >= 0) any = take_values(group[k], &w, cloud[k], f) || any;
+		if (wanted && group[k] >= 0) any = take(group[k], &w, cloud[k], f) || any;
 	}
-	if (any) snprintf(f->field, sizeof f->field, "%.63s", field);
+	if (any) snprintf(name, 64, "%.63s", field);
 	return any;
+}
+
+static int take_fields(
+	render_frame *f, const hid_t group[3], const char *path, const render_wish *wish, quern_text *why) {
+	const char *field = wish->field ? wish->field : wish->chains ? NULL : "velocity";
+	if (field && !take_field(f, group, field, take_values, f->field) && wish->field)
+		return no_such_field(group, field, path, false, why);
+	if (wish->vectors && !take_field(f, group, wish->vectors, take_vectors, f->vector_field))
+		return no_such_field(group, wish->vectors, path, true, why);
+	return QUERN_EXIT_DONE;
 }
 
 /* ---- all of it ---- */
@@ -260,8 +295,8 @@ static void read_poses(hid_t file, render_frame *f) {
 	double *position = NULL, *turn = NULL;
 	if (group < 0) return;
 	if (quern_h5_read_size(group, "position", &rows, &columns) && rows && columns == 3)
-		position = read_table(group, "position", rows, &columns);
-	if (position) turn = read_table(group, "turn", rows, &columns);
+		position = quern_render_table(group, "position", rows, &columns);
+	if (position) turn = quern_render_table(group, "turn", rows, &columns);
 	if (turn && columns == 9) {
 		f->pose = quern_take(rows, sizeof *f->pose);
 		f->n_poses = rows;
@@ -279,7 +314,8 @@ static void read_poses(hid_t file, render_frame *f) {
 	H5Gclose(group);
 }
 
-static int read_clouds(render_frame *f, hid_t file, const char *path, const char *field, quern_text *why) {
+static int read_clouds(
+	render_frame *f, hid_t file, const char *path, const render_wish *wish, quern_text *why) {
 	const hid_t group[3] = { quern_h5_find(file, "grains"), quern_h5_find(file, "points"),
 		quern_h5_find(file, "cells") };
 	int status = QUERN_EXIT_DONE;
@@ -292,8 +328,9 @@ static int read_clouds(render_frame *f, hid_t file, const char *path, const char
 	} else if (!f->grains.n && !f->points.n) {
 		quern_text_add(why, "%s holds neither grains nor points", path);
 		status = QUERN_EXIT_SCENE;
-	} else if (!colour_by(f, group, field ? field : "velocity") && field)
-		status = no_such_field(group, field, path, why);
+	} else status = take_fields(f, group, path, wish, why);
+	if (status == QUERN_EXIT_DONE && wish->chains && !quern_render_links_read(f, file, path, why))
+		status = QUERN_EXIT_SCENE;
 	for (int k = 0; k < 3; k++)
 		if (group[k] >= 0) H5Gclose(group[k]);
 	read_poses(file, f);
@@ -313,13 +350,13 @@ static quern_scene *scene_of(const char *folder) {
 }
 
 int quern_render_frame_read_file(
-	render_frame *f, const char *path, int64_t number, const char *field, quern_text *why) {
+	render_frame *f, const char *path, int64_t number, const render_wish *wish, quern_text *why) {
 	*f = (render_frame) { .number = number };
 	const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
 	int status = QUERN_EXIT_SCENE;
 	if (file < 0) quern_text_add(why, "%s cannot be read: it is missing or damaged", path);
 	else if (!read_head(file, f)) quern_text_add(why, "%s is no frame of this program, or is damaged", path);
-	else status = read_clouds(f, file, path, field, why);
+	else status = read_clouds(f, file, path, wish, why);
 	if (file >= 0) H5Fclose(file);
 	return status;
 }
@@ -327,7 +364,8 @@ int quern_render_frame_read_file(
 /* ---- damage ---- */
 
 typedef struct {
-	const char *path, *field;
+	const char *path;
+	const render_wish *wish;
 } trial;
 
 /* What the library prints as it crashes is nobody's sentence. */
@@ -336,16 +374,16 @@ static void try_reading(void *arg) {
 	render_frame f;
 	quern_text why = { 0 };
 	if (!freopen("/dev/null", "w", stderr)) return;
-	quern_render_frame_read_file(&f, t->path, 0, t->field, &why);
+	quern_render_frame_read_file(&f, t->path, 0, t->wish, &why);
 	quern_text_finish(&why);
 	quern_render_frame_finish(&f);
 }
 
 /* Frames have no checksum, and a damaged one can crash the library that reads it: so a child reads it first. */
-static bool is_readable(const char *path, const char *field, quern_text *why) {
+static bool is_readable(const char *path, const render_wish *wish, quern_text *why) {
 	enum { SECONDS = 600 };
 	char what[80];
-	trial t = { path, field };
+	trial t = { path, wish };
 	const quern_child how = quern_child_run(try_reading, &t, SECONDS);
 	if (how.end != QUERN_CHILD_CRASHED && how.end != QUERN_CHILD_LATE) return true;
 	quern_child_say(&how, SECONDS, what);
@@ -355,8 +393,13 @@ static bool is_readable(const char *path, const char *field, quern_text *why) {
 
 /* ---- a run's ---- */
 
+int64_t quern_render_frame_last(const char *folder) {
+	int64_t first, last;
+	return frames_of(folder, &first, &last) ? last : -1;
+}
+
 int quern_render_frame_read(
-	render_frame *f, const char *folder, int64_t number, const char *field, quern_text *why) {
+	render_frame *f, const char *folder, int64_t number, const render_wish *wish, quern_text *why) {
 	int64_t first = 0, last = 0;
 	*f = (render_frame) { .number = number };
 	if (!frames_of(folder, &first, &last)) {
@@ -370,10 +413,10 @@ int quern_render_frame_read(
 		return QUERN_EXIT_SCENE;
 	}
 	char *path = quern_format("%s/frames/%06lld.h5", folder, (long long)number);
-	const int status = is_readable(path, field, why)
-						   ? quern_render_frame_read_file(f, path, number, field, why)
-						   : QUERN_EXIT_SCENE;
+	const int status = is_readable(path, wish, why) ? quern_render_frame_read_file(f, path, number, wish, why)
+													: QUERN_EXIT_SCENE;
 	if (status == QUERN_EXIT_DONE) f->scene = scene_of(folder);
+	if (status == QUERN_EXIT_DONE) quern_render_links_mend(f);
 	free(path);
 	return status;
 }
@@ -382,6 +425,7 @@ static void finish_cloud(render_cloud *cloud) {
 	free(cloud->position);
 	free(cloud->size);
 	free(cloud->value);
+	free(cloud->vector);
 	free(cloud->sort);
 }
 
@@ -390,5 +434,6 @@ void quern_render_frame_finish(render_frame *f) {
 	finish_cloud(&f->points);
 	finish_cloud(&f->cells);
 	free(f->pose);
+	free(f->link);
 	if (f->scene) quern_scene_destroy(f->scene);
 }

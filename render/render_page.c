@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render.h"
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
 #include <math.h>
 #include <quern/oracle.h>
 #include <stdio.h>
@@ -11,7 +13,9 @@ typedef struct {
 	const render_frame *frame;
 	const render_range *range;
 	render_view *view;
-	double unit, width, margin; /* pixels */
+	char chain[96], arrow[160];       /* what a line and an arrow of the legend stand for */
+	double chain_width, arrow_length; /* pixels */
+	double unit, width, margin;       /* pixels */
 } page;
 
 typedef struct {
@@ -19,7 +23,18 @@ typedef struct {
 	int sign;
 } legend_entry;
 
-enum { SIGN_GRAIN, SIGN_SHARED, SIGN_FIXED, SIGN_POINT, SIGN_HYBRID, SIGN_CONTINUUM, SIGN_BODY, SIGNS };
+enum {
+	SIGN_GRAIN,
+	SIGN_SHARED,
+	SIGN_FIXED,
+	SIGN_POINT,
+	SIGN_HYBRID,
+	SIGN_CONTINUUM,
+	SIGN_BODY,
+	SIGN_CHAIN,
+	SIGN_ARROW,
+	SIGNS
+};
 
 enum { LEFT, MIDDLE, RIGHT };
 
@@ -139,7 +154,8 @@ static void draw_scale(const page *p, double x, double y) {
 
 /* ---- legend ---- */
 
-static size_t list_signs(const render_frame *f, legend_entry out[SIGNS]) {
+static size_t list_signs(const page *p, legend_entry out[SIGNS]) {
+	const render_frame *f = p->frame;
 	const bool plane = f->dimension == 2, zones = plane && f->cells.sort;
 	const bool cells = f->cells.value != NULL,
 			   bodies = plane && f->scene && quern_scene_section(f->scene, "bodies");
@@ -152,7 +168,8 @@ static size_t list_signs(const render_frame *f, legend_entry out[SIGNS]) {
 		{ !cells && f->points.n, { "continuum point", SIGN_POINT } },
 		{ zones && quern_render_has(&f->cells, QUERN_HYBRID), { "hybrid zone", SIGN_HYBRID } },
 		{ zones && quern_render_has(&f->cells, QUERN_CONTINUUM), { "continuum zone", SIGN_CONTINUUM } },
-		{ bodies, { "wall or body", SIGN_BODY } } };
+		{ bodies, { "wall or body", SIGN_BODY } }, { *p->chain != 0, { p->chain, SIGN_CHAIN } },
+		{ *p->arrow != 0, { p->arrow, SIGN_ARROW } } };
 	size_t n = 0;
 	for (size_t k = 0; k < SIGNS; k++)
 		if (all[k].here) out[n++] = all[k].entry;
@@ -171,6 +188,18 @@ static void draw_sign(const page *p, double x, double y, int sign) {
 						 : sign == SIGN_FIXED ? RENDER_FIXED
 											  : RENDER_WHOLE;
 		quern_render_disc(p->c, x, y, r, sign == SIGN_FIXED ? quern_render_grey : grain, sort, 1.4 * line);
+		return;
+	}
+	if (sign == SIGN_CHAIN) {
+		cairo_move_to(p->c, x - 12 * line, y);
+		cairo_line_to(p->c, x + 12 * line, y);
+		quern_render_set(p->c, quern_render_ink, 1);
+		cairo_set_line_width(p->c, p->chain_width);
+		cairo_stroke(p->c);
+		return;
+	}
+	if (sign == SIGN_ARROW) {
+		quern_render_arrow(p->c, x - 12 * line, y, p->arrow_length, 0, line);
 		return;
 	}
 	const double half = sign == SIGN_POINT ? 0.6 * r : 1.1 * r;
@@ -196,41 +225,119 @@ static void draw_sign(const page *p, double x, double y, int sign) {
 /* Two columns; returns the height. */
 static double draw_legend(const page *p, double x, double y, bool measure) {
 	legend_entry entry[SIGNS];
-	const size_t n = list_signs(p->frame, entry), rows = (n + 1) / 2;
+	const size_t n = list_signs(p, entry), rows = (n + 1) / 2;
 	for (size_t k = 0; k < n && !measure; k++) {
 		const double left = x + (k / rows ? 250 : 0) * p->unit,
 					 level = y + (18 + 34 * (double)(k % rows)) * p->unit;
 		draw_sign(p, left + 12 * p->unit, level, entry[k].sign);
-		write_text(p, left + 36 * p->unit, level + 7 * p->unit, 20, false, LEFT, entry[k].text);
+		const double room =
+			entry[k].sign == SIGN_ARROW ? fmax(36 * p->unit, p->arrow_length + 12 * p->unit) : 36 * p->unit;
+		write_text(p, left + room, level + 7 * p->unit, 20, false, LEFT, entry[k].text);
 	}
 	return (double)(34 * rows) * p->unit;
 }
 
+/* Round values, as large as they may be, so that their signs fit in. */
+static void set_scales(page *p, const render_style *s) {
+	char value[64];
+	if (s->frame->n_links && s->widest > 0) {
+		const double force = quern_render_round_step(s->widest);
+		quern_render_quantity(value, sizeof value, force, "N");
+		snprintf(p->chain, sizeof p->chain, "presses with %s", value);
+		p->chain_width = quern_render_line_width(s) * force / s->widest;
+	}
+	if (*s->frame->vector_field && s->longest > 0) {
+		const double size = quern_render_round_step(s->longest);
+		quern_render_quantity(value, sizeof value, size, s->frame->vector_unit);
+		snprintf(p->arrow, sizeof p->arrow, "%.24s %s", s->frame->vector_field, value);
+		p->arrow_length = quern_render_arrow_length(s) * size / s->longest;
+	}
+}
+
 /* ---- the page ---- */
 
-cairo_surface_t *quern_render_page(const render_frame *f, int width) {
+static void draw_picture(cairo_t *c, const render_style *s) {
+	if (s->frame->dimension == 2) quern_render_plane(c, s);
+	else quern_render_space(c, s);
+}
+
+/* Spheres are an image on paper too, and so are very many discs, which would be a file that nothing opens. */
+static void draw_as_image(cairo_t *c, const render_style *s) {
+	enum { FINER = 2 };
+	render_view view = *s->view;
+	render_style style = *s;
+	view.scale *= FINER, view.width *= FINER, view.height *= FINER, style.line *= FINER;
+	style.view = &view;
+	cairo_surface_t *image =
+		cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)ceil(view.width), (int)ceil(view.height));
+	cairo_t *on = cairo_create(image);
+	draw_picture(on, &style);
+	cairo_destroy(on);
+	cairo_scale(c, 1.0 / FINER, 1.0 / FINER);
+	cairo_set_source_surface(c, image, 0, 0);
+	cairo_paint(c);
+	cairo_surface_destroy(image);
+}
+
+static bool is_image(const render_frame *f, render_form form) {
+	const size_t most = 20000; /* of what may be drawn one by one */
+	return form != RENDER_PNG && (f->dimension == 3 || f->grains.n + f->points.n + f->cells.n > most);
+}
+
+/* An empty page; `scale`: from pixels to the form's own unit. A date would make the same picture another file. */
+static cairo_surface_t *open_page(
+	double width, double height, double scale, render_form form, cairo_write_func_t write, void *to) {
+	if (form == RENDER_PNG) return cairo_image_surface_create(CAIRO_FORMAT_RGB24, (int)width, (int)height);
+	cairo_surface_t *surface =
+		form == RENDER_PDF ? cairo_pdf_surface_create_for_stream(write, to, scale * width, scale * height)
+						   : cairo_svg_surface_create_for_stream(write, to, width, height);
+	if (form == RENDER_SVG) cairo_svg_surface_set_document_unit(surface, CAIRO_SVG_UNIT_PX);
+	else cairo_pdf_surface_set_metadata(surface, CAIRO_PDF_METADATA_CREATE_DATE, "");
+	return surface;
+}
+
+/* Of a page that is one of many all rows are kept, so that every one is as high. */
+static double foot_of(const page *p, bool fixed) {
+	return fmax(fixed ? 34 * (SIGNS + 1) / 2 * p->unit : draw_legend(p, 0, 0, true), 100 * p->unit) +
+		   24 * p->unit;
+}
+
+static void draw_page(page *p, const render_style *style, double head, render_form form) {
+	const double unit = p->unit, width = p->width;
+	cairo_set_source_rgb(p->c, 1, 1, 1);
+	cairo_paint(p->c);
+	draw_heading(p, 50 * unit);
+	cairo_save(p->c);
+	cairo_translate(p->c, floor(0.5 * (width - p->view->width)), floor(head));
+	if (is_image(p->frame, form)) draw_as_image(p->c, style);
+	else draw_picture(p->c, style);
+	cairo_restore(p->c);
+	const double top = head + p->view->height + 28 * unit, room = width - 2 * p->margin;
+	if (*p->frame->field) draw_bar(p, p->margin + 16 * unit, top, 0.36 * room);
+	draw_scale(p, p->margin + (*p->frame->field ? 0.46 * room : 0), top);
+	draw_legend(p, width - p->margin - 480 * unit, top, false);
+}
+
+cairo_surface_t *quern_render_page(const render_frame *f, const render_wish *wish, int width,
+	render_form form, cairo_write_func_t write, void *to) {
 	const double unit = fmax(width / 1600.0, 0.5), margin = 40 * unit, head = 84 * unit;
-	const render_range range = quern_render_range_of(f);
-	render_view view = quern_render_view_of(f);
+	const double scale = form == RENDER_PDF ? 0.45 : 1; /* 1600 pixels are as wide as a sheet on its side */
+	const render_range range = quern_render_range_of(f, wish);
+	render_view view = quern_render_view_of(f, wish);
+	const render_style style = { .frame = f,
+		.view = &view,
+		.range = &range,
+		.line = unit,
+		.widest = wish->widest > 0 ? wish->widest : quern_render_widest(f),
+		.longest = wish->longest > 0 ? wish->longest : quern_render_longest(f) };
 	page p = { .frame = f, .range = &range, .view = &view, .unit = unit, .width = width, .margin = margin };
 	quern_render_view_fit(&view, f, width - 2 * margin, 0.8 * width);
-	const double foot = fmax(draw_legend(&p, 0, 0, true), 100 * unit) + 24 * unit;
-	const int height = (int)ceil(head + view.height + 28 * unit + foot);
-	cairo_surface_t *surface = cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height);
+	set_scales(&p, &style);
+	const double height = ceil(head + view.height + 28 * unit + foot_of(&p, view.fixed));
+	cairo_surface_t *surface = open_page(width, height, scale, form, write, to);
 	p.c = cairo_create(surface);
-	cairo_set_source_rgb(p.c, 1, 1, 1);
-	cairo_paint(p.c);
-	draw_heading(&p, 50 * unit);
-	const render_style style = { .frame = f, .view = &view, .range = &range, .line = unit };
-	cairo_save(p.c);
-	cairo_translate(p.c, floor(0.5 * (width - view.width)), floor(head));
-	if (f->dimension == 2) quern_render_plane(p.c, &style);
-	else quern_render_space(p.c, &style);
-	cairo_restore(p.c);
-	const double top = head + view.height + 28 * unit, room = width - 2 * margin;
-	if (*f->field) draw_bar(&p, margin + 16 * unit, top, 0.36 * room);
-	draw_scale(&p, margin + (*f->field ? 0.46 * room : 0), top);
-	draw_legend(&p, width - margin - 480 * unit, top, false);
+	cairo_scale(p.c, scale, scale);
+	draw_page(&p, &style, head, form);
 	cairo_destroy(p.c);
 	return surface;
 }

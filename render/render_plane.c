@@ -48,6 +48,10 @@ void quern_render_disc(
 }
 
 /* What lies beyond is left out: far away, Cairo's numbers of pixels begin again from the other side. */
+static const double beside = 1000; /* pixels */
+
+static double in_pixels(double size, const render_view *v) { return fmin(size * v->scale, 1e6); }
+
 static bool is_inside(const render_view *v, const double at[3], double reach) {
 	return at[0] > -reach && at[1] > -reach && at[0] < v->width + reach && at[1] < v->height + reach;
 }
@@ -57,7 +61,7 @@ static void draw_grains(cairo_t *c, const render_style *s) {
 	for (size_t i = 0; i < cloud->n; i++) {
 		double at[3];
 		quern_render_project(s->view, cloud->position[i], at);
-		const double radius = fmax(cloud->size[i] * s->view->scale, 0.7);
+		const double radius = fmax(in_pixels(cloud->size[i], s->view), 0.7);
 		if (!is_inside(s->view, at, radius + s->line)) continue;
 		quern_render_disc(
 			c, at[0], at[1], radius, quern_render_colour_of(s, cloud, i), cloud->sort[i], s->line);
@@ -69,7 +73,7 @@ static void draw_squares(cairo_t *c, const render_style *s, const render_cloud *
 		double at[3];
 		if (cloud == &s->frame->cells && cloud->value[i] == 0) continue;
 		quern_render_project(s->view, cloud->position[i], at);
-		const double edge = fmax(share * cloud->size[i] * s->view->scale, 1.2);
+		const double edge = fmax(share * in_pixels(cloud->size[i], s->view), 1.2);
 		if (!is_inside(s->view, at, edge)) continue;
 		quern_render_set(c, quern_render_colour_of(s, cloud, i), 1);
 		cairo_rectangle(c, at[0] - 0.5 * edge, at[1] - 0.5 * edge, edge, edge);
@@ -86,7 +90,7 @@ static void draw_outlines(cairo_t *c, const render_style *s) {
 		for (size_t i = 0; i < clouds[k]->n; i++) {
 			double at[3];
 			quern_render_project(s->view, clouds[k]->position[i], at);
-			const double radius = k == 0 ? clouds[k]->size[i] * s->view->scale : 0.7 * s->line;
+			const double radius = k == 0 ? in_pixels(clouds[k]->size[i], s->view) : 0.7 * s->line;
 			if (!is_inside(s->view, at, radius + s->line)) continue;
 			cairo_new_sub_path(c);
 			cairo_arc(c, at[0], at[1], radius, 0, 2 * M_PI);
@@ -125,6 +129,8 @@ static void zone_corner(const render_style *s, const double corner[2], long x, l
 	const double at[3] = { corner[0] + (double)x * s->frame->cell, corner[1] + (double)y * s->frame->cell,
 		0 };
 	quern_render_project(s->view, at, out);
+	out[0] = fmin(fmax(out[0], -beside), s->view->width + beside);
+	out[1] = fmin(fmax(out[1], -beside), s->view->height + beside);
 }
 
 static void draw_tints(cairo_t *c, const render_style *s) {
@@ -206,7 +212,7 @@ static bool is_there(const quern_section *bodies, const quern_filling *body) {
 }
 
 /* With the values of the scene's stage that led to the frame. */
-static const quern_section *bodies_of(const render_frame *f) {
+const quern_section *quern_render_bodies(const render_frame *f) {
 	const quern_scene *scene = f->scene;
 	if (!scene) return NULL;
 	int64_t k = quern_episode_at(scene, f->time);
@@ -244,7 +250,7 @@ static float thickening(const render_style *s, const quern_filling *body, float 
 
 /* The distance to the nearest body, in pixels, of every pixel. */
 static float *distances(const render_style *s, int width, int height) {
-	const quern_section *bodies = bodies_of(s->frame);
+	const quern_section *bodies = quern_render_bodies(s->frame);
 	const size_t n = (size_t)width * (size_t)height;
 	if (!bodies || !bodies->n_slots) return NULL;
 	float *nearest = quern_take(n, sizeof(float)), *one = quern_take(n, sizeof(float));
@@ -337,5 +343,7 @@ void quern_render_plane(cairo_t *c, const render_style *s) {
 		draw_grains(c, s);
 	}
 	draw_borders(c, s);
+	quern_render_chains(c, s);
+	quern_render_arrows(c, s);
 	cairo_restore(c);
 }

@@ -225,6 +225,8 @@ void quern_render_space(cairo_t *c, const render_style *s) {
 	cairo_surface_t *image = smooth(&r, fmax(0.8 * size * r.scale, 2));
 	cairo_set_source_surface(c, image, 0, 0);
 	cairo_paint(c);
+	quern_render_chains(c, s);
+	quern_render_arrows(c, s);
 	cairo_surface_destroy(image);
 	free(r.depth);
 	free(r.colour);

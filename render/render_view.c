@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render.h"
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -21,14 +23,56 @@ bool quern_render_shown(const render_view *v, const render_frame *f, const rende
 	return true;
 }
 
+static bool is_within(const double x[3], const double low[3], const double high[3]) {
+	for (int k = 0; k < 3; k++)
+		if (x[k] < low[k] || x[k] > high[k]) return false;
+	return true;
+}
+
 /* Grains that make up a rough floor do not widen the picture, unless there are no others. */
-static void add_clouds(render_view *v, const render_frame *f) {
+static size_t list_places(const render_frame *f, double (*place)[3], double *half) {
 	const bool all = !f->points.n && !quern_render_has(&f->grains, RENDER_WHOLE) &&
 					 !quern_render_has(&f->grains, RENDER_SHARED);
-	for (int k = 0; k < 3; k++) v->low[k] = INFINITY, v->high[k] = -INFINITY;
+	size_t n = 0;
 	for (size_t i = 0; i < f->grains.n; i++)
-		if (all || !is_fixed(&f->grains, f, i)) add(v, f->grains.position[i], f->grains.size[i]);
-	for (size_t i = 0; i < f->points.n; i++) add(v, f->points.position[i], 0.5 * f->points.size[i]);
+		if (all || !is_fixed(&f->grains, f, i)) {
+			memcpy(place[n], f->grains.position[i], sizeof *place);
+			half[n++] = f->grains.size[i];
+		}
+	for (size_t i = 0; i < f->points.n; i++) {
+		memcpy(place[n], f->points.position[i], sizeof *place);
+		half[n++] = 0.5 * f->points.size[i];
+	}
+	return n;
+}
+
+/* How far out what moves is no stray: by half of the longest side beyond 99.8 % of it along each axis. */
+static void set_fence(double (*place)[3], size_t n, double low[3], double high[3]) {
+	enum { LEAST = 50, PART = 1000 };
+	const size_t out = n < LEAST ? 0 : n / PART ? n / PART : 1;
+	double *along = quern_take(n + 1, sizeof(double)), longest = 0;
+	for (int k = 0; k < 3; k++) {
+		for (size_t i = 0; i < n; i++) along[i] = place[i][k];
+		quern_render_quantile(along, n, 0);
+		low[k] = out ? along[out] : -INFINITY;
+		high[k] = out ? along[n - 1 - out] : INFINITY;
+		longest = fmax(longest, high[k] - low[k]);
+	}
+	for (int k = 0; k < 3; k++) low[k] -= 0.5 * longest, high[k] += 0.5 * longest;
+	free(along);
+}
+
+static void add_clouds(render_view *v, const render_frame *f) {
+	const size_t most = f->grains.n + f->points.n + 1;
+	double(*place)[3] = quern_take(most, sizeof *place), *half = quern_take(most, sizeof(double));
+	double low[3], high[3];
+	const size_t n = list_places(f, place, half);
+	set_fence(place, n, low, high);
+	for (int k = 0; k < 3; k++) v->low[k] = INFINITY, v->high[k] = -INFINITY;
+	for (size_t i = 0; i < n; i++)
+		if (is_within(place[i], low, high)) add(v, place[i], half[i]);
+	free(place);
+	free(half);
 }
 
 /* What is occupied, down to the floor unless that is far below. */
@@ -55,7 +99,7 @@ static void crop(render_view *v, const render_frame *f) {
 	}
 }
 
-render_view quern_render_view_of(const render_frame *f) {
+render_view quern_render_view_of(const render_frame *f, const render_wish *wish) {
 	render_view v = { .right = { 1, 0, 0 }, .up = { 0, 1, 0 }, .away = { 0, 0, -1 } };
 	if (f->dimension == 3) {
 		const double turn = -0.45, lift = 0.40;
@@ -64,7 +108,10 @@ render_view quern_render_view_of(const render_frame *f) {
 		v.up[0] = sin(lift) * away[0], v.up[1] = sin(lift) * away[1], v.up[2] = cos(lift);
 		v.away[0] = cos(lift) * away[0], v.away[1] = cos(lift) * away[1], v.away[2] = -sin(lift);
 	}
-	crop(&v, f);
+	v.fixed = wish->has_view;
+	memcpy(v.low, wish->low, sizeof v.low);
+	memcpy(v.high, wish->high, sizeof v.high);
+	if (!v.fixed) crop(&v, f);
 	return v;
 }
 
@@ -79,15 +126,19 @@ static void widen(const render_view *v, const double x[3], double half, double l
 
 void quern_render_view_fit(render_view *v, const render_frame *f, double most_width, double most_height) {
 	double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
-	const int corners = f->dimension == 3 ? 4 : 8; /* in 3-D of the ground alone: the upper ones are empty */
+	/* in 3-D of the ground alone, where nothing else is wished: the upper ones are empty */
+	const int corners = f->dimension == 3 && !v->fixed ? 4 : 8;
 	for (int corner = 0; corner < corners; corner++) {
 		double x[3];
 		for (int k = 0; k < 3; k++) x[k] = corner >> k & 1 ? v->high[k] : v->low[k];
 		widen(v, x, 0, low, high);
 	}
-	for (size_t i = 0; i < f->grains.n; i++)
-		if (!is_fixed(&f->grains, f, i)) widen(v, f->grains.position[i], f->grains.size[i], low, high);
-	for (size_t i = 0; i < f->points.n; i++) widen(v, f->points.position[i], f->points.size[i], low, high);
+	for (size_t i = 0; i < f->grains.n && !v->fixed; i++)
+		if (!is_fixed(&f->grains, f, i) && is_within(f->grains.position[i], v->low, v->high))
+			widen(v, f->grains.position[i], f->grains.size[i], low, high);
+	for (size_t i = 0; i < f->points.n && !v->fixed; i++)
+		if (is_within(f->points.position[i], v->low, v->high))
+			widen(v, f->points.position[i], f->points.size[i], low, high);
 	v->scale = fmin(most_width / (high[0] - low[0]), most_height / (high[1] - low[1]));
 	v->left = low[0];
 	v->top = high[1];

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* fuzz frame - a good frame with some of its values, sizes and types changed is refused with a sentence, or drawn; the
- * unchanged one is drawn. The last byte says which field colours it. */
+ * unchanged one is drawn. The last byte says which field colours it, and whether
+ * there are arrows. */
 #include "edits.h"
 #include "kit.h"
 #include <frame.h>
@@ -26,18 +27,20 @@ int LLVMFuzzerInitialize(int *argc, char ***argv) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 	const size_t n_fields = sizeof fields / sizeof *fields;
-	const char *field = size ? fields[data[size - 1] % n_fields] : NULL;
+	const render_wish wish = { .field = size ? fields[data[size - 1] % n_fields] : NULL,
+		.chains = true,
+		.vectors = size && data[size - 1] & 64 ? "velocity" : NULL };
 	render_frame frame;
 	quern_text why = { 0 };
 	edits_make(path, data, size);
-	const int status = quern_render_frame_read_file(&frame, path, 0, field, &why);
+	const int status = quern_render_frame_read_file(&frame, path, 0, &wish, &why);
 	if (status ? !why.length : why.length > 0) abort();
 	if (!size && status) {
 		fprintf(stderr, "the frame as it was written is refused: %s\n", why.data);
 		abort();
 	}
 	if (!status) {
-		cairo_surface_t *picture = quern_render_page(&frame, WIDTH);
+		cairo_surface_t *picture = quern_render_page(&frame, &wish, WIDTH, RENDER_PNG, NULL, NULL);
 		if (cairo_surface_status(picture) != CAIRO_STATUS_SUCCESS) abort();
 		cairo_surface_destroy(picture);
 	}

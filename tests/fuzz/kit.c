@@ -10,7 +10,7 @@ static const char scene_text[] =
 	"quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [0.2, 0.2]}\ntime: {end: "
 	"1}\n"
 	"output: {every: 0.1, compress: false, fields: [grain.velocity, grain.weight, point.stress, "
-	"point.velocity, cell.zone]}\n"
+	"point.velocity, cell.zone, contact.force, touch.force]}\n"
 	"bodies: [{plane: {point: [0, 0], normal: [0, 1]}}]\n"
 	"grains: {material: {density: 2500, radius: {mean: 0.002}}, contact: {linear: {stiffness: 1e5}},\n"
 	"  fill: {region: {box: {lower: [0.002, 0.002], upper: [0.05, 0.05]}}}}\n"
