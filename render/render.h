@@ -155,6 +155,8 @@ render_colour quern_render_colour_of(const render_style *, const render_cloud *,
 bool quern_render_has(const render_cloud *, int sort);
 void quern_render_plane(cairo_t *, const render_style *);
 void quern_render_space(cairo_t *, const render_style *);
+/* What `draw` would draw, as an image in the page. */
+void quern_render_as_image(cairo_t *, const render_style *, void (*draw)(cairo_t *, const render_style *));
 /* Signs of the legend, also used for what they stand for. */
 void quern_render_disc(cairo_t *, double x, double y, double radius, render_colour, int sort, double line);
 void quern_render_hatch(cairo_t *, double line);

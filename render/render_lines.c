@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double usual = 0.995; /* of the values are at most what the widest and the longest stand for */
+static const double usual = 0.995;  /* of the values are at most what the widest and the longest stand for */
+static const double thickest = 1.5; /* of the widest: a force may be anything */
 
 /* ---- chains ---- */
 
@@ -46,14 +47,13 @@ static void draw_link(cairo_t *c, const render_style *s, const render_link *l, d
 
 /* Those that are too thin to be seen, and those that pull, are left out. */
 void quern_render_chains(cairo_t *c, const render_style *s) {
-	enum { THICKEST = 4 }; /* of the widest: a force may be anything */
 	const double widest = quern_render_line_width(s);
 	quern_render_set(c, quern_render_ink, 1);
 	cairo_set_line_cap(c, CAIRO_LINE_CAP_ROUND);
 	for (size_t i = 0; i < s->frame->n_links; i++) {
 		const double share = s->frame->link[i].force / s->widest;
 		if (share * widest > 0.03 * s->line)
-			draw_link(c, s, &s->frame->link[i], widest * fmin(share, THICKEST));
+			draw_link(c, s, &s->frame->link[i], widest * fmin(share, thickest));
 	}
 	cairo_set_line_cap(c, CAIRO_LINE_CAP_BUTT);
 }
@@ -76,7 +76,7 @@ double quern_render_longest(const render_frame *f) {
 	return longest;
 }
 
-double quern_render_arrow_length(const render_style *s) { return 64 * s->line; }
+double quern_render_arrow_length(const render_style *s) { return 52 * s->line; }
 
 /* Paper around the ink, so that it is seen on all colours. */
 void quern_render_arrow(cairo_t *c, double x, double y, double dx, double dy, double line) {

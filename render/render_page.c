@@ -262,23 +262,6 @@ static void draw_picture(cairo_t *c, const render_style *s) {
 }
 
 /* Spheres are an image on paper too, and so are very many discs, which would be a file that nothing opens. */
-static void draw_as_image(cairo_t *c, const render_style *s) {
-	enum { FINER = 2 };
-	render_view view = *s->view;
-	render_style style = *s;
-	view.scale *= FINER, view.width *= FINER, view.height *= FINER, style.line *= FINER;
-	style.view = &view;
-	cairo_surface_t *image =
-		cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)ceil(view.width), (int)ceil(view.height));
-	cairo_t *on = cairo_create(image);
-	draw_picture(on, &style);
-	cairo_destroy(on);
-	cairo_scale(c, 1.0 / FINER, 1.0 / FINER);
-	cairo_set_source_surface(c, image, 0, 0);
-	cairo_paint(c);
-	cairo_surface_destroy(image);
-}
-
 static bool is_image(const render_frame *f, render_form form) {
 	const size_t most = 20000; /* of what may be drawn one by one */
 	return form != RENDER_PNG && (f->dimension == 3 || f->grains.n + f->points.n + f->cells.n > most);
@@ -309,7 +292,7 @@ static void draw_page(page *p, const render_style *style, double head, render_fo
 	draw_heading(p, 50 * unit);
 	cairo_save(p->c);
 	cairo_translate(p->c, floor(0.5 * (width - p->view->width)), floor(head));
-	if (is_image(p->frame, form)) draw_as_image(p->c, style);
+	if (is_image(p->frame, form)) quern_render_as_image(p->c, style, draw_picture);
 	else draw_picture(p->c, style);
 	cairo_restore(p->c);
 	const double top = head + p->view->height + 28 * unit, room = width - 2 * p->margin;

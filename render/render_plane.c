@@ -178,6 +178,28 @@ static void draw_borders(cairo_t *c, const render_style *s) {
 	free(zone);
 }
 
+/* ---- images on paper ---- */
+
+/* Twice as fine as on the page. */
+void quern_render_as_image(cairo_t *c, const render_style *s, void (*draw)(cairo_t *, const render_style *)) {
+	enum { FINER = 2 };
+	render_view view = *s->view;
+	render_style style = *s;
+	view.scale *= FINER, view.width *= FINER, view.height *= FINER, style.line *= FINER;
+	style.view = &view;
+	cairo_surface_t *image =
+		cairo_image_surface_create(CAIRO_FORMAT_ARGB32, (int)ceil(view.width), (int)ceil(view.height));
+	cairo_t *on = cairo_create(image);
+	draw(on, &style);
+	cairo_destroy(on);
+	cairo_save(c);
+	cairo_scale(c, 1.0 / FINER, 1.0 / FINER);
+	cairo_set_source_surface(c, image, 0, 0);
+	cairo_paint(c);
+	cairo_restore(c);
+	cairo_surface_destroy(image);
+}
+
 /* ---- bodies, by their own geometry, whatever plugin they are of ---- */
 
 enum { RUN = 256 };
@@ -296,7 +318,7 @@ static cairo_surface_t *mask_of(const float *gap, int width, int height, double 
 	return mask;
 }
 
-static void draw_bodies(cairo_t *c, const render_style *s) {
+static void fill_bodies(cairo_t *c, const render_style *s) {
 	const int width = (int)ceil(s->view->width), height = (int)ceil(s->view->height);
 	float *gap = distances(s, width, height);
 	if (!gap) return;
@@ -311,6 +333,12 @@ static void draw_bodies(cairo_t *c, const render_style *s) {
 	cairo_surface_destroy(solid);
 	cairo_surface_destroy(rim);
 	free(gap);
+}
+
+/* Masks are of pixels: on paper too. */
+static void draw_bodies(cairo_t *c, const render_style *s) {
+	if (cairo_surface_get_type(cairo_get_target(c)) == CAIRO_SURFACE_TYPE_IMAGE) fill_bodies(c, s);
+	else quern_render_as_image(c, s, fill_bodies);
 }
 
 /* ---- the plane ---- */
