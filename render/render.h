@@ -112,7 +112,7 @@ typedef struct render_range {
 render_range quern_render_range_of(const render_frame *, const render_wish *);
 /* "1.5 mm/s": a value in a unit with a fitting prefix. */
 void quern_render_quantity(char *out, size_t size, double value, const char *unit);
-/* The quantile `share` of n numbers, which are sorted by it. */
+/* The least of n numbers that at least the part `share` does not exceed; sorts them. 0 if there are none. */
 double quern_render_quantile(double *values, size_t n, double share);
 /* The least and greatest that colours stand for lie within it; what is beyond has none. */
 #define RENDER_MOST_VALUE 1e150

@@ -49,7 +49,7 @@ static int by_value(const void *a, const void *b) {
 
 double quern_render_quantile(double *values, size_t n, double share) {
 	qsort(values, n, sizeof(double), by_value);
-	return n ? values[(size_t)(share * (double)(n - 1))] : 0;
+	return n ? values[(size_t)ceil(share * (double)(n - 1))] : 0;
 }
 
 /* Values that can be drawn. */
