@@ -1,72 +1,17 @@
 # SPDX-License-Identifier: MIT
 """`quern render`: pictures of frames of every sort, looked at pixel by pixel, and its refusals."""
-import os
+import json
 import pathlib
+import signal
 import subprocess
 import tempfile
-import zlib
+import time
 
 import h5py
 import numpy as np
 
-QUERN = pathlib.Path(os.environ["QUERN"])
-SOURCE = pathlib.Path(os.environ["QUERN_SOURCE"])
-
-
-def run(*words, status=0):
-    done = subprocess.run([str(w) for w in (QUERN, *words)], capture_output=True, text=True, timeout=60)
-    assert done.returncode == status, f"{words}: exit status {done.returncode}, not {status}\n{done.stderr}"
-    return done.stdout if status == 0 else done.stderr
-
-
-def unfilter(kind, row, above):
-    """Undoes what PNG did to a row before packing it."""
-    if kind == 2:
-        return bytearray((a + b) & 255 for a, b in zip(row, above))
-    for x in range(len(row) if kind else 0):
-        left, up, corner = (row[x - 3], above[x], above[x - 3]) if x > 2 else (0, above[x], 0)
-        if kind == 1:
-            guess = left
-        elif kind == 3:
-            guess = (left + up) >> 1
-        else:
-            to_left, to_up, to_corner = abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)
-            guess = left if to_left <= to_up and to_left <= to_corner else up if to_up <= to_corner else corner
-        row[x] = (row[x] + guess) & 255
-    return row
-
-
-def read_png(path):
-    """Rows x columns x 3 of a picture with eight bits per colour."""
-    data = path.read_bytes()
-    assert data[:8] == b"\x89PNG\r\n\x1a\n", f"{path} is no PNG"
-    place, packed, width, height = 8, b"", 0, 0
-    while place < len(data):
-        length, name = int.from_bytes(data[place:place + 4], "big"), data[place + 4:place + 8]
-        body = data[place + 8:place + 8 + length]
-        if name == b"IHDR":
-            width, height = (int.from_bytes(body[k:k + 4], "big") for k in (0, 4))
-            assert body[8:10] == b"\x08\x02", "not eight bits of red, green, blue"
-        packed += body if name == b"IDAT" else b""
-        place += length + 12
-    raw, stride = zlib.decompress(packed), 3 * width
-    above, picture = bytearray(stride), bytearray()
-    for y in range(height):
-        begin = y * (stride + 1)
-        above = unfilter(raw[begin], bytearray(raw[begin + 1:begin + 1 + stride]), above)
-        picture += above
-    return np.frombuffer(picture, np.uint8).reshape(height, width, 3).astype(int)
-
-
-def write_frame(folder, dimension, name, sets, number=0):
-    (folder / "frames").mkdir(parents=True, exist_ok=True)
-    with h5py.File(folder / f"frames/{number:06d}.h5", "w") as file:
-        for key, value in {"format": np.bytes_("quern-frame 1"), "time": 0.35, "dimension": np.int64(dimension),
-                           "name": np.bytes_(name)}.items():
-            file.attrs.create(key, value)
-        for group, columns in sets.items():
-            for field, (unit, table) in columns.items():
-                file.create_dataset(f"{group}/{field}", data=table).attrs.create("unit", np.bytes_(unit))
+import lab
+from png import QUERN, SOURCE, place, read_png, run, write_frame
 
 
 def lattice(dimension, n, step):
@@ -144,6 +89,88 @@ def pictures(folder):
     lightness_rises(folder / "row")
 
 
+def cloud(n, value, far=None):
+    """n grains in a heap 40 mm wide, perhaps one of them elsewhere; the first stands at (10 mm, 5 mm) and has the value."""
+    x = np.random.default_rng(3).uniform(0, 0.04, (n, 3)) * [1, 0.5, 0]
+    x[0], speed = (0.01, 0.005, 0), np.zeros((n, 3))
+    x[np.hypot(*(x - x[0])[:, :2].T) < 2e-3] += [0, 0.01, 0]  # nothing lies over it
+    x[0], x[1] = (0.01, 0.005, 0), far or x[1]
+    speed[:, 0] = np.linspace(0, 2 * value, n)
+    speed[0] = value, 0, 0
+    return {"grains": {"position": ("m", x), "radius": ("m", np.full(n, 5e-4)), "velocity": ("m/s", speed)}}
+
+
+def measure(folder, *options):
+    return json.loads(run("render", folder, "--measure", *options))
+
+
+def views(folder):
+    """A fixed view and range: the same grain at the same pixel in the same colour, whatever else is in the frame; and strays."""
+    view, at = [-0.01, -0.005, 0.05, 0.03], []
+    write_frame(folder / "v", 2, "few", cloud(30, 0.5), 0)
+    write_frame(folder / "v", 2, "many", cloud(900, 0.5, far=(3, 2, 0)), 1)
+    for k, width in ((0, 600), (1, 600), (1, 1100)):
+        x, y = place(view, width, (0.01, 0.005))
+        picture = picture_of(folder / "v", folder / "v.png", "--frame", k, "--view", ",".join(map(str, view)), "--range",
+                             "0,1000 mm/s", width=width)
+        at.append(picture[y, x])
+        assert (picture[y - 1:y + 2, x - 1:x + 2] == at[0]).all(), f"the grain at pixel {x}, {y} is {picture[y, x]}, not {at[0]}"
+    middle = has_colour(picture[:, :200], at[0])  # the bar has it in its middle
+    assert middle and len({tuple(a) for a in at}) == 1, at
+    write_frame(folder / "v", 2, "no stray", cloud(900, 0.5), 2)
+    write_frame(folder / "v", 2, "a front", cloud(900, 0.5, far=(0.055, 0.01, 0)), 3)
+    stray, none, front = (measure(folder / "v", "--frame", k) for k in (1, 2, 3))
+    share = (none["view"][2] - none["view"][0]) / (stray["view"][2] - stray["view"][0])
+    assert 0.98 < share < 1.02 and stray["view"][2] < 0.05, f"a stray changes the view: {stray}, {none}"
+    assert front["view"][2] > 0.0555, f"the front is cut off: {front}"
+    assert none["range"] == [0, 1], none
+    # what is measured draws the same picture again; only its legend keeps all rows
+    fixed = [f"--{key}={','.join(map(repr, none[key]))}" for key in ("view", "range")]
+    own, again = (picture_of(folder / "v", folder / f"{k}.png", "--frame", 2, *words) for k, words in (("own", ()), ("again", fixed)))
+    assert (own[:-70] == again[:len(own) - 70]).all() and len(again) > len(own), "a measured view is another one"
+    write_frame(folder / "v", 3, "space", cloud(900, 0.5, far=(3, 2, 1)), 4)
+    box = measure(folder / "v", "--frame", 4)["view"]
+    assert len(box) == 6 and max(box) < 0.05, box
+    picture_of(folder / "v", folder / "box.png", "--frame", 4, f"--view={','.join(map(repr, box))}")
+    print(f"one grain at one pixel, colour {at[0]}; a stray at 3 m widens the view by {1 / share - 1:.1%}")
+
+
+def inode(path):
+    return path.stat().st_ino if path.exists() else None  # of a file that is replaced as a whole another one
+
+
+def until_true(what):
+    deadline = time.monotonic() + 60
+    while not what():
+        assert time.monotonic() < deadline, "it does not come"
+        time.sleep(0.02)
+
+
+def watching(folder):
+    """A run at work is drawn again and again until it ends, or until somebody does not want to see more."""
+    scene, out = lab.scene("two_grains"), folder / "watched"
+    endless = ["--set=time.end=1e6", "--set=output.every=4e-3", "--set=grains.place.0.velocity=[0, 0]", "--set=grains.place.1.velocity=[0, 0]"]
+    at_work = subprocess.Popen([str(QUERN), "run", scene, "-o", str(out), "--quiet", *endless])
+    try:
+        until_true(lambda: (out / "frames/000001.h5").exists())
+        watch = [str(QUERN), "render", str(out), "--watch", "--width", "600"]
+        one, two = (subprocess.Popen([*watch, "-o", str(folder / f"w{k}.png")], stdout=subprocess.PIPE, text=True) for k in "12")
+        seen = set()
+        until_true(lambda: seen.add(inode(folder / "w1.png")) or len(seen - {None}) > 2)
+        one.send_signal(signal.SIGINT)
+        assert one.wait(timeout=20) == 130
+        assert two.poll() is None
+        at_work.terminate()
+        assert at_work.wait(timeout=20) == 130 and two.wait(timeout=20) == 0
+    finally:
+        at_work.kill()
+    drawn = len(two.stdout.read().splitlines())
+    run("render", out, "-o", folder / "last.png", "--width", 600)
+    assert (folder / "last.png").read_bytes() == (folder / "w2.png").read_bytes(), "the last frame was not drawn"
+    assert run("render", out, "--watch") == f"{out}/newest.png\n", "a run that is over is drawn once"
+    print(f"watched: {drawn} pictures, the last one of the last frame")
+
+
 def refusals(folder):
     damaged = folder / "damaged/frames"
     damaged.mkdir(parents=True)
@@ -162,6 +189,21 @@ def refusals(folder):
                                 ([folder / "h2", "--field", "grain.radius", "-o", folder / "no/a.png"], 4, "written"),
                                 ([folder / "h2", "--field", "grain.radius.y"], 1, "no field"),
                                 ([folder / "h2", "--width", 10], 1, "between 600 and 8000"),
+                                ([folder / "h2", "-o", folder / "a.jpg"], 1, "PNG, SVG and PDF can be written"),
+                                ([folder / "h2", "--view", "0,0,1"], 1, "needs 4 numbers between commas, found 3"),
+                                ([folder / "h3", "--view", "0,0,1,1"], 1, "needs 6 numbers"),
+                                ([folder / "h2", "--view", "1,0,0,1"], 1, "give the lower corner first"),
+                                ([folder / "h2", "--view", "0,0,1 s,1"], 1, "1 s"),
+                                ([folder / "h2", "--view", "0,0,1e99,1"], 1, "beyond"),
+                                ([folder / "h2", "--range", "1,1"], 1, "give the lower end first"),
+                                ([folder / "h2", "--range", "0,1 kg"], 1, "kg"), ([folder / "h2", "--range", "0,nan"], 1, "nan"),
+                                ([folder / "h2", "--chains"], 2, "contact.force and touch.force in output.fields"),
+                                ([folder / "h2", "--vectors", "pressure"], 1, "no vectors 'pressure'"),
+                                ([folder / "h2", "--vectors", "velocity", "--longest", "0"], 1, "above 0"),
+                                ([folder / "h2", "--widest", "1"], 1, "give both"), ([folder / "h2", "--longest", "1"], 1, "give both"),
+                                ([folder / "h2", "--watch", "--frame", 0], 1, "leave out --frame"),
+                                ([folder / "h2", "--measure", "-o", folder / "a.png"], 1, "leave out --output"),
+                                ([folder / "nowhere", "--watch"], 2, "holds no frames"),
                                 ([folder / "h2", "--colour"], 1, "unknown option '--colour'"), ([], 1, "is missing")]:
         said = run("render", *words, status=status)
         assert part in said, f"render {words}: {said}"
@@ -170,4 +212,6 @@ def refusals(folder):
 
 with tempfile.TemporaryDirectory() as name:
     pictures(pathlib.Path(name))
+    views(pathlib.Path(name))
+    watching(pathlib.Path(name))
     refusals(pathlib.Path(name))
