@@ -263,7 +263,7 @@ static void draw_picture(cairo_t *c, const render_style *s) {
 
 /* Spheres are an image on paper too, and so are very many discs, which would be a file that nothing opens. */
 static bool is_image(const render_frame *f, render_form form) {
-	const size_t most = 20000; /* of what may be drawn one by one */
+	const size_t most = 10000; /* of what may be drawn one by one */
 	return form != RENDER_PNG && (f->dimension == 3 || f->grains.n + f->points.n + f->cells.n > most);
 }
 
