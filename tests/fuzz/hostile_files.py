@@ -135,7 +135,7 @@ def begin(folder):
         scene = folder / f"{name}.yaml"
         scene.write_text(hostile_scenes.written(hostile_scenes.base(name)))
         status, _, said = call("run", scene, "-o", folder / name, "--quiet", "--threads", 1, "--until", until,
-                               *hostile_scenes.OBSERVED[:1], "--set=output.fields=[grain.velocity, point.stress]", limit=60)
+                               *hostile_scenes.OBSERVED[:1], "--set=output.fields=[grain.velocity, point.stress, contact.force, touch.force]", limit=60)
         assert status == 0, said
 
 
@@ -146,7 +146,7 @@ def resume(k, name, folder, own, r):
     else:
         forge(checkpoint, r)
     words = ["run", folder / f"{name}.yaml", "-o", own, "--quiet", "--resume", "--threads", 1, *hostile_scenes.OBSERVED[:1],
-             "--set=output.fields=[grain.velocity, point.stress]"]
+             "--set=output.fields=[grain.velocity, point.stress, contact.force, touch.force]"]
     # a step that somebody has made smaller may be sound, and then a run takes as long as it says
     status, _, said = call(*words, limit=20, stop_after=5)
     check_end(words, status, said, allowed=(0, 2, 3, 4, 130))
@@ -159,7 +159,9 @@ def resume(k, name, folder, own, r):
 def draw(k, folder, own, r):
     frame = r.choice(sorted((own / "frames").glob("*.h5")))
     frame.write_bytes(damage(frame.read_bytes(), r))
-    field = r.choice([[], ["--field", "grain.velocity.x"], ["--field", "radius"], ["--field", "point.stress.xy"]])
+    field = r.choice([[], ["--field", "grain.velocity.x"], ["--field", "radius"], ["--field", "point.stress.xy"],
+                      ["--chains"], ["--vectors", "velocity"], ["--view=-0.01,0,0.01,0.02"], ["--view=-0.01,0,0,0.01,0.02,0.03"],
+                      ["--range=-1,1"]])
     words = ["render", own, "--frame", int(frame.stem), "--width", 600, "-o", own / "picture.png", *field]
     status, _, said = call(*words, limit=20)
     check_end(words, status, said, allowed=(0, 1, 2) if field else (0, 2))
@@ -173,7 +175,7 @@ def go_on_past(k, name, folder, own, r):
     frame.write_bytes(damage(frame.read_bytes(), r))
     words = ["run", folder / f"{name}.yaml", "-o", own, "--quiet", "--resume", "--threads", 1, "--until",
              hostile_scenes.SMALL[name].get("time.end", "4 ms"), *hostile_scenes.OBSERVED[:1],
-             "--set=output.fields=[grain.velocity, point.stress]"]
+             "--set=output.fields=[grain.velocity, point.stress, contact.force, touch.force]"]
     status, _, said = call(*words, limit=20)
     check_end(words, status, said, allowed=(0,))
     return "goes on past a frame"
