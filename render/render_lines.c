@@ -114,7 +114,7 @@ static void put(square *q, const render_style *s, const double at[3], const doub
 	double on[2] = { 0 };
 	for (int k = 0; k < 3; k++) on[0] += s->view->right[k] * x[k], on[1] -= s->view->up[k] * x[k];
 	if (s->frame->dimension == 3) {
-		if (q->n && at[2] >= q->depth) return;
+		if (q->n > 0 && at[2] >= q->depth) return;
 		*q = (square) { .depth = at[2] };
 	}
 	for (int k = 0; k < 2; k++) q->at[k] += at[k], q->vector[k] += on[k];
@@ -144,7 +144,7 @@ void quern_render_arrows(cairo_t *c, const render_style *s) {
 	gather(squares, across, down, edge, s, &s->frame->cells);
 	for (long k = 0; k < across * down; k++) {
 		const square *q = &squares[k];
-		if (!q->n) continue;
+		if (!(q->n > 0)) continue;
 		const double dx = scale * q->vector[0] / q->n, dy = scale * q->vector[1] / q->n, size = hypot(dx, dy);
 		const double cut = size > longest ? longest / size : 1;
 		if (size > 2 * s->line && isfinite(size))
