@@ -249,7 +249,8 @@ static void set_scales(page *p, const render_style *s) {
 	if (*s->frame->vector_field && s->longest > 0) {
 		const double size = quern_render_round_step(s->longest);
 		quern_render_quantity(value, sizeof value, size, s->frame->vector_unit);
-		snprintf(p->arrow, sizeof p->arrow, "%.24s %s", s->frame->vector_field, value);
+		const char *dot = strrchr(s->frame->vector_field, '.');
+		snprintf(p->arrow, sizeof p->arrow, "%.12s %s", dot ? dot + 1 : s->frame->vector_field, value);
 		p->arrow_length = quern_render_arrow_length(s) * size / s->longest;
 	}
 }

@@ -225,8 +225,12 @@ void quern_render_space(cairo_t *c, const render_style *s) {
 	cairo_surface_t *image = smooth(&r, fmax(0.8 * size * r.scale, 2));
 	cairo_set_source_surface(c, image, 0, 0);
 	cairo_paint(c);
+	cairo_save(c);
+	cairo_rectangle(c, 0, 0, s->view->width, s->view->height);
+	cairo_clip(c);
 	quern_render_chains(c, s);
 	quern_render_arrows(c, s);
+	cairo_restore(c);
 	cairo_surface_destroy(image);
 	free(r.depth);
 	free(r.colour);
