@@ -25,7 +25,9 @@ double quern_render_line_width(const render_style *s) {
 	double sum = 0;
 	for (size_t i = 0; i < s->frame->grains.n; i++) sum += s->frame->grains.size[i];
 	const double mean = s->frame->grains.n ? sum / (double)s->frame->grains.n : 0;
-	return fmin(fmax(1.2 * mean * s->view->scale, 3 * s->line), 16 * s->line);
+	const double part =
+		s->frame->dimension == 2 ? 1.2 : 0.7; /* in space there are more of them, one over the other */
+	return fmin(fmax(part * mean * s->view->scale, 3 * s->line), 16 * s->line);
 }
 
 /* Far away, Cairo's numbers of pixels begin again from the other side. */

@@ -99,8 +99,8 @@ def check_full():
 
 def check_files(folder):
     quern("run", SCENE, "-o", folder / "deep/down/run", "--quiet")
-    for name in ("x.svg", "x.pdf", "x.PNG.pdf"):
-        assert "only PNG can be written" in said("render", folder / "deep/down/run", "-o", folder / name)
+    for name in ("x.jpg", "x.ps", "x.PNG.gif"):
+        assert "PNG, SVG and PDF can be written" in said("render", folder / "deep/down/run", "-o", folder / name)
         assert not (folder / name).exists()
     quern("render", folder / "deep/down/run", "-o", folder / "x.PNG")
     assert "cannot be written" in quern("render", folder / "deep/down/run", "-o", "/dev/full", status=4).stderr

@@ -68,4 +68,5 @@ with tempfile.TemporaryDirectory() as name:
         (here / "study.yaml").write_text(f"study: 1\nbase: {SOURCE}/configs/two_grains.yaml\nset: {{time.end: 1 ms}}\n")
         said = run(here / "moved/bin/quern", "sweep", here / "study.yaml", "-o", here / "study", "--quiet")
         assert said.startswith("1 runs: 1 done; "), said
-        print("ok  quern sweep works where it is installed")
+        assert "holds no frames" in run(here / "moved/bin/quern", "film", here, status=2)
+        print("ok  quern sweep and quern film work where they are installed")
