@@ -16,11 +16,14 @@ struct quern_log {
 	bool quiet, verbose, terminal, dirty;
 };
 
-double quern_wall(void) {
+static double seconds_of(clockid_t clock) {
 	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
+	clock_gettime(clock, &t);
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
+
+double quern_wall(void) { return seconds_of(CLOCK_MONOTONIC); }
+double quern_processor(void) { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
 
 quern_log *quern_log_create(bool quiet, bool verbose) {
 	quern_log *log = quern_take(1, sizeof *log);

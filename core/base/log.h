@@ -20,4 +20,5 @@ void quern_log_add(quern_log *, int level, const char *fmt, ...) __attribute__((
 void quern_log_addv(quern_log *, int level, const char *fmt, va_list) __attribute__((format(printf, 3, 0)));
 /* Rewrites the line at the bottom of the terminal, cut to its width; nothing where there is no terminal. */
 void quern_log_progress(quern_log *, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
-double quern_wall(void); /* s, monotonic */
+double quern_wall(void);      /* s, monotonic */
+double quern_processor(void); /* s that this process has used, all threads together */

@@ -32,6 +32,7 @@ typedef struct {
 	quern_run_folder folder;
 	quern_series series;
 	double start, saved; /* on the clock */
+	double used;         /* s of the processor, of this process, that the run has booked */
 	double until;        /* s; negative: to the end */
 	bool begun;          /* the folder is this run's: what happens is noted there */
 	char *alike;         /* runs of this key settle to the same state; NULL: it is neither taken nor kept */
@@ -114,9 +115,17 @@ static void tell_what_stays(const session *s) {
 		run->clock.frame ? "s" : "", checkpoint);
 }
 
+static void book_time(session *s) {
+	const double now = quern_wall(), used = quern_processor();
+	s->run->wall_before += now - s->start;
+	s->run->processor += used - s->used;
+	s->start = now;
+	s->used = used;
+}
+
 static quern_status checkpoint(session *s) {
-	s->run->wall_before += quern_wall() - s->start;
-	s->start = s->saved = quern_wall();
+	book_time(s);
+	s->saved = s->start;
 	/* rows that a checkpoint counts must be there after a power cut too */
 	if (quern_series_flush(&s->series, s->run) != QUERN_OK) return s->run->status;
 	const quern_status status = quern_checkpoint_write(s->run, s->series.rows);
@@ -132,19 +141,31 @@ static bool due(const session *s) {
 
 /* ---- the run ---- */
 
+/* Up to here; what stands in a checkpoint is not lost with the process. */
+static void book_settling(session *s, double *begin) {
+	const double now = quern_wall();
+	s->run->settle_wall += now - *begin;
+	*begin = now;
+	book_time(s);
+	s->run->settle_processor = s->run->processor;
+}
+
 static quern_status settle(session *s) {
 	quern_run *run = s->run;
-	const double begin = quern_wall();
+	double begin = quern_wall();
+	const bool open = !run->clock.settled;
 	if (s->alike) quern_settled_take(run, s->alike);
 	const int warnings = quern_log_warnings(run->log); /* what was cut off would be taken for settled */
 	const bool settles = !run->clock.settled;
 	while (!run->clock.settled && !interrupted && quern_run_next(run) == QUERN_SETTLING) {
 		progress(s);
-		if (due(s)) checkpoint(s);
+		if (!due(s)) continue;
+		book_settling(s, &begin);
+		checkpoint(s);
 	}
 	const bool rests = settles && run->clock.settled && run->status == QUERN_OK;
 	if (s->alike && rests && quern_log_warnings(run->log) == warnings) quern_settled_keep(run, s->alike);
-	run->settle_wall += quern_wall() - begin;
+	if (open) book_settling(s, &begin);
 	if (settles && run->clock.settled && run->clock.settle_step)
 		quern_log_add(run->log, 1, "settled in %lld steps, %.1f s", (long long)run->clock.settle_step,
 			run->settle_wall);
@@ -208,6 +229,7 @@ static void report_end(session *s, const char *status) {
 		quern_log_add(
 			run->log, 1, "to go on: quern run %s/scene.yaml -o %s --resume", run->folder, run->folder);
 	char why[256];
+	book_time(s);
 	quern_progress_end(&s->progress, run, status, wall);
 	if (!quern_summary_write(run, &s->series, status, wall, why)) quern_run_stop(run, QUERN_E_IO, "%s", why);
 }

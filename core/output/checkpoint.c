@@ -27,8 +27,10 @@ static const struct {
 	size_t offset;
 } numbers[] = { NUMBER("dt", clock.dt), NUMBER("settle_dt", clock.settle_dt), NUMBER("begin", clock.begin),
 	NUMBER("end", clock.end), NUMBER("wall", wall_before), NUMBER("settle_wall", settle_wall),
-	NUMBER("mass_initial", mass_initial) };
-enum { N_NUMBERS = sizeof numbers / sizeof *numbers };
+	NUMBER("mass_initial", mass_initial), NUMBER("processor", processor),
+	NUMBER("settle_processor", settle_processor) };
+/* files of before the processor's time was counted have the first ones alone */
+enum { N_NUMBERS = sizeof numbers / sizeof *numbers, N_ALWAYS = N_NUMBERS - 2 };
 
 static int64_t *counter(quern_run *run, size_t i) {
 	return (int64_t *)(void *)((char *)&run->clock + counters[i].offset);
@@ -203,7 +205,7 @@ static bool read_clock(quern_run *run, quern_h5 *h, int64_t *rows, quern_text *w
 	for (size_t i = 0; i < N_COUNTERS; i++)
 		good = good && quern_h5_read_integer(h->file, counters[i].name, counter(run, i));
 	for (size_t i = 0; i < N_NUMBERS; i++)
-		good = good && quern_h5_read_number(h->file, numbers[i].name, number(run, i));
+		good = good && (quern_h5_read_number(h->file, numbers[i].name, number(run, i)) || i >= N_ALWAYS);
 	const hid_t stepped = quern_h5_find(h->file, "stepped");
 	for (size_t s = 0; s < run->plan->store.n_sets; s++) {
 		quern_set_store *set = &run->plan->store.sets[s];

@@ -156,6 +156,8 @@ bool quern_summary_write(
 	json_object_set_new(root, "step_limited_by", json_string(run->limit_reason));
 	json_object_set_new(root, "wall_seconds", number(wall));
 	json_object_set_new(root, "settle_seconds", number(run->settle_wall));
+	json_object_set_new(root, "processor_seconds", number(run->processor));
+	json_object_set_new(root, "settle_processor_seconds", number(run->settle_processor));
 	json_object_set_new(root, "threads", json_integer(quern_pool_workers(run->pool)));
 	put_counts(root, run);
 	json_object_set_new(root, "seconds_by_stage", stages(run));

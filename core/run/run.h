@@ -43,9 +43,10 @@ struct quern_run {
 	size_t n_plans;
 	const quern_plan_stage *stage; /* the one that runs, for messages; NULL between stages */
 	quern_status status;
-	char *message;                   /* why the run stopped */
-	quern_mark fault;                /* where in the scene the reason stands; no file: nowhere */
-	double wall_before, settle_wall; /* s on the clock spent before a resume; in settling */
+	char *message;                      /* why the run stopped */
+	quern_mark fault;                   /* where in the scene the reason stands; no file: nowhere */
+	double wall_before, settle_wall;    /* s on the clock spent before a resume; in settling */
+	double processor, settle_processor; /* s of all threads up to the last checkpoint; up to the release */
 	double mass_initial;
 	char limit_reason[200]; /* what sets the step */
 	char *identity;         /* see identity.h */

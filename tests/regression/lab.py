@@ -160,7 +160,7 @@ def contents(path):
 
 
 # What the run was made with, or how long it took; all the rest is the result.
-PROVENANCE = {"@compiler", "@flags", "@program", "@wall", "@settle_wall", "scene"}
+PROVENANCE = {"@compiler", "@flags", "@program", "@wall", "@settle_wall", "@processor", "@settle_processor", "scene"}
 
 
 def is_provenance(name):

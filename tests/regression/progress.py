@@ -8,9 +8,11 @@ import os
 import pathlib
 import pty
 import re
+import signal
 import struct
 import subprocess
 import termios
+import time
 
 import h5py
 import numpy
@@ -117,7 +119,42 @@ def share_and_updates(place):
     assert abs(found["value"] - 100 * share) < 1e-6
 
 
+def measured(scene, out, *options, stop=None, threads=2, status=0, **environment):
+    """Seconds of the processor that the system counts for one run, and its summary; `stop`: s of it before it is asked to end."""
+    words = [word if word != "1" else str(threads) for word in lab.command(scene, out, *options)]
+    process = subprocess.Popen(words, env={**os.environ, **environment}, stderr=subprocess.PIPE)
+    if stop:
+        while not (out / "progress.json").exists():
+            time.sleep(0.01)
+        time.sleep(stop)
+        process.send_signal(signal.SIGTERM)
+    said = process.stderr.read()
+    _, ended, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(ended)
+    assert process.returncode == status, said
+    return usage.ru_utime + usage.ru_stime, lab.summary(out)
+
+
+def cost(place):
+    """What a run has cost is what the system says, of all threads, over a stop while it settles and one after; what it took up to the
+    release stands apart, and of a state that was kept that is little."""
+    scene, sums = place / "bed.yaml", []
+    for k, how in enumerate([{"stop": 0.3, "status": 130}, {"options": ["--until=0.2", "--resume"]}, {"options": ["--resume"]}]):
+        used, found = measured(scene, place / "parts", *how.pop("options", []), **how)
+        sums.append((used, found["processor_seconds"], found["settle_processor_seconds"], found["settle_seconds"]))
+        print("of the system {:.3f} s; in all {:.3f} s, settling {:.3f} s, on the clock {:.3f} s".format(*sums[-1]))
+        whole = sum(one[0] for one in sums)
+        assert found["processor_seconds"] <= whole <= found["processor_seconds"] + 0.05 * (k + 1), (k, sums)
+    assert 0.8 * sums[0][1] < sums[0][2] <= sums[0][1] < sums[1][2] == sums[2][2] < sums[1][1] < sums[2][1], sums
+    assert sums[0][3] + 0.2 < sums[1][3] == sums[2][3], "what had settled before the stop is forgotten"
+    cache = str(place / "cache")
+    first, second = (measured(scene, place / name, QUERN_CACHE=cache)[1] for name in ("keeps", "takes"))
+    costs = [found[name] for found in (first, second) for name in ("settle_processor_seconds", "processor_seconds")]
+    print("settled here: {:.3f} of {:.3f} s, taken: {:.3f} of {:.3f} s".format(*costs))
+    assert costs[2] < costs[0] / 5 and costs[2] < costs[3] < costs[1]
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
-        for test in (a_line, numbers, share_and_updates):
+        for test in (a_line, numbers, share_and_updates, cost):
             test(pathlib.Path(name))

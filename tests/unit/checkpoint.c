@@ -220,6 +220,8 @@ static const struct {
 	{ "@end", 1e300, 0, false },
 	{ "@begin", (double)NAN, 0, false },
 	{ "@wall", (double)INFINITY, 0, false },
+	{ "@processor", -1, 0, false },
+	{ "@settle_processor", (double)NAN, 0, false },
 	{ "@mass_initial", (double)NAN, 0, false },
 	{ "@mass_initial", 1e9, 0, false },
 	{ "grain/mass.0", 1e9, 0, false },
