@@ -150,32 +150,61 @@ static int id_field(const quern_store *store, int set) {
 	return -1;
 }
 
+typedef struct {
+	int64_t id;
+	int32_t at;
+} numbered;
+
+static int by_number(const void *a, const void *b) {
+	const int64_t x = ((const numbered *)a)->id, y = ((const numbered *)b)->id;
+	return (x > y) - (x < y);
+}
+
+/* In the order of their numbers, which may be anything below 2^53: no table has room for all. */
+static numbered *in_order(const int64_t *id, uint32_t n) {
+	numbered *list = malloc(((size_t)n + 1) * sizeof *list);
+	for (uint32_t i = 0; list && i < n; i++) list[i] = (numbered) { id[i], (int32_t)i };
+	if (list) qsort(list, n, sizeof *list, by_number);
+	return list;
+}
+
+static bool match(const int64_t *is, const int64_t *wanted, uint32_t n, int32_t *from) {
+	numbered *here = in_order(is, n), *there = in_order(wanted, n);
+	bool good = here && there;
+	for (uint32_t i = 0; good && i < n; i++) {
+		good = here[i].id == there[i].id && (!i || there[i].id > there[i - 1].id);
+		from[there[i].at] = here[i].at;
+	}
+	free(here);
+	free(there);
+	return good;
+}
+
+/* Nothing of an entry is as it was before settling, so that it does not matter which one it was. */
+static bool all_settles(const quern_store *store, int set) {
+	for (size_t k = 0; k < store->n_fields; k++)
+		if (store->fields[k].set == set && store->fields[k].state && !store->fields[k].settles) return false;
+	return true;
+}
+
 /* Where each entry of the file stands in the set as the set-up has left it: what settling leaves alone goes along with the
  * number. NULL if they are not the same entries. */
 static int32_t *places(quern_run *run, const quern_state_group *g, int set) {
 	quern_store *store = &run->plan->store;
 	const int id = id_field(store, set);
 	const uint32_t n = store->sets[set].n;
-	int32_t *from = malloc(((size_t)g->n + 1) * sizeof *from), *at = NULL;
-	int64_t *wanted = malloc(((size_t)g->n + 1) * sizeof *wanted);
-	bool good = from && wanted && (id < 0 || (n == g->n && g->next_id == store->sets[set].next_id));
+	int32_t *from = malloc(((size_t)g->n + 1) * sizeof *from);
+	bool good = from && (id < 0 || (n == g->n && g->next_id == store->sets[set].next_id));
 	for (uint32_t i = 0; good && id < 0 && i < g->n; i++) from[i] = n == g->n ? (int32_t)i : -1;
-	good = good && (id >= 0 || n == g->n || n == 0);
+	good = good && (id >= 0 || n == g->n || n == 0 || all_settles(store, set));
 	if (good && id >= 0) {
 		char name[64];
+		int64_t *wanted = malloc(((size_t)n + 1) * sizeof *wanted);
 		snprintf(name, sizeof name, "%s.0", strchr(store->fields[id].name, '.') + 1);
-		const int64_t *is = store->fields[id].data[store->fields[id].now][0];
-		at = malloc(((size_t)g->next_id + 1) * sizeof *at);
-		good = at && quern_h5_read(g->at, name, H5T_NATIVE_INT64, n, 1, wanted);
-		for (int64_t k = 0; good && k < g->next_id; k++) at[k] = -1;
-		for (uint32_t i = 0; good && i < n; i++) at[is[i]] = (int32_t)i;
-		for (uint32_t i = 0; good && i < n; i++) {
-			good = wanted[i] >= 0 && wanted[i] < g->next_id && at[wanted[i]] >= 0;
-			if (good) from[i] = at[wanted[i]], at[wanted[i]] = -1;
-		}
+		good = wanted && quern_h5_read(g->at, name, H5T_NATIVE_INT64, n, 1, wanted) &&
+			   match(store->fields[id].data[store->fields[id].now][0], wanted, n, from);
+		free(wanted);
 	}
-	free(at);
-	free(wanted);
 	if (good) return from;
 	free(from);
 	return NULL;
