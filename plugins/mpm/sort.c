@@ -11,8 +11,10 @@ static bool always(const void *arg, uint32_t block) {
 
 quern_status quern_mpm_sort(const void *self, const quern_step *s) {
 	int32_t *unsorted = s->use[SORT_UNSORTED].index;
+	/* a stage of the scene begins as a scene that starts from the state before it would: sorted */
+	const bool begins = s->step == s->stage_step;
 	(void)self;
-	if (!*unsorted) return QUERN_OK;
+	if (!*unsorted && !begins) return QUERN_OK;
 	*unsorted = 0;
 	const bool hybrid = s->host->has(s->run, "hybrid");
 	const cover c = {
