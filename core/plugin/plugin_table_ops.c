@@ -265,6 +265,18 @@ static bool labels(quern_table_reader *r, const char *what, const char *const *l
 	return true;
 }
 
+/* Sets of its own that a file can fill. */
+static bool takes_own(quern_table_reader *r, const quern_solver_ops *ops) {
+	for (size_t i = 0; ops->takes[i]; i++) {
+		const quern_set *set = ops->sets;
+		while (set->name && strcmp(set->name, ops->takes[i]) != 0) set++;
+		if (!set->name || set->rows || (!i && (set->slot || set->when)))
+			return quern_table_refuse(r, "takes: '%.60s' is no set of this solver that %s", ops->takes[i],
+				i ? "holds entries" : "holds entries in every scene");
+	}
+	return true;
+}
+
 static bool starts(quern_table_reader *r, const quern_solver_ops *ops) {
 	if (!ops->from) return true;
 	const quern_param *row = is_label(ops->from) ? quern_param_find(r->table->params, ops->from) : NULL;
@@ -272,7 +284,7 @@ static bool starts(quern_table_reader *r, const quern_solver_ops *ops) {
 		return quern_table_refuse(r, "from: '%.60s' is no parameter that names a file", ops->from);
 	if (!ops->takes || !ops->takes[0] || !ops->essential || !ops->essential[0])
 		return quern_table_refuse(r, "from is there, and takes or essential are not");
-	return labels(r, "takes", ops->takes) && labels(r, "essential", ops->essential) &&
+	return labels(r, "takes", ops->takes) && takes_own(r, ops) && labels(r, "essential", ops->essential) &&
 		   labels(r, "same", ops->same) && sections(r, "unlike", ops->unlike);
 }
 

@@ -91,6 +91,15 @@ def observer(outputs, ops='.set = "grain", .map = map'):
                    ops=f".outputs = outputs, {ops}")
 
 
+def starter(takes, **changes):
+    """A solver that starts from another run's state, of these sets."""
+    row = 'static const char *const takes[] = { %s 0 }, *const needed[] = { "s.a", 0 };\n' % takes
+    text = solver(**changes).replace("static const quern_solver_ops", row + "static const quern_solver_ops")
+    named = '{ .name = "from", .doc = "F.", .type = QUERN_T_TEXT, .flags = QUERN_FILE }, QUERN_END_PARAMS'
+    return text.replace(".stages = stages", '.stages = stages, .from = "from", .takes = takes, .essential = needed').replace(
+        "QUERN_END_PARAMS", named, 1)
+
+
 ENDLESS = f"[0 ... 1999] = {{ {ROW} }},"
 LIST = '{ .name = "l", .doc = "L.", .type = QUERN_T_LIST, .item_size = 16, .rows = %s },'
 OUTPUT = '{ .name = "%s", .unit = "1", .doc = "O." }, { .name = 0 }'
@@ -186,6 +195,12 @@ TABLES = [
     (solver(stage=".run = 0"), "stage bad.go: phase 0 or flags 0 are unknown, or there is no run or no uses"),
     (solver(stage=".phase = 99"), "stage bad.go: phase 99 or flags 0 are unknown"),
     (library(kind="solver", table=RUN % ("s", "0", "", ""), ops=".sets = sets"), "a solver without stages"),
+    (starter(""), "from is there, and takes or essential are not"),
+    (starter('"s",').replace("QUERN_FILE", "0"), "from: 'from' is no parameter that names a file"),
+    (starter('"t",'), "takes: 't' is no set of this solver that holds entries in every scene"),
+    (starter('"s",', set_slot='"a"'), "takes: 's' is no set of this solver that holds entries in every scene"),
+    (starter('"s",', set_slot="0, .rows = 8"), "takes: 's' is no set of this solver that holds entries in every scene"),
+    (starter('"s", "t",'), "takes: 't' is no set of this solver that holds entries"),
     (library(kind="check", table=LAW % "bad", ops=".law = law"), "ops: there is no kind; use QUERN_KIND"),
     (library(kind="check", table=LAW % "good", ops=TESTED % "good"), "it checks the kind good, so its id must be check.good"),
     (library(kind="check", table=LAW % "bad", ops=".kind = &quern_bad_kind"), "ops lacks the function law"),
@@ -198,6 +213,7 @@ def check_tables(folder):
     """Nothing that a table says is believed before it was looked at, by whichever command."""
     refused(library(), "contact.bad", folder, status=0)
     refused(solver(), "solver.bad", folder, status=0)
+    refused(starter('"s",'), "solver.bad", folder, status=0)
     small = "static const quern_param own[] = { { .name = \"k\", .type = QUERN_T_INT }, QUERN_END_PARAMS };"
     refused(library(rows=LIST.replace("16", "4") % "own", head=small), "contact.bad", folder, status=0)
     for text, expected in TABLES:
