@@ -58,23 +58,25 @@ static telling look(quern_run *run) {
 
 /* Others read it while the run goes on: there is the old one or the new one. Nobody needs it after a power cut, and a fault
  * of writing is found at the next frame. */
-static void save(const quern_run *run, json_t *root) {
+static bool save(const quern_run *run, json_t *root) {
+	bool good = false;
 	char *path = quern_format("%s/progress.json", run->folder), *half = quern_format("%s.part", path);
 	FILE *file = fopen(half, "w");
 	if (file) {
-		const bool good =
-			!json_dumpf(root, file, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(9));
-		if (fclose(file) || !good || rename(half, path)) unlink(half);
+		good = !json_dumpf(root, file, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(9));
+		good = !fclose(file) && good && !rename(half, path);
+		if (!good) unlink(half);
 	}
 	free(path);
 	free(half);
+	return good;
 }
 
 typedef struct {
 	double rate, left; /* steps/s; s, not a number where nobody knows */
 } pace;
 
-static void save_all(const quern_run *run, const char *status, double wall, const pace *is, json_t *looks) {
+static bool save_all(const quern_run *run, const char *status, double wall, const pace *is, json_t *looks) {
 	json_t *root = json_object();
 	const quern_clock *c = &run->clock;
 	json_object_set_new(root, "status", json_string(status));
@@ -88,8 +90,9 @@ static void save_all(const quern_run *run, const char *status, double wall, cons
 	json_object_set_new(root, "wall_seconds", number(wall));
 	json_object_set_new(root, "seconds_left", number(is->left));
 	json_object_set(root, "looks", looks);
-	save(run, root);
+	const bool good = save(run, root);
 	json_decref(root);
+	return good;
 }
 
 /* ---- the line ---- */
@@ -140,7 +143,11 @@ void quern_progress_end(quern_progress *p, quern_run *run, const char *status, d
 	if (run->status == QUERN_OK) t = look(run);
 	else t.looks = json_object();
 	if (quern_run_over(run)) is.left = 0;
-	save_all(run, status, wall, &is, t.looks);
+	if (!save_all(run, status, wall, &is, t.looks)) {
+		char *path = quern_format("%s/progress.json", run->folder);
+		unlink(path); /* no word is better than one that the run goes on */
+		free(path);
+	}
 	quern_text_finish(&t.line);
 	json_decref(t.looks);
 }

@@ -154,7 +154,41 @@ def cost(place):
     assert costs[2] < costs[0] / 5 and costs[2] < costs[3] < costs[1]
 
 
+def is_held(folder):
+    """Whether a process holds a run's folder, as docs/run_folder.md says that one finds out."""
+    try:
+        with open(folder / ".quern.lock") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    return False
+
+
+def who_is_at_work(place):
+    """A killed run leaves its last word behind, and the lock tells that nobody is at work; one whose last word cannot be written leaves
+    none, rather than one that says that it goes on."""
+    scene = place / "bed.yaml"
+    killed = lab.start(scene, place / "killed")
+    assert lab.wait_for(place / "killed" / "progress.json", killed) and is_held(place / "killed")
+    word = json.loads((place / "killed" / "progress.json").read_text())
+    assert word["process"] == killed.pid
+    killed.kill()
+    killed.wait()
+    word = json.loads((place / "killed" / "progress.json").read_text())
+    assert word["status"] in ("settling", "running") and not is_held(place / "killed"), word
+    blocked = lab.start(scene, place / "blocked")
+    assert lab.wait_for(place / "blocked" / "progress.json", blocked)
+    while blocked.poll() is None and not (place / "blocked" / "progress.json.part").is_dir():
+        with contextlib.suppress(FileExistsError):
+            (place / "blocked" / "progress.json.part").mkdir()  # as on a full disk: nothing can be written there
+    assert blocked.wait() == 0 and lab.summary(place / "blocked")["status"] == "done"
+    assert not (place / "blocked" / "progress.json").exists() and not is_held(place / "blocked")
+    print(f"a killed run says '{word['status']}' and holds no lock; one that cannot write its last word has none")
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
-        for test in (a_line, numbers, share_and_updates, cost):
+        for test in (a_line, numbers, share_and_updates, cost, who_is_at_work):
             test(pathlib.Path(name))
