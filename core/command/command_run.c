@@ -10,6 +10,7 @@
 #include "run_folder.h"
 #include "settled.h"
 #include "sidecar.h"
+#include "start.h"
 #include "summary.h"
 #include "text.h"
 #include "watch.h"
@@ -259,8 +260,7 @@ static int finish(session *s) {
 static quern_status take_over(session *s, bool again) {
 	quern_run *run = s->run;
 	char why[256] = "";
-	if (!quern_run_folder_begin(&s->folder, run->scene, why))
-		return quern_run_stop(run, QUERN_E_IO, "%s", why);
+	if (!quern_run_folder_begin(&s->folder, run, why)) return quern_run_stop(run, QUERN_E_IO, "%s", why);
 	char *path = quern_format("%s/log.txt", run->folder);
 	quern_log_open(run->log, path, again);
 	free(path);
@@ -282,6 +282,7 @@ static quern_status begin_anew(session *s, const options *o) {
 	quern_text_finish(&why);
 	if (!good) return run->status;
 	if (o->resume) quern_log_add(run->log, 1, "no checkpoint yet: starting from the beginning");
+	quern_start_hold(run);
 	quern_run_identity(run); /* of the files as they are now */
 	if (quern_run_setup(run) != QUERN_OK) return run->status;
 	/* what goes on from a checkpoint may have begun with other plugins, or another file to read */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "run_folder.h"
 #include "folder.h"
+#include "start.h"
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -315,6 +316,7 @@ void quern_run_folder_trim(const quern_run_folder *f, int64_t frames) {
 
 typedef struct {
 	const quern_run_folder *folder;
+	const quern_run *run;
 	char *why;
 	bool failed;
 } copying;
@@ -325,9 +327,11 @@ static char *copy_input(void *context, const char *path) {
 	uint64_t hash;
 	char digits[20];
 	const char *slash = strrchr(path, '/'), *base = slash ? slash + 1 : path;
-	if (!quern_hash_file(path, 0, &hash)) {
+	char *held = quern_start_held(c->run, path);
+	if (!quern_hash_file(held, 0, &hash)) {
 		if (!c->failed) snprintf(c->why, 256, "%.180s cannot be read: %s", path, strerror(errno));
 		c->failed = true;
+		free(held);
 		return quern_copy(path);
 	}
 	snprintf(digits, sizeof digits, "%016llx-", (unsigned long long)hash);
@@ -336,17 +340,18 @@ static char *copy_input(void *context, const char *path) {
 	char *folder = in_folder(c->folder, "files");
 	if (!c->failed && !is_copy(to, name + strlen("files/"))) {
 		mkdir(folder, 0777);
-		c->failed = !quern_save_copy(to, path, c->why);
+		c->failed = !quern_save_copy(to, held, c->why);
 	}
+	free(held);
 	free(folder);
 	free(to);
 	return name;
 }
 
-static bool save_resolved(const quern_run_folder *f, const quern_scene *s, char why[256]) {
-	copying c = { f, why, false };
+static bool save_resolved(const quern_run_folder *f, const quern_run *run, char why[256]) {
+	copying c = { f, run, why, false };
 	const quern_naming naming = { copy_input, &c };
-	char *resolved = quern_scene_resolved(s, &naming);
+	char *resolved = quern_scene_resolved(run->scene, &naming);
 	char *text = quern_format(
 		"%s%016llx\n%s", heading, (unsigned long long)quern_hash(resolved, strlen(resolved)), resolved);
 	char *path = in_folder(f, "scene.yaml");
@@ -359,7 +364,8 @@ static bool save_resolved(const quern_run_folder *f, const quern_scene *s, char 
 	return good;
 }
 
-bool quern_run_folder_begin(const quern_run_folder *f, const quern_scene *s, char why[256]) {
+bool quern_run_folder_begin(const quern_run_folder *f, const quern_run *run, char why[256]) {
+	const quern_scene *s = run->scene;
 	inputs in = inputs_of(s);
 	char *frames = in_folder(f, "frames"), *scene = in_folder(f, "scene.yaml"),
 		 *input = in_folder(f, "input.yaml");
@@ -367,7 +373,7 @@ bool quern_run_folder_begin(const quern_run_folder *f, const quern_scene *s, cha
 	if (!good) snprintf(why, 256, "the folder %.180s cannot be made: %s", frames, strerror(errno));
 	/* when it goes on from its own scene, a run still has the text that somebody wrote */
 	const bool again = is_input(&in, scene) || is_input(&in, input);
-	good = good && save_resolved(f, s, why);
+	good = good && save_resolved(f, run, why);
 	if (good && !again) good = quern_save_bytes(input, s->tree->source, s->tree->length, why);
 	free(frames);
 	free(scene);

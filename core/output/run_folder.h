@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* run_folder - the folder of a run: who holds it, what of it a run has left, and the scene that lies in it */
 #pragma once
-#include "scene.h"
+#include "run.h"
 #include "text.h"
 
 typedef struct quern_run_folder {
@@ -30,4 +30,4 @@ void quern_run_folder_trim(const quern_run_folder *, int64_t frames);
 /* Writes scene.yaml, the scene with every default, with the files that it names in files/; input.yaml, the scene as it was
  * written; and makes frames/. A scene.yaml that no run has written, or that was changed, stays as it is, and so does what
  * the scene was read from. */
-bool quern_run_folder_begin(const quern_run_folder *, const quern_scene *, char why[256]);
+bool quern_run_folder_begin(const quern_run_folder *, const quern_run *, char why[256]);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "identity.h"
+#include "start.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,14 +14,15 @@ enum { N_FREE = 6, N_MAY_CHANGE = 7 };
 
 /* ---- the scene as a text ---- */
 
-static char *contents_of(void *none, const char *path) {
+static char *contents_of(void *context, const char *path) {
 	uint64_t hash;
-	(void)none;
-	if (!quern_hash_file(path, 0, &hash)) return quern_format("a file that cannot be read");
+	const quern_run *const *run = context;
+	char *held = quern_start_held(*run, path);
+	const bool good = quern_hash_file(held, 0, &hash);
+	free(held);
+	if (!good) return quern_format("a file that cannot be read");
 	return quern_format("a file with the hash %016llx", (unsigned long long)hash);
 }
-
-static const quern_naming by_contents = { contents_of, NULL };
 
 static void drop(quern_node *map, const char *path) {
 	const size_t n = strcspn(path, ".");
@@ -38,7 +40,10 @@ static void drop(quern_node *map, const char *path) {
 	}
 }
 
-quern_node *quern_run_tree(const quern_run *run) { return quern_scene_tree(run->scene, &by_contents); }
+quern_node *quern_run_tree(const quern_run *run) {
+	const quern_naming by_contents = { contents_of, &run };
+	return quern_scene_tree(run->scene, &by_contents);
+}
 
 const char *quern_run_identity(quern_run *run) {
 	if (run->identity) return run->identity;

@@ -120,6 +120,7 @@ void quern_run_destroy(quern_run *run) {
 	quern_run_finish_episodes(run);
 	if (run->has_grid) quern_grid_finish(&run->grid);
 	quern_pool_destroy(run->pool);
+	quern_start_let_go(run);
 	quern_scene_destroy(run->scene);
 	quern_log_destroy(run->log);
 	arena_reset(&run->arena);

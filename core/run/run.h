@@ -51,6 +51,7 @@ struct quern_run {
 	char limit_reason[200]; /* what sets the step */
 	char *identity;         /* see identity.h */
 	uint64_t scene_hash, *plugins;
+	struct quern_held *held; /* by section: the file that it starts from, see start.h; NULL: none is held */
 	bool *
 		taken; /* by field: it holds what another run's state had of it; NULL: none does, or the set-up is over */
 	char *replaced; /* plugins that took the place of others on the way, a line each; NULL: none */

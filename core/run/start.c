@@ -21,6 +21,28 @@ static const char *file_of(const quern_section *section) {
 	return path;
 }
 
+/* ---- the files ---- */
+
+void quern_start_hold(quern_run *run) {
+	const size_t n = run->scene->n_sections;
+	if (run->held) return;
+	run->held = quern_take(n, sizeof *run->held);
+	for (size_t i = 0; i < n; i++) run->held[i] = quern_start_file_hold(file_of(&run->scene->sections[i]));
+}
+
+void quern_start_let_go(quern_run *run) {
+	for (size_t i = 0; run->held && i < run->scene->n_sections; i++) quern_start_file_let_go(&run->held[i]);
+	free(run->held);
+	run->held = NULL;
+}
+
+char *quern_start_held(const quern_run *run, const char *path) {
+	for (size_t i = 0; run->held && i < run->scene->n_sections; i++)
+		if (run->held[i].file >= 0 && !strcmp(run->held[i].path, path))
+			return quern_format("/proc/self/fd/%d", run->held[i].file);
+	return quern_copy(path);
+}
+
 /* Whether its entries point at what a slot holds. */
 static bool hangs_on_slot(const quern_set_store *set) { return set->table && set->table->slot; }
 
@@ -145,8 +167,8 @@ static void note_lost(starting *s, size_t k) {
 		s->run->plan->stages[maker->stage].section != s->section)
 		return;
 	const bool plugin = is_plugin(s->run->scene, maker->owner);
-	const bool asked = s->file.frame && s->run->plan->stages[maker->stage].phase == QUERN_SETUP &&
-					   maker->row->flags & QUERN_OPTIONAL && !(maker->row->flags & QUERN_SHOWN);
+	const bool asked =
+		s->file.frame && maker->row->flags & QUERN_OPTIONAL && !(maker->row->flags & QUERN_SHOWN);
 	if (!plugin && !asked) return;
 	quern_text_add(&s->lost, "%s%s", s->lost.length ? ", " : "", field->name);
 	if (plugin) quern_text_add(&s->lost, " of %s", maker->owner);
@@ -199,10 +221,11 @@ static int by_size(const void *a, const void *b) {
 	return (x > y) - (x < y);
 }
 
-/* Numbers are given once; frames do not say which was the last. */
+/* Numbers are given once, also where all that had one have left; frames do not say which was the last. */
 static bool number(starting *s, int set, int64_t next_id) {
 	quern_store *store = &s->run->plan->store;
 	quern_set_store *of = &store->sets[set];
+	of->next_id = next_id;
 	for (size_t k = 0; k < store->n_fields; k++) {
 		const quern_field *field = &store->fields[k];
 		if (!is_meant(field, set) || field->shape != QUERN_ID || !s->run->taken[k] || !of->n) continue;
@@ -213,7 +236,7 @@ static bool number(starting *s, int set, int64_t next_id) {
 		bool good = sorted[0] >= 0 && last < (int64_t)1 << 53 && (s->file.frame || last < next_id);
 		for (uint32_t i = 1; i < of->n && good; i++) good = sorted[i] > sorted[i - 1];
 		free(sorted);
-		of->next_id = s->file.frame ? last + 1 : next_id;
+		if (s->file.frame) of->next_id = last + 1;
 		if (!good)
 			return quern_text_add(&s->why, "it is damaged: two entries have one %s", field->name), false;
 	}
@@ -306,38 +329,44 @@ static bool is_same(const quern_node *a, const quern_node *b) {
 	return true;
 }
 
-/* Whether what stands in the slots of this section that hold a plugin is what stood there in the run. */
-static bool is_as_it_was(const starting *s, const quern_node *own, const char *id) {
-	const quern_node *was =
-		s->file.scene->root ? quern_node_find(s->file.scene->root, s->section->name) : NULL;
-	bool same = was;
-	for (size_t k = 0; k < s->section->n_slots && same; k++) {
-		const quern_slot_use *use = &s->section->slots[k];
-		for (size_t j = 0; j < use->n && same; j++)
-			if (!strcmp(use->filling[j].instance->file->plugin.id, id))
-				same = is_same(quern_node_find(own, use->slot->name), quern_node_find(was, use->slot->name));
-	}
-	return same;
+static bool knows(const starting *s, const char *id) {
+	/* frames do not say who took part */
+	return !s->file.frame && quern_start_file_knows(&s->file, -1, NULL, id);
 }
 
-/* Frames do not say who took part. */
+/* Which plugins in this section's own slots took part and stood there as they do here. Others are another section's, which may
+ * have started from another run. */
 static void note_plugins(starting *s) {
-	bool *knows = s->run->taken + s->run->plan->store.n_fields;
+	bool *took = s->run->taken + s->run->plan->store.n_fields, *seen;
 	const quern_loader *loader = s->run->scene->loader;
+	const size_t n = quern_loader_count(loader);
 	quern_node *root = quern_run_tree(s->run);
 	const quern_node *own = quern_node_find(root, s->section->name);
-	for (size_t i = 0; i < quern_loader_count(loader) && !s->file.frame && own; i++) {
-		const char *id = quern_loader_at(loader, i)->plugin.id;
-		knows[i] = quern_start_file_knows(&s->file, -1, NULL, id) && is_as_it_was(s, own, id);
+	const quern_node *was =
+		s->file.scene->root ? quern_node_find(s->file.scene->root, s->section->name) : NULL;
+	seen = quern_take(n, sizeof *seen);
+	for (size_t k = 0; k < s->section->n_slots && own; k++) {
+		const quern_slot_use *use = &s->section->slots[k];
+		if (use->slot->same_as) continue;
+		const bool same =
+			was && is_same(quern_node_find(own, use->slot->name), quern_node_find(was, use->slot->name));
+		for (size_t j = 0; j < use->n; j++)
+			for (size_t i = 0; i < n; i++) {
+				if (quern_loader_at(loader, i) != use->filling[j].instance->file) continue;
+				took[i] = same && knows(s, quern_loader_at(loader, i)->plugin.id) && (took[i] || !seen[i]);
+				seen[i] = true;
+			}
 	}
+	free(seen);
 	quern_node_destroy(root);
 }
 
 static quern_status start(quern_run *run, const quern_section *section, const char *path, bool rest) {
 	starting s = { .run = run, .section = section, .path = path };
 	const char **groups = groups_of(&s);
+	const hid_t held = run->held ? run->held[section - run->scene->sections].h5 : -1;
 	const bool good =
-		quern_start_file_open(&s.file, path, groups, &s.why) && scenes_fit(&s) && take_sets(&s, rest);
+		quern_start_file_open(&s.file, path, held, groups, &s.why) && scenes_fit(&s) && take_sets(&s, rest);
 	if (good) tell(&s, rest), note_plugins(&s);
 	else {
 		char *param = quern_format("%s.%s", section->name, section->ops->from);

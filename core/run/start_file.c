@@ -4,9 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-enum { MOST_ENTRIES = 1 << 30, MOST_TEXT = 1 << 26, SECONDS = 600 };
+enum { MOST_ENTRIES = 1 << 30, MOST_TEXT = 1 << 26, SECONDS = 600, MOST_TRIES = 100 };
 static const int64_t most_id = (int64_t)1 << 53;
 
 /* ---- frames ---- */
@@ -126,9 +127,10 @@ static bool read_time(quern_start_file *f) {
 	return true;
 }
 
-static bool open_checkpoint(quern_start_file *f, const char *path, quern_text *why) {
+static bool open_checkpoint(quern_start_file *f, const char *path, hid_t held, quern_text *why) {
 	char is[32], broken[256];
-	if (!quern_h5_open(&f->h5, path, broken)) return quern_text_add(why, "%s", broken), false;
+	if (held >= 0) f->h5.file = H5Freopen(held);
+	else if (!quern_h5_open(&f->h5, path, broken)) return quern_text_add(why, "%s", broken), false;
 	const hid_t file = f->h5.file;
 	bool good = quern_h5_read_text(file, "format", is, sizeof is) && !strcmp(is, "quern-checkpoint 3");
 	f->scene = good ? read_scene(file) : NULL;
@@ -140,11 +142,40 @@ static bool open_checkpoint(quern_start_file *f, const char *path, quern_text *w
 	return good;
 }
 
+/* ---- one moment of a run that is still at work ---- */
+
+/* HDF5 opens files by their names alone, so that the one which was opened may be another by then. */
+static bool open_held(quern_held *held, const char *path) {
+	char why[256];
+	quern_h5 h;
+	held->file = quern_open_file(path);
+	if (held->file < 0 || is_plain_hdf5(path)) return true;
+	char *name = quern_format("/proc/self/fd/%d", held->file);
+	if (quern_h5_open(&h, name, why)) held->h5 = h.file;
+	free(name);
+	struct stat is, was;
+	return held->h5 >= 0 || stat(path, &is) || fstat(held->file, &was) || is.st_ino == was.st_ino;
+}
+
+quern_held quern_start_file_hold(const char *path) {
+	quern_held held = { .path = path, .file = -1, .h5 = -1 };
+	for (int k = 0; path && k < MOST_TRIES && !open_held(&held, path); k++) quern_start_file_let_go(&held);
+	return held;
+}
+
+void quern_start_file_let_go(quern_held *held) {
+	if (held->h5 >= 0) H5Fclose(held->h5);
+	if (held->file >= 0) close(held->file);
+	held->h5 = held->file = -1;
+}
+
 /* ---- both ---- */
 
-bool quern_start_file_open(quern_start_file *f, const char *path, const char *const *sets, quern_text *why) {
+bool quern_start_file_open(
+	quern_start_file *f, const char *path, hid_t held, const char *const *sets, quern_text *why) {
 	*f = (quern_start_file) { .h5 = { .file = -1 } };
-	const bool good = is_plain_hdf5(path) ? open_frame(f, path, sets, why) : open_checkpoint(f, path, why);
+	const bool frame = held < 0 && is_plain_hdf5(path);
+	const bool good = frame ? open_frame(f, path, sets, why) : open_checkpoint(f, path, held, why);
 	if (!f->scene) f->scene = quern_take(1, sizeof *f->scene);
 	return good;
 }

@@ -14,9 +14,19 @@ typedef struct quern_start_file {
 		*scene; /* of the run, resolved; of a frame the one beside it: without a root where there is none */
 } quern_start_file;
 
-/* False with a reason; finish it in any case. `sets`: of a frame those that a child reads first, since it has no
- * checksum; NULL-terminated, as the file calls them. */
-bool quern_start_file_open(quern_start_file *, const char *path, const char *const *sets, quern_text *why);
+/* A file of one moment, whatever takes its place: a run that is still at work replaces its checkpoint. */
+typedef struct quern_held {
+	const char *path; /* the caller's */
+	int file;         /* its bytes; -1: it cannot be read */
+	hid_t h5;         /* a checkpoint whose checksum holds; -1: it is none */
+} quern_held;
+quern_held quern_start_file_hold(const char *path); /* NULL: nothing */
+void quern_start_file_let_go(quern_held *);
+
+/* False with a reason; finish it in any case. `held`: of a checkpoint, what is held of it; -1: it is read from `path`.
+ * `sets`: of a frame those that a child reads first, since it has no checksum; NULL-terminated, as the file calls them. */
+bool quern_start_file_open(
+	quern_start_file *, const char *path, hid_t held, const char *const *sets, quern_text *why);
 void quern_start_file_finish(quern_start_file *);
 
 /* The group of a set and how many entries it has; below 0 if there is none, or none that makes sense. */

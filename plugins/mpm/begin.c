@@ -61,6 +61,9 @@ static bool is_whole(const quern_step *s, const quern_bound *material) {
 quern_status quern_mpm_begin(const mpm *p, const quern_step *s, uint32_t n) {
 	const quern_column *u = s->use;
 	const quern_bound *material = &s->slot[SLOT_MATERIAL][0];
+	if (!n && !p->source.n)
+		return s->host->stop(s->run, QUERN_E_PARAM, "from", -1,
+			"that state has no points left: name a frame from before, RUN:FRAME, or give a source");
 	for (uint32_t i = 0; i < n; i++) {
 		const quern_status status = check(s, i);
 		if (status != QUERN_OK) return status;
