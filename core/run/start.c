@@ -210,7 +210,7 @@ static bool read_fields(starting *s, hid_t group, int set, uint32_t n) {
 		const quern_field *field = &store->fields[k];
 		if (!is_meant(field, set)) continue;
 		if (!is_given(s, group, k)) note_lost(s, k);
-		else if (quern_start_file_read(&s->file, group, field, n)) s->run->taken[k] = true;
+		else if (quern_start_file_read(&s->file, group, store, field, n)) s->run->taken[k] = true;
 		else return quern_text_add(&s->why, "it is damaged: %s does not fit its set", field->name), false;
 	}
 	return true;

@@ -248,15 +248,68 @@ static bool read_table(const quern_start_file *f, hid_t group, const quern_field
 	return good;
 }
 
-bool quern_start_file_read(const quern_start_file *f, hid_t group, const quern_field *field, uint32_t n) {
+/* Entry q in the order of the places of the set's blocks, which alone says nothing of how the run had numbered these; a frame has
+ * it already. NULL: the order of the file. */
+static uint32_t *order_of(const quern_start_file *f, hid_t group, uint32_t n) {
+	size_t blocks = 0, columns = 0;
+	if (f->frame || !quern_h5_read_size(group, "by_place", &blocks, &columns) || blocks > MOST_ENTRIES)
+		return NULL;
+	uint32_t *place = quern_take(blocks + 1, sizeof *place), *block = quern_take(blocks + 2, sizeof *block);
+	uint32_t *order = quern_take((size_t)n + 1, sizeof *order), q = 0;
+	bool *seen = quern_take((size_t)n + 1, sizeof *seen);
+	bool good = quern_h5_read(group, "by_place", H5T_NATIVE_UINT32, blocks, 1, place) &&
+				quern_h5_read(group, "block", H5T_NATIVE_UINT32, blocks + 1, 1, block);
+	for (size_t k = 0; good && k < blocks; k++) {
+		good = place[k] < blocks && block[place[k] + 1] <= n;
+		for (uint32_t i = good ? block[place[k]] : 0; good && i < block[place[k] + 1]; i++)
+			if ((good = q < n && !seen[i])) seen[i] = true, order[q++] = i;
+	}
+	free(seen);
+	free(place);
+	free(block);
+	if (good && q == n) return order;
+	free(order);
+	return NULL;
+}
+
+static void bring_in_order(void *column, size_t bytes, const uint32_t *order, uint32_t n) {
+	char *was = quern_take((size_t)n + 1, bytes);
+	memcpy(was, column, n * bytes);
+	for (uint32_t q = 0; q < n; q++) memcpy((char *)column + q * bytes, was + order[q] * bytes, bytes);
+	free(was);
+}
+
+/* Indices into a set that was brought in order. */
+static void follow(const quern_start_file *f, const quern_set_store *of, int32_t *index, uint32_t n) {
+	uint32_t m = 0;
+	int64_t next_id;
+	const hid_t group = quern_start_file_set(f, of, &m, &next_id);
+	uint32_t *order = group >= 0 ? order_of(f, group, m) : NULL;
+	int32_t *at = order ? quern_take((size_t)m + 1, sizeof *at) : NULL;
+	for (uint32_t q = 0; order && q < m; q++) at[order[q]] = (int32_t)q;
+	for (uint32_t i = 0; order && i < n; i++)
+		if (index[i] >= 0 && (uint32_t)index[i] < m) index[i] = at[index[i]];
+	if (group >= 0) H5Gclose(group);
+	free(order);
+	free(at);
+}
+
+bool quern_start_file_read(
+	const quern_start_file *f, hid_t group, const quern_store *store, const quern_field *field, uint32_t n) {
 	const bool whole = field->shape == QUERN_INDEX || field->shape == QUERN_ID;
 	char name[64];
 	if (f->frame && !whole) return read_table(f, group, field, n);
-	for (int c = 0; c < field->n_components; c++)
-		if (!quern_h5_read(
-				group, dataset(f, field, c, name), quern_state_type(field), n, 1, field->data[field->now][c]))
-			return false;
-	return true;
+	uint32_t *order = order_of(f, group, n);
+	bool good = true;
+	for (int c = 0; c < field->n_components && good; c++) {
+		void *column = field->data[field->now][c];
+		good = quern_h5_read(group, dataset(f, field, c, name), quern_state_type(field), n, 1, column);
+		if (good && order) bring_in_order(column, quern_field_bytes(field), order, n);
+	}
+	free(order);
+	if (good && !f->frame && field->shape == QUERN_INDEX && field->target >= 0)
+		follow(f, &store->sets[field->target], field->data[field->now][0], n);
+	return good;
 }
 
 bool quern_start_file_knows(

@@ -35,7 +35,8 @@ hid_t quern_start_file_set(const quern_start_file *, const quern_set_store *, ui
 bool quern_start_file_has(const quern_start_file *, hid_t group, const quern_field *);
 /* Whether it stands there with n entries, as far as can be told without reading them. */
 bool quern_start_file_holds(const quern_start_file *, hid_t group, const quern_field *, uint32_t n);
-/* Reads n entries of it into its columns; false if it is of another type or size. */
-bool quern_start_file_read(const quern_start_file *, hid_t group, const quern_field *, uint32_t n);
+/* Reads n entries of it into its columns, in the order of places; false if it is of another type or size. */
+bool quern_start_file_read(
+	const quern_start_file *, hid_t group, const quern_store *, const quern_field *, uint32_t n);
 /* Whether a plugin took part in the run, or made the field of the frame. */
 bool quern_start_file_knows(const quern_start_file *, hid_t group, const quern_field *, const char *plugin);
