@@ -13,7 +13,7 @@ import sys
 import tempfile
 
 SOURCE, QUERN = pathlib.Path(os.environ["QUERN_SOURCE"]), pathlib.Path(os.environ["QUERN"])
-PAGES = {"README.md": 10, "docs/tutorial.md": 8, "docs/run_folder.md": 4, "docs/python.md": 5, "docs/film.md": 8, "docs/studies.md": 3, "docs/observers.md": 1}
+PAGES = {"README.md": 10, "docs/tutorial.md": 13, "docs/run_folder.md": 4, "docs/python.md": 5, "docs/film.md": 8, "docs/studies.md": 3, "docs/observers.md": 1}
 PIECE = re.compile(r"^```(yaml|python|text)\n(.*?)^```|^    (build/quern [^\n]*)$", re.M | re.S)
 
 

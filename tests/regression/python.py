@@ -20,6 +20,10 @@ try:
     import yaml
 except ImportError:
     yaml = None
+try:
+    import pandas
+except ImportError:
+    pandas = None
 
 
 def raises(kind, function, *words, **options):
@@ -65,6 +69,13 @@ def check_whole(here):
     rows = list(csv.DictReader((here / "whole/series.csv").open()))
     front = [float(row["runout.front [m]"]) for row in rows]
     assert run.series["runout.front"].tolist() == front and run.series.units["runout.front"] == "m" and len(run.series) == 5
+    if pandas:
+        told, held = run.series.to_pandas(), pandas.read_csv(here / "whole/series.csv", float_precision="round_trip")
+        assert list(told.columns) == list(held.columns) and len(told) == 5, list(told.columns)
+        assert (told.to_numpy() == held[told.columns].to_numpy(float)).all() and told["runout.front [m]"].tolist() == front
+        print(f"ok  a table of pandas with {len(told.columns)} columns")
+    else:
+        print("pandas is not here: to_pandas was not looked at")
     assert "the series have no 'runout.back'" in str(raises(KeyError, run.series.__getitem__, "runout.back"))
     assert run.summary == lab.summary(here / "whole") and "done: t = 0.02 s" in run.log
     if yaml:
