@@ -261,6 +261,7 @@ static quern_status take_over(session *s, bool again) {
 	quern_run *run = s->run;
 	char why[256] = "";
 	if (!quern_run_folder_begin(&s->folder, run, why)) return quern_run_stop(run, QUERN_E_IO, "%s", why);
+	quern_start_let_go(run); /* all of it is in the folder now */
 	char *path = quern_format("%s/log.txt", run->folder);
 	quern_log_open(run->log, path, again);
 	free(path);
