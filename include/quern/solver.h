@@ -166,7 +166,8 @@ typedef struct quern_solver_ops {
 	 * in which the scene names a run, RUN or RUN:FRAME; NULL: this solver does not start so. Before the set-up the host
 	 * gives the sets of `takes` what the file holds of their fields, with IDs, and of a plugin's own fields what the same
 	 * plugin has left; the first set is there, and has the fields of `essential`, or the run is refused. Another set that
-	 * cannot be read is empty. They are sets of this solver without rows, the first of them there in every scene. The stages of QUERN_SETUP go on from there, and answer for what the numbers mean here */
+	 * cannot be read is empty. They are sets of this solver without rows, the first of
+	 * them there in every scene. The stages of QUERN_SETUP go on from there, and answer for what the numbers mean here */
 	const char *from;
 	const char *const *takes, *const *essential; /* "grain"; "grain.position" */
 	/* since 2.1: parameters that must be as they were; of a list "materials.name", which may go on behind what was there */
