@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 
 import yaml
 
+from .chart_form import Chart, read_charts, read_page
 from .closed import Closed, read_closed
 from .measure import RESERVED, Measure, read_measures
 from .reader import Reader, Sets, StudyError, compose, flow, is_path, kind, nearest, number_label, read_sets
 
-KEYS = ("study", "name", "base", "set", "axes", "repeats", "reference", "measure", "front", "jobs", "threads", "limit")
+KEYS = ("study", "name", "base", "set", "axes", "repeats", "reference", "measure", "front", "jobs", "threads", "limit", "charts", "page")
 FRONTS = ("processor", "running", "wall")
 SECONDS = {"": 1, "s": 1, "min": 60, "h": 3600, "d": 86400}
 MOST_RUNS = 100_000
@@ -55,6 +56,8 @@ class Study:
     jobs: int = 0
     threads: int = 1
     limit: float = math.inf
+    charts: list[Chart] = field(default_factory=list)
+    page: pathlib.Path | None = None
 
 
 def spread(first: float, last: float, law: str, share: float) -> float:
@@ -241,6 +244,8 @@ def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
     study.jobs = reader.whole(parts["jobs"], "jobs", 1, 10_000) if "jobs" in parts else 0
     study.threads = reader.whole(parts["threads"], "threads", 1, 1024) if "threads" in parts else 1
     study.limit = read_limit(reader, parts["limit"]) if "limit" in parts else math.inf
+    study.charts = read_charts(reader, parts["charts"], study) if "charts" in parts else []
+    study.page = read_page(reader, parts["page"], path.parent) if "page" in parts else None
     count = math.prod(len(axis.values) for axis in study.axes if not axis.drawn) * max(1, len(study.seeds))
     count *= max((len(axis.values) for axis in study.axes if axis.drawn), default=1)
     if count > MOST_RUNS:

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of charts, by Matplotlib. Lines differ by colour, and by dash or marker for eyes that do not tell the colours apart."""
+import io
+import math
+import os
+import pathlib
+
+import numpy as np
+
+from . import chart_labels, errors
+from .chart_data import Curve, Picture
+from .program import QuernError
+
+# Okabe and Ito's colours but for yellow, which is faint on white, and black, which is the reference's.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DASHES = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 2, 1.2, 2)))
+MARKERS = "osD^vP*X<>"
+REFERENCE = "black"
+STYLE = {"font.family": "DejaVu Sans", "font.size": 9.0, "svg.fonttype": "none", "svg.hashsalt": "quern", "axes.spines.top": False,
+         "axes.spines.right": False, "axes.grid": True, "grid.color": "#e6e6e6", "grid.linewidth": 0.6, "axes.axisbelow": True,
+         "legend.frameon": False, "axes.titlelocation": "left", "axes.titlesize": 10.0, "lines.linewidth": 1.5, "pdf.fonttype": 42,
+         "axes.unicode_minus": True, "axes.formatter.useoffset": False, "figure.dpi": 72}
+PREFIXED = {"m", "s", "Pa", "J", "N", "W", "N/m", "J/m"}
+PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+MOST_NAMED = 12  # points with their names beside them; more get numbers and a key
+SURE, MAYBE = 0.95, 0.05
+WIDTH, HEIGHT = 5.2, 3.6  # inches, of the axes
+PNG_DPI = 200
+
+
+def scaled(unit: str, arrays: list[np.ndarray]) -> tuple[float, str]:
+    """What to divide by so that numbers stay short, and the unit then."""
+    most = max((float(np.nanmax(np.abs(data))) for data in arrays if np.isfinite(data).any()), default=0.0)
+    if unit not in PREFIXED or most <= 0:
+        return 1.0, unit
+    power = min(9, max(-9, 3 * math.floor(math.log10(most) / 3 + 1e-9)))
+    return 10.0 ** power, PREFIXES[power] + unit
+
+
+def powers(unit: str) -> str:
+    """Powers as letters above the line: text that stays text."""
+    return "".join(part if k == 0 else part[:end].translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")) + part[end:]
+                   for k, part in enumerate(unit.split("^")) for end in [len(part) - len(part.lstrip("-0123456789"))])
+
+
+def named(word: str, unit: str) -> str:
+    return word if unit in ("1", "") else f"{word} [{powers(unit)}]"
+
+
+def linear_or_log(axis, low: float, high: float, log: bool) -> None:
+    """Ticks that are written as people write numbers."""
+    from matplotlib import ticker
+    plain = ticker.FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}"))
+    axis.set_major_formatter(plain)
+    if log:
+        span = high / low
+        axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if span < 200 else (1,), numticks=30))
+        axis.set_minor_locator(ticker.NullLocator())
+    else:
+        axis.set_major_locator(ticker.MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
+
+
+def style_of(number: int, one: Curve, references: int) -> dict:
+    if one.reference:
+        return {"color": REFERENCE, "linestyle": DASHES[(references + 1) % 4], "marker": ""}
+    return {"color": COLOURS[number % 6], "linestyle": DASHES[number // 6 % 4], "marker": MARKERS[number % 10]}
+
+
+def draw_lines(axes, picture: Picture, x_by: float, y_by: float) -> None:
+    """Lines with a band of one standard error, or two in a chart of scalars, whose points have bars."""
+    plain = references = 0
+    scalar = picture.kind == "scalar"
+    for one in picture.curves:
+        style = style_of(plain, one, references)
+        references, plain = references + one.reference, plain + (not one.reference)
+        x, y = one.x / x_by, one.y / y_by
+        spread = None if one.dy is None or not np.isfinite(one.dy).any() else (2 if scalar else 1) * one.dy / y_by
+        if spread is not None and (one.reference or not scalar):
+            axes.fill_between(x, y - spread, y + spread, color=style["color"], alpha=0.18, linewidth=0)
+        if scalar and not one.reference:
+            axes.errorbar(x, y, None if spread is None else np.nan_to_num(spread), markersize=5, capsize=2.5, elinewidth=1, label=one.label, **style)
+            continue
+        there = np.isfinite(y)
+        alone = there & ~np.append(there[1:], False) & ~np.append(False, there[:-1])  # a line does not show these
+        many = len(x) > 12 and not alone.any()
+        axes.plot(x, y, label=one.label, markersize=4, markevery=(plain * max(1, len(x) // 40), max(1, len(x) // 8)) if many else None,
+                  drawstyle="steps-post" if picture.kind == "distribution" and one.label != "asked" else "default", **style)
+
+
+def draw_words(axes, picture: Picture, by: float) -> None:
+    """Scalars over words lie: a row for each word reads better than words that stand on end. Lines of one row lie beside each other."""
+    lines = [one for one in picture.curves if not one.reference]
+    for number, one in enumerate(lines):
+        style = style_of(number, one, 0)
+        shift = (number - (len(lines) - 1) / 2) * min(0.22, 0.7 / len(lines))
+        spread = None if one.dy is None or not np.isfinite(one.dy).any() else 2 * np.nan_to_num(one.dy) / by
+        axes.errorbar(one.y / by, one.x + shift, xerr=spread, color=style["color"], marker=style["marker"], linestyle="", markersize=5,
+                      capsize=2.5, elinewidth=1, label=one.label)
+    for number, one in enumerate(one for one in picture.curves if one.reference):
+        dashes = DASHES[(number + 1) % 4]
+        for k, (place, value) in enumerate(zip(one.x, one.y / by)):
+            axes.plot([value, value], [place - 0.45, place + 0.45], color=REFERENCE, linestyle=dashes, label=one.label if k == 0 else None)
+            if one.dy is not None and math.isfinite(one.dy[k]):
+                axes.fill_betweenx([place - 0.45, place + 0.45], *(value + side * 2 * one.dy[k] / by for side in (-1, 1)), color=REFERENCE,
+                                   alpha=0.12, linewidth=0)
+    axes.set_yticks(range(len(picture.words)), picture.words)
+    axes.set_ylim(len(picture.words) - 0.5, -0.5)
+    axes.grid(axis="y", visible=False)
+
+
+# ---- cost against error ----
+
+def class_of(share: float) -> int:
+    """0: surely on the front, 1: may be, 2: surely not, 3: nobody knows, of one seed."""
+    return 3 if math.isnan(share) else 0 if share >= SURE else 1 if share > MAYBE else 2
+
+
+CLASSES = (("surely on the front", {"marker": "o", "markersize": 7, "markerfacecolor": "#D55E00", "markeredgecolor": "#D55E00"}),
+           ("may be on the front", {"marker": "D", "markersize": 5.5, "markerfacecolor": "#F2BE99", "markeredgecolor": "#D55E00"}),
+           ("surely not", {"marker": "o", "markersize": 4.5, "markerfacecolor": "white", "markeredgecolor": "#0072B2"}),
+           ("of one seed: not known", {"marker": "s", "markersize": 4.5, "markerfacecolor": "#BBBBBB", "markeredgecolor": "#555555"}))
+
+
+def draw_front(axes, picture: Picture, y_by: float) -> None:
+    """Points with one standard error, the steps of the front of the means, the scatter of the reference."""
+    one, front = picture.curves[0], picture.front
+    x, y = one.x, one.y / y_by
+    if math.isfinite(front.scatter):
+        axes.axhspan(0, front.scatter / y_by, color="#999999", alpha=0.18, linewidth=0, label=f"scatter of single runs of {front.reference}")
+    if front.relative:
+        axes.axvline(1, color=REFERENCE, linestyle=DASHES[2], linewidth=1, label=f"cost of {front.reference}")
+    dx, dy = np.nan_to_num(one.dx), np.nan_to_num(one.dy / y_by)
+    axes.errorbar(x, y, dy, np.minimum(dx, 0.9 * x), linestyle="", color="#888888", elinewidth=0.8, zorder=2)
+    on = np.flatnonzero(errors.front(x, y))
+    on = on[np.argsort(x[on], kind="stable")]
+    axes.step(x[on], y[on], where="post", color="#D55E00", linewidth=0.9, linestyle=DASHES[1], zorder=1.5, label="front of the means")
+    for number, (word, style) in enumerate(CLASSES):
+        which = [k for k in range(len(x)) if class_of(front.shares[k]) == number]
+        if which:
+            axes.plot(x[which], y[which], linestyle="", zorder=3, label=word, **style)
+    for number, word in enumerate(dict.fromkeys(front.marks.values())):
+        which = [k for k, mark in front.marks.items() if mark == word]
+        axes.plot(x[which], y[which], linestyle="", marker="s", markersize=13, markerfacecolor="none", markeredgecolor="black",
+                  markeredgewidth=1.2, zorder=3.5, label=word)
+
+
+def extents(figure, axes, texts: list[str]) -> np.ndarray:
+    """Sizes of texts in points."""
+    renderer, sizes = figure.canvas.get_renderer(), []
+    for text in texts:
+        trial = axes.text(0, 0, text, fontsize=8)
+        box = trial.get_window_extent(renderer)
+        sizes.append((box.width, box.height))
+        trial.remove()
+    return np.array(sizes)
+
+
+def bars(axes, one: Curve, y_by: float) -> np.ndarray:
+    """Boxes of the error bars, upright ones and lying ones."""
+    dx, dy = np.nan_to_num(one.dx), np.nan_to_num(one.dy)
+    found = []
+    for across, along in ((np.minimum(dx, 0.9 * one.x), 0 * dy), (0 * dx, dy)):
+        ends = [axes.transData.transform(np.column_stack([one.x + side * across, (one.y + side * along) / y_by])) for side in (-1, 1)]
+        found.append(np.hstack([ends[0] - 0.5, ends[1] + 0.5]))
+    return np.concatenate(found)
+
+
+def label_points(figure, axes, picture: Picture, y_by: float) -> str:
+    """Names beside points; numbers where there are many, and their key is returned."""
+    one, front = picture.curves[0], picture.front
+    count = len(one.x)
+    width = len(str(count))
+    texts = [label + share_words(share) for label, share in zip(front.labels, front.shares)] if count <= MOST_NAMED else [str(k + 1) for k in range(count)]
+    figure.canvas.draw()
+    anchors = axes.transData.transform(np.column_stack([one.x, one.y / y_by]))
+    frame = axes.get_window_extent()
+    corner = np.array([frame.x0, frame.y0])
+    sizes = extents(figure, axes, texts)
+    covered = [chart_labels.boxes(anchors, np.full((count, 2), 9.0)), bars(axes, one, y_by)]
+    if front.relative:
+        at = axes.transData.transform((1, 0))[0]
+        covered.append(np.array([[at - 1, frame.y0, at + 1, frame.y1]]))
+    centres = chart_labels.place(anchors, sizes, np.concatenate(covered),
+                                 np.array([frame.x0 + 2, frame.y0 + 2, frame.x1, frame.y1]))
+    for text, anchor, centre, size in zip(texts, anchors, centres, sizes):
+        off = centre - anchor
+        anchor, centre = anchor - corner, centre - corner
+        edge = np.clip(-off, -size / 2, size / 2) + off  # the place of the text's box that is nearest to the point
+        if np.hypot(*edge) > 9:
+            axes.annotate("", anchor + edge, anchor, "axes points", "axes points", arrowprops={"arrowstyle": "-", "color": "#777777", "linewidth": 0.6}, zorder=2.5)
+        axes.annotate(text, anchor, centre, "axes points", "axes points", ha="center", va="center", fontsize=8, zorder=4, annotation_clip=False)
+    if count <= MOST_NAMED:
+        return ""
+    return "\n".join(f"{k + 1:>{width}}  {front.labels[k]}{share_words(front.shares[k])}" for k in range(count))
+
+
+def share_words(share: float) -> str:
+    return f" ({100 * share:.0f} %)" if class_of(share) == 1 else ""
+
+
+def write_key(figure, axes, key: str, below: float) -> None:
+    """Numbers and what they stand for, in a column beside the axes, or two."""
+    lines = key.split("\n")
+    half = len(lines) if len(lines) <= 40 else math.ceil(len(lines) / 2)
+    left, pitch = 16.0, 11.0
+    for begin in range(0, len(lines), half):
+        part = lines[begin:begin + half]
+        for k, line in enumerate(part):
+            axes.annotate(line, (1, 1), (left, below - k * pitch), "axes fraction", "offset points", fontsize=8, va="top", annotation_clip=False)
+        left += float(extents(figure, axes, part)[:, 0].max()) + 14
+
+
+def size_of(picture: Picture) -> tuple[float, float]:
+    if picture.words:
+        lines = max(1, sum(not one.reference for one in picture.curves))
+        return WIDTH, max(1.2, len(picture.words) * max(0.26, 0.12 * lines + 0.1))
+    return WIDTH, HEIGHT
+
+
+def bounds_of_front(axes, picture: Picture, y_by: float) -> None:
+    one = picture.curves[0]
+    y, dy = one.y / y_by, np.nan_to_num(one.dy / y_by)
+    scatter = picture.front.scatter / y_by if math.isfinite(picture.front.scatter) else 0
+    low, high = float(one.x.min()), float(one.x.max())
+    if picture.front.relative:
+        low, high = min(low, 1.0), max(high, 1.0)
+    axes.set_xscale("log")
+    room = max(1.25, (high / low) ** 0.06)
+    axes.set_xlim(low / room, high * room)
+    top = 1.12 * max(float((y + dy).max()), scatter) or 1.0
+    axes.set_ylim(-0.03 * top, top)
+    linear_or_log(axes.xaxis, low, high * room, True)
+    linear_or_log(axes.yaxis, 0, 1, False)
+
+
+def figure_of(picture: Picture):
+    """The figure; call it within the style."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    width, height = size_of(picture)
+    figure = Figure(figsize=(width + 2, height + 2))
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes([1 / (width + 2), 1 / (height + 2), width / (width + 2), height / (height + 2)])
+    x_by, x_unit = scaled(picture.x[1], [one.x for one in picture.curves] if not picture.words and not picture.front else [])
+    y_by, y_unit = scaled(picture.y[1], [one.y for one in picture.curves])
+    key = ""
+    if picture.front:
+        draw_front(axes, picture, y_by)
+        bounds_of_front(axes, picture, y_by)
+        key = label_points(figure, axes, picture, y_by)
+    elif picture.words:
+        draw_words(axes, picture, y_by)
+        linear_or_log(axes.xaxis, 0, 1, False)
+    else:
+        draw_lines(axes, picture, x_by, y_by)
+        axes.margins(x=0.02)
+        if picture.kind == "line":
+            axes.set_xlim(0, picture.curves[0].x[[0, -1]].sum() / x_by)
+        for axis in (axes.xaxis, axes.yaxis):
+            linear_or_log(axis, 0, 1, False)
+    below, across = named(picture.x[0], x_unit), named(picture.y[0], y_unit)
+    axes.set_xlabel(across if picture.words else below)
+    axes.set_ylabel("" if picture.words else across)
+    if picture.title:
+        axes.set_title(picture.title, pad=10)
+    known = dict(zip(*reversed(axes.get_legend_handles_labels())))
+    handles = list(known.values()) if picture.front else [known[one.label] for one in picture.curves if one.label in known]
+    if len(handles) > 1 or picture.front:
+        legend = axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0, bbox_transform=axes.transAxes, fontsize=8, handlelength=3)
+        figure.canvas.draw()
+        bottom = legend.get_window_extent().y0 - axes.get_window_extent().y1
+    else:
+        bottom = 0.0
+    if key:
+        write_key(figure, axes, key, bottom - 8)
+    return figure
+
+
+def metadata_for(kind: str, about: dict[str, str]) -> dict:
+    """Title, Creator (program), Description (command) and Source (study and its hash), as each format calls them; no dates."""
+    if kind == "svg":
+        return {"Title": about["Title"], "Creator": about["Creator"], "Description": about["Description"], "Source": about["Source"], "Date": None}
+    if kind == "png":
+        return {"Title": about["Title"], "Software": about["Creator"], "Description": about["Description"], "Source": about["Source"]}
+    return {"Title": about["Title"], "Creator": about["Creator"], "Subject": about["Description"], "Keywords": about["Source"], "CreationDate": None,
+            "Producer": None}
+
+
+def save(picture: Picture, paths: list[pathlib.Path], about: dict[str, str]) -> None:
+    """The picture in the form that each path ends with: svg, png or pdf; written aside and renamed."""
+    try:
+        import matplotlib
+    except ImportError:
+        raise QuernError("charts need Matplotlib (Debian: python3-matplotlib)", 1) from None
+    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **STYLE}):
+        figure = figure_of(picture)
+        for path in paths:
+            kind, out = path.suffix[1:], io.BytesIO()
+            figure.savefig(out, format=kind, dpi=PNG_DPI if kind == "png" else 72, bbox_inches="tight", pad_inches=0.12, metadata=metadata_for(kind, about))
+            aside = path.with_name(f"{path.name}.{os.getpid()}.part")
+            aside.write_bytes(out.getvalue())
+            aside.replace(path)

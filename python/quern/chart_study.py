@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""From the table of a study to the lines of its charts: which runs belong together, what the reference is, where points lie."""
+import math
+import pathlib
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+from .chart_data import FROM_RUNS, Curve, Front, Group, Picture, over_seeds
+from .chart_form import Chart
+from .points import combinations
+from .program import QuernError
+from .study import Study
+from .table import axis_numbers
+
+
+@dataclass
+class Table:
+    """One of the tables in table.h5: columns, numbers or text, and units of those that are numbers."""
+    columns: dict[str, np.ndarray]
+    units: dict[str, str]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self.columns:
+            raise QuernError(f"the table has no column '{name}'; it was written for another form of the study; quern sweep writes it anew", 2)
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), []))
+
+
+@dataclass
+class Made:
+    """A study that was made: its runs, its points, and where they lie."""
+    study: Study
+    folder: pathlib.Path
+    runs: Table
+    points: Table
+    labels: list[dict[str, str]]  # of each point, by axis
+    numbers: dict[str, str]  # units of axes that are numbers
+
+
+def read_table(group: h5py.Group) -> Table:
+    columns, units = {}, {}
+    for name, data in group.items():
+        if "unit" in data.attrs:
+            unit = data.attrs["unit"]
+            columns[name], units[name] = data[()], unit.decode() if isinstance(unit, bytes) else unit
+        else:
+            columns[name] = data.asstr()[()]
+    return Table(columns, units)
+
+
+def read_made(study: Study, folder: pathlib.Path) -> Made:
+    """The tables of a study; QuernError where there are none or they are of another study."""
+    path = folder / "table.h5"
+    if not path.exists():
+        raise QuernError(f"{folder}: no table lies there; quern sweep {study.path} makes it, -o names another folder", 2)
+    try:
+        with h5py.File(path, "r") as file:
+            runs, points = read_table(file["runs"]), read_table(file["points"])
+    except (OSError, KeyError) as why:
+        raise QuernError(f"{path} cannot be read: {why}; quern sweep {study.path} writes it anew", 2) from None
+    labels = [{name: value.label for name, value in point.items()} for point in combinations(study)]
+    made = Made(study, folder, runs, points, labels, axis_numbers(study))
+    if len(points) != len(labels) or not all(axis.name in points.columns for axis in study.axes):
+        raise QuernError(f"{path} has {len(points)} points and the study {len(labels)}, or other axes; quern sweep {study.path} writes it anew", 2)
+    return made
+
+
+def label_of(made: Made, values: dict[str, str], names) -> str:
+    """What a line is called: words as they are, numbers with their axis."""
+    return ", ".join(f"{name} {values[name]}" if name in made.numbers else values[name] for name in names if name in values)
+
+
+def picked(made: Made, chart: Chart) -> list[int]:
+    """Points that have the values of `where`."""
+    return [k for k, values in enumerate(made.labels) if all(values[name] == label for name, label in chart.where.items())]
+
+
+def done(made: Made, rows) -> list[int]:
+    return [int(k) for k in rows if made.runs["status"][k] == "done"]
+
+
+def rows_of_point(made: Made, point: int) -> list[int]:
+    runs = made.runs
+    return done(made, np.flatnonzero((runs["model"] == "") & (runs["point"] == point)))
+
+
+def reference_rows(made: Made, point: int) -> list[int]:
+    """Runs of the reference that a point is compared with."""
+    if not made.study.reference:
+        return []
+    runs = made.runs
+    same = runs["model"] != ""
+    for name in made.study.follows:
+        same &= runs[name] == made.points[name][point]
+    return done(made, np.flatnonzero(same))
+
+
+def references(made: Made, chart: Chart, names) -> list[tuple[str, list[int]]]:
+    """Label and rows of each reference that the chart's points have."""
+    found: dict[tuple, tuple[str, list[int]]] = {}
+    for point in picked(made, chart):
+        rows = reference_rows(made, point)
+        values = {name: made.labels[point][name] for name in made.study.follows if name in names}
+        if rows:
+            found.setdefault(tuple(rows), (", ".join(filter(None, [made.study.reference, label_of(made, values, names)])), rows))
+    return list(found.values())
+
+
+def groups_of(made: Made, chart: Chart) -> list[Group]:
+    """A group for each point, then the references."""
+    def folders(rows):
+        return [made.folder / "runs" / made.runs["run"][k] for k in rows]
+    groups = [Group(label_of(made, made.labels[k], chart.by) or made.study.name, folders(rows_of_point(made, k))) for k in picked(made, chart)]
+    groups = [group for group in groups if group.folders]
+    return groups + [Group(label, folders(rows), True) for label, rows in references(made, chart, chart.by)]
+
+
+# ---- from the table alone ----
+
+def scalar_lines(made: Made, chart: Chart) -> dict[str, list[int]]:
+    lines: dict[str, list[int]] = {}
+    for point in picked(made, chart):
+        lines.setdefault(label_of(made, made.labels[point], chart.by), []).append(point)
+    return lines
+
+
+def reference_of(made: Made, chart: Chart, label: str, points: list[int], x: np.ndarray) -> Curve | None:
+    """Mean of the reference beside each point of a line, and its standard error."""
+    values, measure = made.runs[chart.measure], chart.measure
+    rows = [reference_rows(made, point) for point in points]
+    stats = [over_seeds([values[k] for k in row]) if row else (math.nan, math.nan) for row in rows]
+    y, dy = (np.array([float(one[part]) for one in stats]) for part in (0, 1))
+    if not made.study.reference or not np.isfinite(y).any() or measure not in made.runs.columns:
+        return None
+    name = f"{made.study.reference}, {label}" if label and set(made.study.follows) & set(chart.by) else made.study.reference
+    return Curve(name, x, y, dy=dy, reference=True)
+
+
+def draw_scalar(made: Made, chart: Chart) -> Picture:
+    points, axis = made.points, next(axis for axis in made.study.axes if axis.name == chart.over)
+    words = [] if chart.over in made.numbers else [value.label for value in axis.values]
+    picture = Picture(chart.name, "scalar", chart.title, (chart.over, made.numbers.get(chart.over, "1")),
+                      (chart.measure, points.units.get(f"{chart.measure}.mean", "1")), [], words)
+    mean, deviation = points[f"{chart.measure}.mean"], points[f"{chart.measure}.standard_error"]
+    seen = set()
+    for label, which in scalar_lines(made, chart).items():
+        x = np.array([float(words.index(made.labels[k][chart.over])) if words else made.points[chart.over][k] for k in which])
+        order = np.argsort(x, kind="stable")
+        which, x = [which[k] for k in order], x[order]
+        there = np.isfinite(mean[which])
+        if there.any():
+            picture.curves.append(Curve(label or made.study.name, x[there], mean[which][there], dy=deviation[which][there]))
+        one = reference_of(made, chart, label, which, x)
+        if one and one.label not in seen:
+            picture.curves.append(one)
+            seen.add(one.label)
+    picture.curves.sort(key=lambda one: one.reference)
+    return picture
+
+
+def cost_of(made: Made, rows: list[int]) -> tuple[float, float]:
+    """Mean of the study's cost and its standard error."""
+    mean, deviation = over_seeds([made.runs[f"cost.{made.study.front}"][k] for k in rows]) if rows else (math.nan, math.nan)
+    return float(mean), float(deviation)
+
+
+def draw_front(made: Made, chart: Chart) -> Picture:
+    """Cost and error of each point, cheapest first."""
+    name, points = chart.measure, made.points
+    error, deviation = points[f"{name}.error"], points[f"{name}.error.standard_error"]
+    rows = [k for k in picked(made, chart) if math.isfinite(error[k]) and rows_of_point(made, k)]
+    costs = {k: cost_of(made, rows_of_point(made, k)) for k in rows}
+    if chart.relative_cost:
+        of = {k: cost_of(made, reference_rows(made, k))[0] for k in rows}
+        costs = {k: (cost / of[k], spread / of[k]) for k, (cost, spread) in costs.items() if of[k] > 0}
+    rows = sorted(costs, key=lambda k: (costs[k][0], k))
+    axes = [axis.name for axis in made.study.axes if len(axis.values) > 1 and axis.name not in chart.where]
+    labels = [label_of(made, made.labels[k], axes) or made.study.name for k in rows]
+    marks = {i: ", ".join(f"{axis} {label}" for axis, label in chart.mark.items()) for i, k in enumerate(rows)
+             if chart.mark and all(made.labels[k][axis] == label for axis, label in chart.mark.items())}
+    scatters = points[f"{name}.scatter"][rows]
+    scatter = float(np.median(scatters[np.isfinite(scatters)])) if np.isfinite(scatters).any() else math.nan
+    what = {"running": "processor time from the release on", "processor": "processor time", "wall": "time by the clock"}[made.study.front]
+    x = (f"{what}, over that of {made.study.reference}", "1") if chart.relative_cost else (what, "s")
+    measure = next(one for one in made.study.measures if one.name == name)
+    relative = getattr(measure, "norm", "") == "share" or bool(getattr(measure, "relative", False))
+    place = [np.array([costs[k][part] for k in rows]) for part in (0, 1)]
+    line = Curve("settings", place[0], error[rows], place[1], deviation[rows])
+    share = points.columns.get(f"cost.{name}.front_share", np.full(len(points), math.nan))[rows]
+    y = (f"error of {name} against {made.study.reference}", "%" if relative else points.units[f"{name}.error"])
+    if relative:
+        line.y, line.dy, scatter = 100 * line.y, 100 * line.dy, 100 * scatter
+    return Picture(chart.name, "front", chart.title, x, y, [line] if rows else [],
+                   front=Front(labels, share, marks, scatter, made.study.reference, chart.relative_cost))
+
+
+def picture_of(made: Made, chart: Chart) -> Picture:
+    if chart.kind in ("scalar", "front"):
+        return {"scalar": draw_scalar, "front": draw_front}[chart.kind](made, chart)
+    at = "last"
+    if chart.kind == "profile":
+        measure = next(one for one in made.study.measures if one.name == chart.measure)
+        chart.column, at = measure.path, measure.at
+    return FROM_RUNS[chart.kind](chart, groups_of(made, chart), at)
