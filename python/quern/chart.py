@@ -203,6 +203,8 @@ def charts_of_study(study: Study, options: argparse.Namespace, words: list[str])
     folder = pathlib.Path(options.output or pathlib.Path("out") / study.name).resolve()
     made = read_made(study, folder)
     tell_missing(made, options.what[0])
+    if study.page:
+        page.split(study.page)  # before anything is drawn
     (folder / "charts").mkdir(exist_ok=True)
     source = f"{study.path.name} sha256:{digest(study.path)}, points.csv sha256:{digest(folder / 'points.csv')}"
     drawn = {}

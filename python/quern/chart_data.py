@@ -29,6 +29,7 @@ class Curve:
 @dataclass
 class Front:
     """What a chart of cost and error knows of its points beside their places."""
+    points: list[int]  # their numbers in the table, cheapest first
     labels: list[str]
     shares: np.ndarray  # of resamples in which the point is on the front; NaN for one seed
     marks: dict[int, str]  # point: what it is called

@@ -25,6 +25,7 @@ PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 MOST_NAMED = 12  # points with their names beside them; more get numbers and a key
 SURE, MAYBE = 0.95, 0.05
 WIDTH, HEIGHT = 5.2, 3.6  # inches, of the axes
+KEY_PITCH = 11.0  # points from line to line
 PNG_DPI = 200
 
 
@@ -186,7 +187,7 @@ def label_points(figure, axes, picture: Picture, y_by: float) -> str:
         off = centre - anchor
         anchor, centre = anchor - corner, centre - corner
         edge = np.clip(-off, -size / 2, size / 2) + off  # the place of the text's box that is nearest to the point
-        if np.hypot(*edge) > 9:
+        if np.hypot(*edge) > 7:
             axes.annotate("", anchor + edge, anchor, "axes points", "axes points", arrowprops={"arrowstyle": "-", "color": "#777777", "linewidth": 0.6}, zorder=2.5)
         axes.annotate(text, anchor, centre, "axes points", "axes points", ha="center", va="center", fontsize=8, zorder=4, annotation_clip=False)
     if count <= MOST_NAMED:
@@ -202,11 +203,11 @@ def write_key(figure, axes, key: str, below: float) -> None:
     """Numbers and what they stand for, in a column beside the axes, or two."""
     lines = key.split("\n")
     half = len(lines) if len(lines) <= 40 else math.ceil(len(lines) / 2)
-    left, pitch = 16.0, 11.0
+    left = 16.0
     for begin in range(0, len(lines), half):
         part = lines[begin:begin + half]
         for k, line in enumerate(part):
-            axes.annotate(line, (1, 1), (left, below - k * pitch), "axes fraction", "offset points", fontsize=8, va="top", annotation_clip=False)
+            axes.annotate(line, (1, 1), (left, below - k * KEY_PITCH), "axes fraction", "offset points", fontsize=8, va="top", annotation_clip=False)
         left += float(extents(figure, axes, part)[:, 0].max()) + 14
 
 
@@ -214,6 +215,9 @@ def size_of(picture: Picture) -> tuple[float, float]:
     if picture.words:
         lines = max(1, sum(not one.reference for one in picture.curves))
         return WIDTH, max(1.2, len(picture.words) * max(0.26, 0.12 * lines + 0.1))
+    keyed = len(picture.front.labels) if picture.front else 0
+    if keyed > MOST_NAMED:  # as high as the key beside it
+        return WIDTH, min(6.5, max(HEIGHT, (120 + KEY_PITCH * keyed) / 72))
     return WIDTH, HEIGHT
 
 
@@ -225,7 +229,7 @@ def bounds_of_front(axes, picture: Picture, y_by: float) -> None:
     if picture.front.relative:
         low, high = min(low, 1.0), max(high, 1.0)
     axes.set_xscale("log")
-    room = max(1.25, (high / low) ** 0.06)
+    room = max(1.1, (high / low) ** 0.06)
     axes.set_xlim(low / room, high * room)
     top = 1.12 * max(float((y + dy).max()), scatter) or 1.0
     axes.set_ylim(-0.03 * top, top)

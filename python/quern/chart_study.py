@@ -195,7 +195,7 @@ def draw_front(made: Made, chart: Chart) -> Picture:
     if relative:
         line.y, line.dy, scatter = 100 * line.y, 100 * line.dy, 100 * scatter
     return Picture(chart.name, "front", chart.title, x, y, [line] if rows else [],
-                   front=Front(labels, share, marks, scatter, made.study.reference, chart.relative_cost))
+                   front=Front(rows, labels, share, marks, scatter, made.study.reference, chart.relative_cost))
 
 
 def picture_of(made: Made, chart: Chart) -> Picture:
