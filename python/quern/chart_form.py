@@ -129,7 +129,7 @@ def read_field(reader: Reader, node: yaml.Node) -> str:
 
 def read_line(reader: Reader, parts: dict, chart: Chart) -> None:
     ends = [read_end(reader, parts[key], f"charts.{key}") if key in parts else () for key in ("from", "to")]
-    if all(ends) and len(ends[0]) != len(ends[1]):
+    if {len(end) for end in ends} == {2, 3}:
         reader.fault(parts["to"], f"charts.to has {len(ends[1])} lengths and charts.from {len(ends[0])}; both are places in one space")
     elif all(ends) and ends[0] == ends[1]:
         reader.fault(parts["to"], "charts.to is the place of charts.from; a line needs two")

@@ -18,7 +18,7 @@ except ImportError:
 QUERN = os.environ["QUERN"]
 STUDIES = pathlib.Path(os.environ["QUERN_SOURCE"]) / "tests/regression/malformed_studies"
 WITHOUT_A_PLACE = {"empty", "not_text"}
-SEVERAL = {"closed_many": 5, "many_faults": 9, "set_no_path": 2}
+SEVERAL = {"charts_many_faults": 7, "closed_many": 5, "many_faults": 9, "set_no_path": 2}
 
 
 def refuse(path, folder):
