@@ -8,7 +8,7 @@ import sys
 from typing import NoReturn
 
 from . import page
-from .chart_data import FROM_RUNS, Group, Picture, as_csv
+from .chart_data import FROM_RUNS, Group, Picture, as_csv, told
 from .chart_draw import save
 from .chart_form import METRES, Chart
 from .chart_study import Made, picture_of, read_made
@@ -143,14 +143,16 @@ def chart_of_runs(options: argparse.Namespace, words: list[str]) -> int:
     for column in what.split(",") if kind == "series" else [""]:
         chart.column = column or chart.column
         pictures.append(FROM_RUNS[kind](chart, groups, at))
-    picture = pictures[0]
-    for other in pictures[1:]:
-        join(picture, other)
-    notes = [note for one in pictures for note in one.notes]
+    notes = told([note for one in pictures for note in one.notes])
     if not any(one.curves for one in pictures):
-        raise QuernError("\n".join(dict.fromkeys(notes)) or "there is nothing to draw", 2)
-    for note in dict.fromkeys(notes):
+        raise QuernError("\n".join(notes) or "there is nothing to draw", 2)
+    for note in notes:
         warn(note)
+    picture, *others = [one for one in pictures if one.curves]
+    for one in picture.curves if others else ():
+        one.label = f"{one.label}, {picture.y[0]}"
+    for other in others:
+        join(picture, other)
     output = pathlib.Path(options.output or "chart.svg")
     save(picture, [output], about(words, options.title or what, ", ".join(options.what)))
     print(output)
@@ -161,13 +163,10 @@ def join(picture: Picture, other: Picture) -> None:
     """Two columns in one chart: they must have one unit."""
     if other.y[1] != picture.y[1]:
         raise QuernError(f"{picture.y[0]} is in '{picture.y[1]}' and {other.y[0]} in '{other.y[1]}'; draw a chart for each")
-    if picture.y[0]:
-        for one in picture.curves:
-            one.label = f"{one.label}, {picture.y[0]}"
     for one in other.curves:
         one.label = f"{one.label}, {other.y[0]}"
     picture.curves += other.curves
-    picture.y = "", picture.y[1]
+    picture.y = f"{picture.y[0]}, {other.y[0]}", picture.y[1]
 
 
 # ---- of a study ----
@@ -184,7 +183,7 @@ def tell_missing(made: Made, path: str) -> None:
 
 def draw_chart(made: Made, chart: Chart, folder: pathlib.Path, words: list[str], source: str) -> Picture | None:
     picture = picture_of(made, chart)
-    for note in dict.fromkeys(picture.notes):
+    for note in told(picture.notes):
         warn(f"{chart.name}: {note}")
     if not picture.curves:
         warn(f"{chart.name}: there is nothing to draw")

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The numbers that a chart shows, from the table of a study and from runs; nothing here draws."""
 import csv
-import fnmatch
 import io
 import math
 import pathlib
@@ -11,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .chart_form import Chart
+from .measure import Measure, sentence_of, taken
 from .program import QuernError
 from .runs import Frame, Run, open as open_run
 
@@ -49,7 +49,7 @@ class Picture:
     curves: list[Curve]
     words: list[str] = field(default_factory=list)  # at 0, 1, 2 of x, where it is no number
     front: Front | None = None
-    notes: list[str] = field(default_factory=list)
+    notes: list[tuple[str, str]] = field(default_factory=list)  # who could not be shown, and why
 
 
 @dataclass
@@ -72,20 +72,20 @@ def over_seeds(rows: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         return np.where(n > 0, mean, math.nan), np.where(n > 1, deviation / np.sqrt(n), math.nan)
 
 
+def told(notes: list[tuple[str, str]]) -> list[str]:
+    """Notes as sentences; what is said of many is said once."""
+    by_why: dict[str, list[str]] = {}
+    for who, why in dict.fromkeys(notes):
+        by_why.setdefault(why, []).append(who)
+    return [f"{who[0]}{f' and {len(who) - 1} more' if len(who) > 1 else ''}: {why}" for why, who in by_why.items()]
+
+
 # ---- one run ----
 
 def series_of(run: Run, chart: Chart) -> tuple[np.ndarray, np.ndarray, str, str]:
     """Times, values, units."""
     series = run.series
     return series["time"], series[chart.column], series.units["time"], series.units[chart.column]
-
-
-def columns_like(names, pattern: str) -> list[str]:
-    """Columns that match, in the order of the number in the place of the `*`."""
-    begin, _, end = pattern.partition("*")
-    found = [name for name in names if fnmatch.fnmatchcase(name, pattern)]
-    number = {name: name[len(begin):len(name) - len(end)] for name in found}
-    return sorted(found, key=lambda name: (not number[name].isdigit(), int(number[name]) if number[name].isdigit() else 0, name))
 
 
 def slabs(run: Run, pattern: str, n: int) -> tuple[np.ndarray, str, str]:
@@ -101,19 +101,17 @@ def slabs(run: Run, pattern: str, n: int) -> tuple[np.ndarray, str, str]:
     return np.arange(n, dtype=float), "slab", "1"
 
 
-def profile_of(run: Run, pattern: str, at: str | int) -> tuple[np.ndarray, np.ndarray, str, str, str]:
-    """Places, values, word and unit of the places, unit of the values; `at` a time's word or the number of a row."""
-    series = run.series
-    names = columns_like(series, pattern)
-    if not names:
-        raise KeyError(f"the series have no '{pattern}'; they have {', '.join(series)}")
-    data = np.array([series[name] for name in names])
-    pick = {"last": lambda: data[:, -1], "first": lambda: data[:, 0], "mean": lambda: data.mean(axis=1), "min": lambda: data.min(axis=1),
-            "max": lambda: data.max(axis=1)}
-    if isinstance(at, int) and not -data.shape[1] <= at < data.shape[1]:
-        raise KeyError(f"there is no frame {at}; the series have {data.shape[1]} rows")
-    places, word, unit = slabs(run, pattern, len(names))
-    return places, data[:, at] if isinstance(at, int) else pick[at](), word, unit, series.units[names[0]]
+def profile_of(run: Run, pattern: str, which: Measure | int) -> tuple[np.ndarray, np.ndarray, str, str, str]:
+    """Places, values, word and unit of the places, unit of the values; of a measure of the study, or of a row of the series."""
+    measure = Measure("profile", "series", pattern, "every") if isinstance(which, int) else which
+    reading = taken(measure, run, run.summary)
+    values = reading.values
+    if isinstance(which, int):
+        if not -len(values) <= which < len(values):
+            raise KeyError(f"there is no frame {which}; the series have {len(values)} rows")
+        values = values[which]
+    places, word, unit = slabs(run, pattern, len(values))
+    return places, values, word, unit, reading.unit
 
 
 def frame_of(run: Run, number: int) -> Frame:
@@ -192,14 +190,14 @@ def asked_radii(run: Run) -> Curve | None:
 
 # ---- lines of a chart: one for each group ----
 
-def each_run(group: Group, take, notes: list[str]) -> list:
+def each_run(group: Group, take, notes: list[tuple[str, str]]) -> list:
     """What `take` takes from the runs of a group; those that do not have it are noted."""
     found = []
     for folder in group.folders:
         try:
             found.append(take(open_run(folder)))
         except (KeyError, ValueError, OSError, IndexError, QuernError) as why:
-            notes.append(f"{group.label}: {folder.name}: {why.args[0] if why.args else why}")
+            notes.append((group.label if group.label == folder.name else f"{group.label}, {folder.name}", sentence_of(why)))
     return found
 
 
@@ -208,7 +206,7 @@ def curve(group: Group, x: np.ndarray, rows: list[np.ndarray]) -> Curve:
     return Curve(group.label, x, mean, dy=deviation, reference=group.reference)
 
 
-def draw_series(chart: Chart, groups: list[Group], at="last") -> Picture:
+def draw_series(chart: Chart, groups: list[Group], _which=-1) -> Picture:
     picture = Picture(chart.name, chart.kind, chart.title, ("time", "s"), (chart.column, "1"), [])
     for group in groups:
         found = each_run(group, lambda run: series_of(run, chart), picture.notes)
@@ -221,11 +219,11 @@ def draw_series(chart: Chart, groups: list[Group], at="last") -> Picture:
     return picture
 
 
-def draw_profile(chart: Chart, groups: list[Group], at="last") -> Picture:
+def draw_profile(chart: Chart, groups: list[Group], which: Measure | int = -1) -> Picture:
     picture = Picture(chart.name, chart.kind, chart.title, ("slab", "1"), (chart.column, "1"), [])
     word = re.sub(r"[._]?\*", "", chart.column)
     for group in groups:
-        found = each_run(group, lambda run: profile_of(run, chart.column, at), picture.notes)
+        found = each_run(group, lambda run: profile_of(run, chart.column, which), picture.notes)
         found = [one for one in found if len(one[0]) == len(found[0][0])]
         if found:
             picture.curves.append(curve(group, found[0][0], [one[1] for one in found]))
@@ -233,7 +231,7 @@ def draw_profile(chart: Chart, groups: list[Group], at="last") -> Picture:
     return picture
 
 
-def draw_line(chart: Chart, groups: list[Group], at="last") -> Picture:
+def draw_line(chart: Chart, groups: list[Group], _which=-1) -> Picture:
     picture = Picture(chart.name, chart.kind, chart.title, ("distance along the line", "m"), (chart.field, "1"), [])
     for group in groups:
         found = each_run(group, lambda run: along(run, chart), picture.notes)
@@ -241,11 +239,11 @@ def draw_line(chart: Chart, groups: list[Group], at="last") -> Picture:
             picture.curves.append(curve(group, found[0][0], [one[1] for one in found]))
             picture.y = chart.field, found[0][2]
         elif found:
-            picture.notes.append(f"{group.label}: nothing with {chart.field} lies within {chart.width / 2:g} m of the line")
+            picture.notes.append((group.label, f"nothing with {chart.field} lies within {chart.width / 2:g} m of the line"))
     return picture
 
 
-def draw_distribution(chart: Chart, groups: list[Group], at="last") -> Picture:
+def draw_distribution(chart: Chart, groups: list[Group], _which=-1) -> Picture:
     """All seeds together; at most a thousand and one steps are drawn."""
     picture = Picture(chart.name, chart.kind, chart.title, (chart.field, "1"), ("share at or below", "1"), [])
     asked = {}

@@ -79,11 +79,12 @@ def read_measure(reader: Reader, node: yaml.Node, what: str, study) -> str:
             reader.fault(node, f"charts.measure: no measure is called '{word}'{others}")
         return word
     one = known[word]
-    vector = "*" in one.path
-    if what == "scalar" and (vector or one.at == "every" or getattr(one, "of", "") == "all"):
+    if what == "scalar" and not one.single:
         reader.fault(node, f"charts.measure: '{word}' is many numbers for each run; kind scalar draws one, such as 'at: last' of one column")
-    if what == "profile" and (not vector or one.source != "series" or one.at == "every"):
+    if what == "profile" and (not one.vector or one.at == "every"):
         reader.fault(node, f"charts.measure: '{word}' is no profile; that is a series such as 'profile.density_*' at one time")
+    if what == "front" and one.source == "cost":
+        reader.fault(node, f"charts.measure: '{word}' is a cost, which has no error; name a measure that is a result")
     if what == "front" and not study.reference:
         reader.fault(node, "charts.measure: a front is of cost and error, and there is no error without a 'reference' of the study")
     return word
@@ -184,6 +185,8 @@ def read_chart(reader: Reader, node: yaml.Node, study) -> Chart | None:
     chart.field = read_field(reader, parts["field"]) if "field" in parts else ""
     chart.frame = read_frame(reader, parts["frame"]) if "frame" in parts else -1
     chart.relative_cost = read_yes(reader, parts["relative_cost"], "charts.relative_cost") if "relative_cost" in parts else False
+    if chart.relative_cost and study.closed:
+        reader.fault(parts["relative_cost"], "charts.relative_cost: the reference is a closed form, which costs nothing; leave 'relative_cost' out")
     read_line(reader, parts, chart)
     read_axes(reader, node, parts, chart, study)
     return chart

@@ -14,11 +14,11 @@ def boxes(centres: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     return np.hstack([centres - sizes / 2, centres + sizes / 2])
 
 
-def overlaps(box: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Area that each of the others shares with a box."""
-    width = np.minimum(box[2], others[:, 2]) - np.maximum(box[0], others[:, 0])
-    height = np.minimum(box[3], others[:, 3]) - np.maximum(box[1], others[:, 1])
-    return np.clip(width, 0, None) * np.clip(height, 0, None)
+def hits(some: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """How many of the others each box overlaps."""
+    low = np.maximum(some[:, None, :2], others[None, :, :2])
+    high = np.minimum(some[:, None, 2:], others[None, :, 2:])
+    return np.all(low < high, axis=2).sum(axis=1)
 
 
 def candidates(anchor: np.ndarray, size: np.ndarray, bounds: np.ndarray, clear: float) -> np.ndarray:
@@ -50,9 +50,8 @@ def best(anchor: np.ndarray, size: np.ndarray, placed: np.ndarray, points: np.nd
     options = candidates(anchor, size, bounds, clear)
     if not len(options):
         return np.clip(anchor + size, bounds[:2] + size / 2, bounds[2:] - size / 2)
-    costs = np.hypot(*(options - anchor).T) + 20 * crosses(anchor, options, placed)
-    for k, box in enumerate(boxes(options, np.tile(size, (len(options), 1)))):
-        costs[k] += 1e4 * (overlaps(box, placed) > 0).sum() + 60 * (overlaps(box, points) > 0).sum()
+    found = boxes(options, size)
+    costs = np.hypot(*(options - anchor).T) + 20 * crosses(anchor, options, placed) + 1e4 * hits(found, placed) + 60 * hits(found, points)
     return options[int(np.argmin(costs))]
 
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import h5py
 import numpy as np
 
-from .chart_data import FROM_RUNS, Curve, Front, Group, Picture, over_seeds
+from .chart_data import FROM_RUNS, Curve, Front, Group, Picture, over_seeds, slabs
 from .chart_form import Chart
+from .measure import Measure, Reading, sentence_of, taken
 from .points import combinations
 from .program import QuernError
+from .runs import open as open_run
 from .study import Study
-from .table import axis_numbers
 
 
 @dataclass
@@ -63,7 +64,7 @@ def read_made(study: Study, folder: pathlib.Path) -> Made:
     except (OSError, KeyError) as why:
         raise QuernError(f"{path} cannot be read: {why}; quern sweep {study.path} writes it anew", 2) from None
     labels = [{name: value.label for name, value in point.items()} for point in combinations(study)]
-    made = Made(study, folder, runs, points, labels, axis_numbers(study))
+    made = Made(study, folder, runs, points, labels, {axis.name: axis.unit for axis in study.axes if axis.unit})
     if len(points) != len(labels) or not all(axis.name in points.columns for axis in study.axes):
         raise QuernError(f"{path} has {len(points)} points and the study {len(labels)}, or other axes; quern sweep {study.path} writes it anew", 2)
     return made
@@ -128,13 +129,16 @@ def scalar_lines(made: Made, chart: Chart) -> dict[str, list[int]]:
     return lines
 
 
-def reference_of(made: Made, chart: Chart, label: str, points: list[int], x: np.ndarray) -> Curve | None:
-    """Mean of the reference beside each point of a line, and its standard error."""
-    values, measure = made.runs[chart.measure], chart.measure
-    rows = [reference_rows(made, point) for point in points]
-    stats = [over_seeds([values[k] for k in row]) if row else (math.nan, math.nan) for row in rows]
-    y, dy = (np.array([float(one[part]) for one in stats]) for part in (0, 1))
-    if not made.study.reference or not np.isfinite(y).any() or measure not in made.runs.columns:
+def reference_of(made: Made, chart: Chart, column: str, label: str, points: list[int], x: np.ndarray) -> Curve | None:
+    """Mean of the reference beside each point of a line, and its standard error; the closed form as it is."""
+    if made.study.closed:
+        y = made.points.columns.get(f"{column}.reference", np.full(len(made.points), math.nan))[points]
+        dy = np.full(len(points), math.nan)
+    else:
+        values, rows = made.runs[column], [reference_rows(made, point) for point in points]
+        stats = [over_seeds([values[k] for k in row]) if row else (math.nan, math.nan) for row in rows]
+        y, dy = (np.array([float(one[part]) for one in stats]) for part in (0, 1))
+    if not np.isfinite(y).any():
         return None
     name = f"{made.study.reference}, {label}" if label and set(made.study.follows) & set(chart.by) else made.study.reference
     return Curve(name, x, y, dy=dy, reference=True)
@@ -143,9 +147,10 @@ def reference_of(made: Made, chart: Chart, label: str, points: list[int], x: np.
 def draw_scalar(made: Made, chart: Chart) -> Picture:
     points, axis = made.points, next(axis for axis in made.study.axes if axis.name == chart.over)
     words = [] if chart.over in made.numbers else [value.label for value in axis.values]
+    column = "cost." * (measure_of(made, chart).source == "cost") + chart.measure
+    mean, deviation = points[f"{column}.mean"], points[f"{column}.standard_error"]
     picture = Picture(chart.name, "scalar", chart.title, (chart.over, made.numbers.get(chart.over, "1")),
-                      (chart.measure, points.units.get(f"{chart.measure}.mean", "1")), [], words)
-    mean, deviation = points[f"{chart.measure}.mean"], points[f"{chart.measure}.standard_error"]
+                      (chart.measure, points.units[f"{column}.mean"]), [], words)
     seen = set()
     for label, which in scalar_lines(made, chart).items():
         x = np.array([float(words.index(made.labels[k][chart.over])) if words else made.points[chart.over][k] for k in which])
@@ -154,7 +159,7 @@ def draw_scalar(made: Made, chart: Chart) -> Picture:
         there = np.isfinite(mean[which])
         if there.any():
             picture.curves.append(Curve(label or made.study.name, x[there], mean[which][there], dy=deviation[which][there]))
-        one = reference_of(made, chart, label, which, x)
+        one = reference_of(made, chart, column, label, which, x)
         if one and one.label not in seen:
             picture.curves.append(one)
             seen.add(one.label)
@@ -186,8 +191,7 @@ def draw_front(made: Made, chart: Chart) -> Picture:
     scatter = float(np.median(scatters[np.isfinite(scatters)])) if np.isfinite(scatters).any() else math.nan
     what = {"running": "processor time from the release on", "processor": "processor time", "wall": "time by the clock"}[made.study.front]
     x = (f"{what}, over that of {made.study.reference}", "1") if chart.relative_cost else (what, "s")
-    measure = next(one for one in made.study.measures if one.name == name)
-    relative = getattr(measure, "norm", "") == "share" or bool(getattr(measure, "relative", False))
+    relative = measure_of(made, chart).kind in ("share", "relative")
     place = [np.array([costs[k][part] for k in rows]) for part in (0, 1)]
     line = Curve("settings", place[0], error[rows], place[1], deviation[rows])
     share = points.columns.get(f"cost.{name}.front_share", np.full(len(points), math.nan))[rows]
@@ -198,11 +202,56 @@ def draw_front(made: Made, chart: Chart) -> Picture:
                    front=Front(rows, labels, share, marks, scatter, made.study.reference, chart.relative_cost))
 
 
+# ---- a closed form beside runs ----
+
+def form_of(made: Made, chart: Chart) -> Measure | None:
+    """The measure by which the study compares with its closed form what the chart shows."""
+    for one in made.study.measures:
+        if chart.kind == "profile" and one.name == chart.measure:
+            return one
+        if chart.kind == "series" and (one.source, one.path, one.at, one.per) == ("series", chart.column, "every", ""):
+            return one
+        if chart.kind == "distribution" and one.distribution and one.path == chart.field:
+            return one
+    return None
+
+
+def form_curve(made: Made, chart: Chart, measure: Measure, point: int, folder: pathlib.Path) -> Curve | None:
+    run = open_run(folder)
+    reading: Reading | None = made.study.closed.reading(measure, made.labels[point], taken(measure, run, run.summary))
+    if not reading:
+        return None
+    label = ", ".join(filter(None, [made.study.reference, label_of(made, made.labels[point], [name for name in made.study.follows if name in chart.by])]))
+    if chart.kind == "distribution":
+        return Curve(label, reading.values, reading.shares, reference=True)
+    return Curve(label, reading.times if chart.kind == "series" else slabs(run, measure.path, len(reading.values))[0], reading.values, reference=True)
+
+
+def add_forms(made: Made, chart: Chart, picture: Picture) -> None:
+    """The closed form for each point, once where it is the same for several."""
+    measure, seen = form_of(made, chart), set()
+    for point in picked(made, chart) if measure and made.study.closed else ():
+        rows = rows_of_point(made, point)
+        try:
+            one = form_curve(made, chart, measure, point, made.folder / "runs" / made.runs["run"][rows[0]]) if rows else None
+        except (KeyError, ValueError, OSError, QuernError) as why:
+            picture.notes.append((made.study.reference, sentence_of(why)))
+            continue
+        if one and one.label not in seen:
+            seen.add(one.label)
+            picture.curves.append(one)
+
+
+def measure_of(made: Made, chart: Chart) -> Measure:
+    return next(one for one in made.study.measures if one.name == chart.measure)
+
+
 def picture_of(made: Made, chart: Chart) -> Picture:
     if chart.kind in ("scalar", "front"):
         return {"scalar": draw_scalar, "front": draw_front}[chart.kind](made, chart)
-    at = "last"
+    which = measure_of(made, chart) if chart.kind == "profile" else -1
     if chart.kind == "profile":
-        measure = next(one for one in made.study.measures if one.name == chart.measure)
-        chart.column, at = measure.path, measure.at
-    return FROM_RUNS[chart.kind](chart, groups_of(made, chart), at)
+        chart.column = which.path
+    picture = FROM_RUNS[chart.kind](chart, groups_of(made, chart), which)
+    add_forms(made, chart, picture)
+    return picture

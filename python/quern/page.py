@@ -134,7 +134,7 @@ def front_words(made: Made, picture: Picture) -> list[str]:
 def points_table(made: Made) -> str:
     """Means of all measures that are numbers, where there is no front."""
     points, axes = made.points, [axis.name for axis in made.study.axes]
-    shown = [one.name for one in made.study.measures if f"{one.name}.mean" in points.columns]
+    shown = ["cost." * (one.source == "cost") + one.name for one in made.study.measures if one.single]
     units = {name: scaled(points.units[f"{name}.mean"], [points[f"{name}.mean"]]) for name in shown}
     head = axes + [name if units[name][1] == "1" else f"{name} [{units[name][1]}]" for name in shown] + ["runs"]
     rows = []
