@@ -73,6 +73,8 @@ char *quern_program_find(const char *word) {
 	return found;
 }
 
+static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
+
 char **quern_program_words(void) {
 	char **words = NULL;
 	size_t n = 0, capacity = 0;
@@ -94,5 +96,6 @@ char **quern_program_words(void) {
 	}
 	words = quern_grow(words, n, &capacity, sizeof *words);
 	words[n] = NULL;
+	qsort(words, n, sizeof *words, by_name); // a folder lists them in any order
 	return words;
 }

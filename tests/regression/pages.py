@@ -4,6 +4,7 @@
 In a page, an indented line `build/quern ...` is run, with the status that `# status N` behind it says; a block of yaml whose first
 line is `# FILE` is saved, others are planned; a block of python is run; every line of a block of text is found in what the last
 command printed. All of a page happens in one folder, in order. Every link of every page leads somewhere."""
+import importlib.util
 import json
 import os
 import pathlib
@@ -14,6 +15,8 @@ import tempfile
 
 SOURCE, QUERN = pathlib.Path(os.environ["QUERN_SOURCE"]), pathlib.Path(os.environ["QUERN"])
 PAGES = {"README.md": 10, "docs/tutorial.md": 13, "docs/run_folder.md": 4, "docs/python.md": 5, "docs/film.md": 8, "docs/studies.md": 3, "docs/observers.md": 1}
+if importlib.util.find_spec("matplotlib"):
+    PAGES["docs/charts.md"] = 3
 PIECE = re.compile(r"^```(yaml|python|text)\n(.*?)^```|^    (build/quern [^\n]*)$", re.M | re.S)
 
 
