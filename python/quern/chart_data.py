@@ -8,11 +8,12 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
+import yaml
 
 from .chart_form import Chart
 from .measure import Measure, sentence_of, taken
-from .program import QuernError
 from .runs import Frame, Run, open as open_run
+from .table import DAMAGE
 
 
 @dataclass
@@ -196,7 +197,7 @@ def each_run(group: Group, take, notes: list[tuple[str, str]]) -> list:
     for folder in group.folders:
         try:
             found.append(take(open_run(folder)))
-        except (KeyError, ValueError, OSError, IndexError, QuernError) as why:
+        except (*DAMAGE, yaml.YAMLError) as why:
             notes.append((group.label if group.label == folder.name else f"{group.label}, {folder.name}", sentence_of(why)))
     return found
 

@@ -48,13 +48,12 @@ def named(word: str, unit: str) -> str:
     return word if unit in ("1", "") else f"{word} [{powers(unit)}]"
 
 
-def linear_or_log(axis, low: float, high: float, log: bool) -> None:
-    """Ticks that are written as people write numbers."""
+def write_ticks(axis, span: float = 0) -> None:
+    """Ticks that are written as people write numbers; `span` is the ratio of the ends of an axis that is logarithmic."""
     from matplotlib import ticker
     plain = ticker.FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}"))
     axis.set_major_formatter(plain)
-    if log:
-        span = high / low
+    if span:
         axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if span < 200 else (1,), numticks=30))
         axis.set_minor_locator(ticker.NullLocator())
     else:
@@ -228,13 +227,14 @@ def bounds_of_front(axes, picture: Picture, y_by: float) -> None:
     low, high = float(one.x.min()), float(one.x.max())
     if picture.front.relative:
         low, high = min(low, 1.0), max(high, 1.0)
-    axes.set_xscale("log")
-    room = max(1.1, (high / low) ** 0.06)
-    axes.set_xlim(low / room, high * room)
+    if low > 0:  # a clock can find that a short run has cost nothing
+        axes.set_xscale("log")
+        room = max(1.1, (high / low) ** 0.06)
+        axes.set_xlim(low / room, high * room)
     top = 1.12 * max(float((y + dy).max()), scatter) or 1.0
     axes.set_ylim(-0.03 * top, top)
-    linear_or_log(axes.xaxis, low, high * room, True)
-    linear_or_log(axes.yaxis, 0, 1, False)
+    write_ticks(axes.xaxis, high / low if low > 0 else 0)
+    write_ticks(axes.yaxis)
 
 
 def figure_of(picture: Picture):
@@ -254,14 +254,14 @@ def figure_of(picture: Picture):
         key = label_points(figure, axes, picture, y_by)
     elif picture.words:
         draw_words(axes, picture, y_by)
-        linear_or_log(axes.xaxis, 0, 1, False)
+        write_ticks(axes.xaxis)
     else:
         draw_lines(axes, picture, x_by, y_by)
         axes.margins(x=0.02)
         if picture.kind == "line":
             axes.set_xlim(0, picture.curves[0].x[[0, -1]].sum() / x_by)
         for axis in (axes.xaxis, axes.yaxis):
-            linear_or_log(axis, 0, 1, False)
+            write_ticks(axis)
     below, across = named(picture.x[0], x_unit), named(picture.y[0], y_unit)
     axes.set_xlabel(across if picture.words else below)
     axes.set_ylabel("" if picture.words else across)

@@ -14,6 +14,7 @@ from .points import combinations
 from .program import QuernError
 from .runs import open as open_run
 from .study import Study
+from .table import DAMAGE
 
 
 @dataclass
@@ -61,7 +62,7 @@ def read_made(study: Study, folder: pathlib.Path) -> Made:
     try:
         with h5py.File(path, "r") as file:
             runs, points = read_table(file["runs"]), read_table(file["points"])
-    except (OSError, KeyError) as why:
+    except (*DAMAGE, RuntimeError) as why:
         raise QuernError(f"{path} cannot be read: {why}; quern sweep {study.path} writes it anew", 2) from None
     labels = [{name: value.label for name, value in point.items()} for point in combinations(study)]
     made = Made(study, folder, runs, points, labels, {axis.name: axis.unit for axis in study.axes if axis.unit})
@@ -234,7 +235,7 @@ def add_forms(made: Made, chart: Chart, picture: Picture) -> None:
         rows = rows_of_point(made, point)
         try:
             one = form_curve(made, chart, measure, point, made.folder / "runs" / made.runs["run"][rows[0]]) if rows else None
-        except (KeyError, ValueError, OSError, QuernError) as why:
+        except DAMAGE as why:
             picture.notes.append((made.study.reference, sentence_of(why)))
             continue
         if one and one.label not in seen:

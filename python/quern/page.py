@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What `quern chart` writes into a page of documentation: pictures, the table of points and sentences that follow from it. No sentence
 is there before its numbers are, so that each is true of whatever table there is."""
-import json
 import math
 import os
 import pathlib
@@ -12,6 +11,7 @@ from .chart_data import Front, Picture
 from .chart_draw import class_of, scaled
 from .chart_study import Made
 from .program import QuernError
+from .workers import read_json
 
 BEGIN, END = "<!-- quern chart -->", "<!-- end -->"
 
@@ -160,24 +160,17 @@ def about_ends(made: Made) -> str:
     return f"{len(bad)} of {len(runs)} runs did not come to their end:\n\n" + "\n".join(rows)
 
 
-def read_json(path: pathlib.Path) -> dict:
-    try:
-        return json.loads(path.read_text())
-    except (OSError, ValueError):
-        return {}
-
-
 def about_cost(made: Made) -> str:
     """Processor hours, and what the runs' own files say of program and machine."""
     spent = made.runs["cost.processor"]
     said = [f"The {len(made.runs)} runs took {np.nansum(spent) / 3600:.3g} hours of processor time."]
     programs, machines = {}, {}
     for key in dict.fromkeys(made.runs["run"]):
-        told = read_json(made.folder / "runs" / key / "summary.json").get("provenance", {})
-        if told:
+        told = read_json(made.folder / "runs" / key / "summary.json").get("provenance")
+        if isinstance(told, dict):
             programs[f"{told.get('program')}, commit {told.get('commit')}, {told.get('compiler')}"] = 1
         machine = read_json(made.folder / "runs" / f"{key}.json").get("machine")
-        if machine:
+        if isinstance(machine, str):
             machines[machine] = 1
     if programs:
         said.append(f"They were made by {listed(list(programs))}.")

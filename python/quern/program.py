@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The program quern: where it is, how it is called, what it says when it fails."""
+import functools
 import json
 import os
 import pathlib
+import platform
 import re
 import shutil
 import subprocess
@@ -31,6 +33,18 @@ def find() -> str:
         if place and os.access(place, os.X_OK) and os.path.isfile(place):
             return os.path.abspath(place)
     raise QuernError("the program quern is not found; name it in the environment variable QUERN, or put its folder into PATH")
+
+
+@functools.cache
+def machine() -> str:
+    """The processor and how many of its cores this process may use: what a cost depends on."""
+    try:
+        lines = pathlib.Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    cores = len(os.sched_getaffinity(0))
+    return f"{names[0] if names else platform.machine()}, {cores} core{'s' * (cores != 1)}"
 
 
 def spelt(value: Any, within: bool = False) -> str:

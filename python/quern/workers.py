@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .points import Job, digest
-from .program import find, sentence, set_options
+from .program import find, machine, sentence, set_options
 from .study import Study
 
 GRACE = 5.0  # s that a run has to end by itself once its limit is over
@@ -129,6 +129,7 @@ def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str
     record = {"status": word, "exit": "" if active.asked else code if code >= 0 else 128 - code, "message": message,
               "limit": None if math.isinf(study.limit) else study.limit, "job": str(active.job), "sets": active.job.sets,
               "cost": {"wall": wall, "processor": processor, "running": running_of(summary, processor), "memory": usage.ru_maxrss * 1024},
+              "machine": machine(),
               "made_by": {path: digests.get(path) or digest(pathlib.Path(path).read_bytes()) for path in sorted(used_by(summary, digests))}}
     if word != "interrupted":
         save(record_path(folder, key), json.dumps(record, indent=1))

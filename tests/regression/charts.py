@@ -144,9 +144,33 @@ def check_files(here, path):
 def check_page(here):
     text = (here / "page.md").read_text()
     assert text.startswith("# Bounces\n\nBefore.\n\n<!-- quern chart -->\n![") and text.endswith("<!-- end -->\n\nAfter.\n") and "old words" not in text
-    for part in ("](page_cost.svg)", "| 6 | ", "restitution 0.7, slow **(marked)**", "All 16 runs came to their end.", "hours of processor time", "made by quern"):
+    for part in ("](page_cost.svg)", "| 6 | ", "restitution 0.7, slow **(marked)**", "All 16 runs came to their end.", "hours of processor time", "made by quern", "They ran on "):
         assert part in text, f"{part}\n{text}"
     print("ok  the page: pictures, table and words")
+
+
+def check_closed(here):
+    """A closed form stands beside the runs where the study compares just that with it: the energy that a restitution leaves."""
+    whole = 0.5 * 2 * 2500 * math.pi * 0.005 ** 2
+    lines = [f"{e},{e * e * whole if t else ''},{t},{(e * e if t else 1) * whole}" for e in (0.5, 0.8) for t in (0, 0.004)]
+    (here / "theory.csv").write_text("\n".join(["restitution,left [J],time [s],course [J]", *lines, ""]))
+    study = write(here / "closed.yaml", set={"time.end": "4 ms", "output.every": "0.5 ms", "observe": ["energy"]}, reference={"name": "theory", "csv": "theory.csv", "follows": ["restitution"]},
+                  axes={"restitution": {"key": "grains.contact.linear.restitution", "list": [0.5, 0.8]}},
+                  measure=[{"name": "left", "series": "energy.grains"}, {"name": "course", "series": "energy.grains", "at": "every"}],
+                  charts=[{"name": "course", "kind": "series", "column": "energy.grains"}, {"name": "left", "kind": "scalar", "measure": "left", "over": "restitution"},
+                          {"name": "front", "kind": "front", "measure": "left"}])
+    call("sweep", study, "-o", here / "out", "--quiet")
+    call("chart", study, "-o", here / "out")
+    for row in rows_of(here / "out/charts/left.csv"):
+        e = float(row["restitution"])
+        assert abs(float(row["left"]) / whole - e * e) < (1e-12 if row["line"] == "theory" else 0.005), row
+    course = {line: [float(row["energy.grains"]) for row in rows_of(here / "out/charts/course.csv") if row["line"] == line]
+              for line in ("theory, restitution 0.5", "theory, restitution 0.8", "restitution 0.8")}
+    assert all(len(values) == 9 for values in course.values()), course
+    assert np.allclose(course["theory, restitution 0.8"], whole * (1 + (0.64 - 1) * np.arange(9) / 8)) and course["theory, restitution 0.5"][-1] < 0.26 * whole
+    front = rows_of(here / "out/charts/front.csv")
+    assert len(front) == 2 and all(float(row["processor time from the release on"]) >= 0 for row in front)
+    print("ok  a closed form beside runs")
 
 
 # ---- sentences ----
@@ -325,7 +349,7 @@ def check_faults(here):
 
 
 with lab.workplace() as name:
-    for check in (check_numbers, check_sentences, check_fields, check_labels, check_browser, check_faults):
+    for check in (check_numbers, check_closed, check_sentences, check_fields, check_labels, check_browser, check_faults):
         place = pathlib.Path(name) / check.__name__
         place.mkdir()
         check(place)
