@@ -130,7 +130,7 @@ def draw_front(axes, picture: Picture, y_by: float) -> None:
     if front.relative:
         axes.axvline(1, color=REFERENCE, linestyle=DASHES[2], linewidth=1, label=f"cost of {front.reference}")
     dx, dy = np.nan_to_num(one.dx), np.nan_to_num(one.dy / y_by)
-    axes.errorbar(x, y, dy, np.minimum(dx, 0.9 * x), linestyle="", color="#888888", elinewidth=0.8, zorder=2)
+    axes.errorbar(x, y, dy, np.minimum(dx, 0.9 * x), linestyle="", color="#AAAAAA", elinewidth=0.9, zorder=2)
     on = np.flatnonzero(errors.front(x, y))
     on = on[np.argsort(x[on], kind="stable")]
     axes.step(x[on], y[on], where="post", color="#D55E00", linewidth=0.9, linestyle=DASHES[1], zorder=1.5, label="front of the means")
@@ -176,7 +176,8 @@ def label_points(figure, axes, picture: Picture, y_by: float) -> str:
     frame = axes.get_window_extent()
     corner = np.array([frame.x0, frame.y0])
     sizes = extents(figure, axes, texts)
-    covered = [chart_labels.boxes(anchors, np.full((count, 2), 9.0)), bars(axes, one, y_by)]
+    around = np.array([[15.0 if k in front.marks else 9.0] * 2 for k in range(count)])
+    covered = [chart_labels.boxes(anchors, around), bars(axes, one, y_by)]
     if front.relative:
         at = axes.transData.transform((1, 0))[0]
         covered.append(np.array([[at - 1, frame.y0, at + 1, frame.y1]]))
@@ -187,7 +188,7 @@ def label_points(figure, axes, picture: Picture, y_by: float) -> str:
         anchor, centre = anchor - corner, centre - corner
         edge = np.clip(-off, -size / 2, size / 2) + off  # the place of the text's box that is nearest to the point
         if np.hypot(*edge) > 7:
-            axes.annotate("", anchor + edge, anchor, "axes points", "axes points", arrowprops={"arrowstyle": "-", "color": "#777777", "linewidth": 0.6}, zorder=2.5)
+            axes.annotate("", anchor + edge, anchor, "axes points", "axes points", arrowprops={"arrowstyle": "-", "color": "#333333", "linewidth": 0.5}, zorder=2.5)
         axes.annotate(text, anchor, centre, "axes points", "axes points", ha="center", va="center", fontsize=8, zorder=4, annotation_clip=False)
     if count <= MOST_NAMED:
         return ""

@@ -161,9 +161,10 @@ def about_ends(made: Made) -> str:
 
 
 def about_cost(made: Made) -> str:
-    """Processor hours, and what the runs' own files say of program and machine."""
-    spent = made.runs["cost.processor"]
-    said = [f"The {len(made.runs)} runs took {np.nansum(spent) / 3600:.3g} hours of processor time."]
+    """Processor time, and what the runs' own files say of program and machine."""
+    spent = float(np.nansum(made.runs["cost.processor"]))
+    took = f"{spent / 3600:.3g} hours" if spent >= 360 else f"{spent:.3g} s"
+    said = [f"The {len(made.runs)} runs took {took} of processor time."]
     programs, machines = {}, {}
     for key in dict.fromkeys(made.runs["run"]):
         told = read_json(made.folder / "runs" / key / "summary.json").get("provenance")

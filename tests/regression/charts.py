@@ -144,7 +144,7 @@ def check_files(here, path):
 def check_page(here):
     text = (here / "page.md").read_text()
     assert text.startswith("# Bounces\n\nBefore.\n\n<!-- quern chart -->\n![") and text.endswith("<!-- end -->\n\nAfter.\n") and "old words" not in text
-    for part in ("](page_cost.svg)", "| 6 | ", "restitution 0.7, slow **(marked)**", "All 16 runs came to their end.", "hours of processor time", "made by quern", "They ran on "):
+    for part in ("](page_cost.svg)", "| 6 | ", "restitution 0.7, slow **(marked)**", "All 16 runs came to their end.", " of processor time.", "made by quern", "They ran on "):
         assert part in text, f"{part}\n{text}"
     print("ok  the page: pictures, table and words")
 

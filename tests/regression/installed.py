@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """An installed Quern works wherever its folders are: libraries in a place of their own, without Cairo, moved as a whole."""
+import importlib.util
 import os
 import pathlib
 import shutil
@@ -70,3 +71,8 @@ with tempfile.TemporaryDirectory() as name:
         assert said.startswith("1 runs: 1 done; "), said
         assert "holds no frames" in run(here / "moved/bin/quern", "film", here, status=2)
         print("ok  quern sweep and quern film work where they are installed")
+        if importlib.util.find_spec("matplotlib"):
+            (here / "study.yaml").write_text((here / "study.yaml").read_text() + "charts:\n  - {name: n, kind: series, column: grains}\n")
+            said = run(here / "moved/bin/quern", "chart", here / "study.yaml", "-o", here / "study")
+            assert said.startswith("1 chart; ") and (here / "study/charts/n.svg").exists(), said
+            print("ok  quern chart works where it is installed")
