@@ -17,7 +17,8 @@ from .reader import QUANTITY, StudyError
 from .study import Study, read
 from .workers import save as save_text
 
-USAGE = "quern chart STUDY.yaml [OPTION]...\n       quern chart RUN... (--series A[,B] | --profile LABEL.COLUMN | --line FIELD | --distribution FIELD) [OPTION]..."
+USAGE = "quern chart STUDY.yaml [OPTION]...\n" \
+    "       quern chart RUN... (--series A[,B] | --profile LABEL.COLUMN | --line FIELD | --distribution FIELD) [OPTION]..."
 FORMATS = (".svg", ".png", ".pdf")
 
 
@@ -33,7 +34,8 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser = Parser(prog="quern chart", usage=USAGE, add_help=False,
                     formatter_class=lambda prog: argparse.HelpFormatter(prog, max_help_position=30, width=200))
     parser.add_argument("what", metavar="STUDY.yaml | RUN", nargs="+", help="a study whose charts are drawn, or folders of runs; docs/charts.md")
-    parser.add_argument("-o", "--output", metavar="PATH", help="of a study its folder, default: out/NAME; of runs the picture, .svg, .png or .pdf, default: chart.svg")
+    parser.add_argument("-o", "--output", metavar="PATH",
+                        help="of a study its folder, default: out/NAME; of runs the picture, .svg, .png or .pdf, default: chart.svg")
     parser.add_argument("--only", metavar="NAME", help="of a study: draw this chart alone")
     parser.add_argument("--series", metavar="A[,B]", help="columns of series.csv over time")
     parser.add_argument("--profile", metavar="LABEL.COLUMN", help="all slabs of an observer such as profile.density")

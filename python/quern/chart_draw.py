@@ -170,7 +170,9 @@ def label_points(figure, axes, picture: Picture, y_by: float) -> str:
     one, front = picture.curves[0], picture.front
     count = len(one.x)
     width = len(str(count))
-    texts = [label + share_words(share) for label, share in zip(front.labels, front.shares)] if count <= MOST_NAMED else [str(k + 1) for k in range(count)]
+    texts = [label + share_words(share) for label, share in zip(front.labels, front.shares)]
+    if count > MOST_NAMED:
+        texts = [str(k + 1) for k in range(count)]
     figure.canvas.draw()
     anchors = axes.transData.transform(np.column_stack([one.x, one.y / y_by]))
     frame = axes.get_window_extent()
@@ -188,7 +190,8 @@ def label_points(figure, axes, picture: Picture, y_by: float) -> str:
         anchor, centre = anchor - corner, centre - corner
         edge = np.clip(-off, -size / 2, size / 2) + off  # the place of the text's box that is nearest to the point
         if np.hypot(*edge) > 7:
-            axes.annotate("", anchor + edge, anchor, "axes points", "axes points", arrowprops={"arrowstyle": "-", "color": "#333333", "linewidth": 0.5}, zorder=2.5)
+            leader = {"arrowstyle": "-", "color": "#333333", "linewidth": 0.5}
+            axes.annotate("", anchor + edge, anchor, "axes points", "axes points", arrowprops=leader, zorder=2.5)
         axes.annotate(text, anchor, centre, "axes points", "axes points", ha="center", va="center", fontsize=8, zorder=4, annotation_clip=False)
     if count <= MOST_NAMED:
         return ""
@@ -271,7 +274,8 @@ def figure_of(picture: Picture):
     known = dict(zip(*reversed(axes.get_legend_handles_labels())))
     handles = list(known.values()) if picture.front else [known[one.label] for one in picture.curves if one.label in known]
     if len(handles) > 1 or picture.front:
-        legend = axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0, bbox_transform=axes.transAxes, fontsize=8, handlelength=3)
+        legend = axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0, bbox_transform=axes.transAxes,
+                             fontsize=8, handlelength=3)
         figure.canvas.draw()
         bottom = legend.get_window_extent().y0 - axes.get_window_extent().y1
     else:
@@ -301,7 +305,8 @@ def save(picture: Picture, paths: list[pathlib.Path], about: dict[str, str]) -> 
         figure = figure_of(picture)
         for path in paths:
             kind, out = path.suffix[1:], io.BytesIO()
-            figure.savefig(out, format=kind, dpi=PNG_DPI if kind == "png" else 72, bbox_inches="tight", pad_inches=0.12, metadata=metadata_for(kind, about))
+            figure.savefig(out, format=kind, dpi=PNG_DPI if kind == "png" else 72, bbox_inches="tight", pad_inches=0.12,
+                           metadata=metadata_for(kind, about))
             aside = path.with_name(f"{path.name}.{os.getpid()}.part")
             aside.write_bytes(out.getvalue())
             aside.replace(path)

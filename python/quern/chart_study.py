@@ -12,6 +12,7 @@ from .chart_form import Chart
 from .measure import Measure, Reading, sentence_of, taken
 from .points import combinations
 from .program import QuernError
+from .reader import number_label
 from .runs import open as open_run
 from .study import Study
 from .table import DAMAGE
@@ -66,9 +67,21 @@ def read_made(study: Study, folder: pathlib.Path) -> Made:
         raise QuernError(f"{path} cannot be read: {why}; quern sweep {study.path} writes it anew", 2) from None
     labels = [{name: value.label for name, value in point.items()} for point in combinations(study)]
     made = Made(study, folder, runs, points, labels, {axis.name: axis.unit for axis in study.axes if axis.unit})
-    if len(points) != len(labels) or not all(axis.name in points.columns for axis in study.axes):
-        raise QuernError(f"{path} has {len(points)} points and the study {len(labels)}, or other axes; quern sweep {study.path} writes it anew", 2)
+    if not is_of(made):
+        raise QuernError(f"{path} is of another form of the study, with other points; quern sweep {study.path} writes it anew", 2)
     return made
+
+
+def is_of(made: Made) -> bool:
+    """True if the table has the points that the study asks for, in their order."""
+    if len(made.points) != len(made.labels):
+        return False
+    for axis in made.study.axes:
+        labels = [values[axis.name] for values in made.labels]
+        wanted = [number_label(label)[0] for label in labels] if axis.unit else labels
+        if axis.name not in made.points.columns or list(made.points[axis.name]) != wanted:
+            return False
+    return True
 
 
 def label_of(made: Made, values: dict[str, str], names) -> str:
@@ -222,7 +235,8 @@ def form_curve(made: Made, chart: Chart, measure: Measure, point: int, folder: p
     reading: Reading | None = made.study.closed.reading(measure, made.labels[point], taken(measure, run, run.summary))
     if not reading:
         return None
-    label = ", ".join(filter(None, [made.study.reference, label_of(made, made.labels[point], [name for name in made.study.follows if name in chart.by])]))
+    followed = label_of(made, made.labels[point], [name for name in made.study.follows if name in chart.by])
+    label = ", ".join(filter(None, [made.study.reference, followed]))
     if chart.kind == "distribution":
         return Curve(label, reading.values, reading.shares, reference=True)
     return Curve(label, reading.times if chart.kind == "series" else slabs(run, measure.path, len(reading.values))[0], reading.values, reference=True)

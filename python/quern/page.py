@@ -86,8 +86,9 @@ def front_table(made: Made, picture: Picture) -> str:
 def about_front(front: Front) -> list[str]:
     by_class = [[k for k in range(len(front.labels)) if class_of(front.shares[k]) == number] for number in range(4)]
     sure = listed([front.labels[k] for k in by_class[0]]) if by_class[0] else ""
-    said = [f"Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, {'is' if len(by_class[0]) == 1 else 'are'} {sure}."
-            if sure else "No point is surely on the front of cost and error: none is there in 95 % of the resamples of the seeds."]
+    verb = "is" if len(by_class[0]) == 1 else "are"
+    said = [f"Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, {verb} {sure}." if sure else
+            "No point is surely on the front of cost and error: none is there in 95 % of the resamples of the seeds."]
     if by_class[1]:
         said.append("Chance decides about " + listed([f"{front.labels[k]} ({share_word(front.shares[k])})" for k in by_class[1]]) + ".")
     if by_class[3]:

@@ -338,6 +338,10 @@ def check_faults(here):
         for kind in ("svg", "pdf"):
             call("chart", run, *words, "-o", here / f"run.{kind}")
             assert (here / f"run.{kind}").stat().st_size > 3000
+    other = study.read_text()
+    study.write_text(other.replace("- 0.7", "- 0.71", 1).replace("restitution: 0.7", "restitution: 0.71"))
+    assert "is of another form of the study" in call("chart", study, "-o", out, status=2)
+    study.write_text(other)
     shutil.copytree(out, here / "lost")
     record = next((here / "lost/runs").glob("*.json"))
     record.unlink()
