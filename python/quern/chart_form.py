@@ -162,7 +162,7 @@ def read_axes(reader: Reader, node: yaml.Node, parts: dict, chart: Chart, study)
 
 def read_chart(reader: Reader, node: yaml.Node, study) -> Chart | None:
     found = reader.mapping(node, "charts", (*COMMON, "kind", *dict.fromkeys(key for keys in KINDS.values() for key in keys)))
-    reader.require(node, found, "charts: ", {"name": "that its files get", "kind": f"one of {', '.join(KINDS)}"})
+    reader.require(node, found, "charts: ", {"name": "by which its files are called", "kind": f"one of {', '.join(KINDS)}"})
     parts = {key: value for key, (_, value) in found.items()}
     if "kind" not in parts or "name" not in parts:
         return None
