@@ -30,6 +30,11 @@ def listed(words: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
+def settings(front: Front, which: list[int]) -> str:
+    """Points by their labels, which may hold commas of their own."""
+    return listed([f"*{front.labels[k]}*" for k in which])
+
+
 def number(value: float, spread: float = math.nan) -> str:
     """Three digits, or as many as its standard error leaves."""
     if not math.isfinite(value):
@@ -85,27 +90,27 @@ def front_table(made: Made, picture: Picture) -> str:
 
 def about_front(front: Front) -> list[str]:
     by_class = [[k for k in range(len(front.labels)) if class_of(front.shares[k]) == number] for number in range(4)]
-    sure = listed([front.labels[k] for k in by_class[0]]) if by_class[0] else ""
+    sure = settings(front, by_class[0]) if by_class[0] else ""
     verb = "is" if len(by_class[0]) == 1 else "are"
     said = [f"Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, {verb} {sure}." if sure else
             "No point is surely on the front of cost and error: none is there in 95 % of the resamples of the seeds."]
     if by_class[1]:
-        said.append("Chance decides about " + listed([f"{front.labels[k]} ({share_word(front.shares[k])})" for k in by_class[1]]) + ".")
+        said.append("Chance decides about " + listed([f"*{front.labels[k]}* ({share_word(front.shares[k])})" for k in by_class[1]]) + ".")
     if by_class[3]:
-        said.append(f"Nothing can be said of {listed([front.labels[k] for k in by_class[3]])}, of one seed.")
+        said.append(f"Nothing can be said of {settings(front, by_class[3])}, of one seed.")
     return said
 
 
 def about_mark(picture: Picture, k: int) -> str:
     """Where a marked point stands, against those that are surely on the front."""
     front, (x, y) = picture.front, (picture.curves[0].x, picture.curves[0].y)
-    said = f"The marked {front.labels[k]} costs {cost_word(picture, k)} and is off by {off(picture, k)}"
+    said = f"The marked *{front.labels[k]}* costs {cost_word(picture, k)} and is off by {off(picture, k)}"
     if class_of(front.shares[k]) == 0:
         return f"{said}; it is itself surely on the front."
     better = [j for j in range(len(x)) if class_of(front.shares[j]) == 0 and x[j] <= x[k] and y[j] <= y[k] and (x[j] < x[k] or y[j] < y[k])]
     if not better:
         return f"{said}; no point that is surely on the front is at most as dear and at most as wrong."
-    words = [f"{front.labels[j]}, which costs {100 * (1 - x[j] / x[k]):.0f} % less and is off by {off(picture, j)}" for j in better]
+    words = [f"*{front.labels[j]}*, which costs {100 * (1 - x[j] / x[k]):.0f} % less and is off by {off(picture, j)}" for j in better]
     return f"{said}; in the means it is beaten by {listed(words)}."
 
 
@@ -120,9 +125,9 @@ def about_scatter(picture: Picture) -> list[str]:
         return [f"{said}; every point is off by more."]
     cheapest = min(within, key=lambda k: one.x[k])
     if len(within) == len(one.y):
-        return [f"{said}; no point is off by more, and {front.labels[cheapest]} is the cheapest."]
-    return [f"{said}; {len(within)} of {len(one.y)} points are off by no more: {listed([front.labels[k] for k in within])}.",
-            f"The cheapest of those is {front.labels[cheapest]}, at a cost of {cost_word(picture, cheapest)}."]
+        return [f"{said}; no point is off by more, and *{front.labels[cheapest]}* is the cheapest."]
+    return [f"{said}; {len(within)} of {len(one.y)} points are off by no more: {settings(front, within)}.",
+            f"The cheapest of those is *{front.labels[cheapest]}*, at a cost of {cost_word(picture, cheapest)}."]
 
 
 def front_words(made: Made, picture: Picture) -> list[str]:
@@ -132,17 +137,30 @@ def front_words(made: Made, picture: Picture) -> list[str]:
 
 # ---- of the whole study ----
 
+def column(made: Made, name: str, of: str, head: str, spread: str = "") -> tuple[str, list[str]]:
+    """A column of the table of points: its head with the unit, and its numbers."""
+    points, path = made.points, f"{name}.{of}"
+    values, errors = points[path], points[f"{name}.{spread}"] if spread else np.full(len(points), math.nan)
+    share = of == "error" and points.units[path] == "1"
+    by, unit = (0.01, "%") if share else scaled(points.units[path], [values])
+    cells = [number(value / by, error / by) if math.isfinite(value) else "" for value, error in zip(values, errors)]
+    return head if unit == "1" else f"{head} [{unit}]", cells
+
+
 def points_table(made: Made) -> str:
-    """Means of all measures that are numbers, where there is no front."""
-    points, axes = made.points, [axis.name for axis in made.study.axes]
-    shown = ["cost." * (one.source == "cost") + one.name for one in made.study.measures if one.single]
-    units = {name: scaled(points.units[f"{name}.mean"], [points[f"{name}.mean"]]) for name in shown}
-    head = axes + [name if units[name][1] == "1" else f"{name} [{units[name][1]}]" for name in shown] + ["runs"]
-    rows = []
-    for k, labels in enumerate(made.labels):
-        numbers = [number(points[f"{name}.mean"][k] / units[name][0], points[f"{name}.standard_error"][k] / units[name][0]) for name in shown]
-        rows.append([labels[axis] for axis in axes] + numbers + [runs_word(made, k)])
-    return table(head, rows)
+    """Means of all measures that are numbers, and errors against the reference, where there is no front."""
+    study, columns = made.study, []
+    for measure in study.measures:
+        name = "cost." * (measure.source == "cost") + measure.name
+        if measure.single:
+            columns.append(column(made, name, "mean", measure.name, "standard_error"))
+        if f"{measure.name}.error" in made.points.columns:
+            if measure.single:
+                columns.append(column(made, name, "reference", f"of {study.reference}"))
+            columns.append(column(made, name, "error", f"error of {measure.name}", "error.standard_error"))
+    axes = [axis.name for axis in study.axes]
+    rows = [[labels[axis] for axis in axes] + [cells[k] for _, cells in columns] + [runs_word(made, k)] for k, labels in enumerate(made.labels)]
+    return table(axes + [head for head, _ in columns] + ["runs"], rows)
 
 
 def about_ends(made: Made) -> str:

@@ -184,16 +184,16 @@ def picture(x, y, shares, marks, scatter):
 
 def check_sentences(_here):
     one = picture([0.2, 0.5, 0.8, 0.9], [5.0, 2.0, 3.0, 1.0], [1.0, 0.97, 0.2, 0.0], {2: "as it stands"}, 2.5)
-    assert page.about_front(one.front) == ["Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, are s0 and s1.",
-                                           "Chance decides about s2 (20 %)."]
-    assert page.about_mark(one, 2) == "The marked s2 costs 0.8 and is off by 3 %; in the means it is beaten by s1, which costs 38 % less and is off by 2 %."
+    assert page.about_front(one.front) == ["Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, are *s0* and *s1*.",
+                                           "Chance decides about *s2* (20 %)."]
+    assert page.about_mark(one, 2) == "The marked *s2* costs 0.8 and is off by 3 %; in the means it is beaten by *s1*, which costs 38 % less and is off by 2 %."
     assert page.about_mark(one, 1).endswith("; it is itself surely on the front.")
     assert page.about_mark(one, 3).endswith("; no point that is surely on the front is at most as dear and at most as wrong.")
-    assert page.about_scatter(one) == ["Single runs of grains scatter by 2.5 %; 2 of 4 points are off by no more: s1 and s3.",
-                                       "The cheapest of those is s1, at a cost of 0.5."]
+    assert page.about_scatter(one) == ["Single runs of grains scatter by 2.5 %; 2 of 4 points are off by no more: *s1* and *s3*.",
+                                       "The cheapest of those is *s1*, at a cost of 0.5."]
     none = picture([0.2, 0.5], [5.0, 2.0], [0.5, math.nan], {}, 1.0)
     assert page.about_front(none.front) == ["No point is surely on the front of cost and error: none is there in 95 % of the resamples of the seeds.",
-                                            "Chance decides about s0 (50 %).", "Nothing can be said of s1, of one seed."]
+                                            "Chance decides about *s0* (50 %).", "Nothing can be said of *s1*, of one seed."]
     assert page.about_scatter(none) == ["Single runs of grains scatter by 1 %; every point is off by more."]
     assert page.number(0.12345, 0.0123) == "0.123 ± 0.012" and page.number(12345.6, 250) == "12346 ± 250" and page.number(3.0) == "3"
     print("ok  sentences follow from their numbers")
