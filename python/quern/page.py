@@ -154,7 +154,8 @@ def points_table(made: Made) -> str:
         name = "cost." * (measure.source == "cost") + measure.name
         if measure.single:
             columns.append(column(made, name, "mean", measure.name, "standard_error"))
-        if f"{measure.name}.error" in made.points.columns:
+        nothing = measure.single and not np.any(made.points.columns.get(f"{name}.reference", 0.0))  # to be off from: the mean says it
+        if f"{measure.name}.error" in made.points.columns and not nothing:
             if measure.single:
                 columns.append(column(made, name, "reference", f"of {study.reference}"))
             columns.append(column(made, name, "error", f"error of {measure.name}", "error.standard_error"))
