@@ -386,7 +386,9 @@ def check_memory(here):
     from quern.study import read
     sleepers = [subprocess.Popen(["sleep", "20"]) for _ in range(2)]
     active = {one.pid: workers.Active(None, one, 0, 0) for one in sleepers}
-    resident, available = workers.proc_bytes(f"/proc/{sleepers[0].pid}/status", "VmRSS:"), workers.proc_bytes("/proc/meminfo", "MemAvailable:")
+    resident, available = 0, workers.proc_bytes("/proc/meminfo", "MemAvailable:")
+    while resident < 1e5 and sleepers[0].poll() is None:  # until the program has taken its place
+        resident = workers.proc_bytes(f"/proc/{sleepers[0].pid}/status", "VmRSS:")
     assert 1e5 < resident < 1e7 < available, (resident, available)
     assert workers.has_room(active, 0) and workers.has_room(active, available / 4)
     assert not workers.has_room(active, available / 2.5)  # two that have yet to grow, and a third
