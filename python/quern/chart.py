@@ -12,7 +12,7 @@ from .chart_data import FROM_RUNS, Group, Picture, as_csv, told
 from .chart_draw import save
 from .chart_form import METRES, Chart
 from .chart_study import Made, picture_of, read_made
-from .program import QuernError, call
+from .program import QuernError, call, sentence_of
 from .reader import QUANTITY, StudyError
 from .study import Study, read
 from .workers import save as save_text
@@ -110,7 +110,7 @@ def about(words: list[str], title: str, source: str) -> dict[str, str]:
     """Metadata of a picture. Where it was put is not told: the same table gives the same bytes."""
     kept, skip = [], False
     for word in words:
-        if not skip and word not in ("-o", "--output") and not word.startswith("--output="):
+        if not skip and not word.startswith(("-o", "--output")):
             kept.append(word)
         skip = word in ("-o", "--output")
     return {"Title": title, "Creator": call(["--version"]).stdout.strip(), "Description": shlex.join(["quern", "chart", *kept]), "Source": source}
@@ -235,5 +235,5 @@ def main(words: list[str] | None = None) -> int:
         print(f"quern chart: error: {error}", file=sys.stderr)
         return error.status
     except OSError as error:
-        print(f"quern chart: error: {error.filename}: {error.strerror}", file=sys.stderr)
+        print(f"quern chart: error: {sentence_of(error)}", file=sys.stderr)
         return 4

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The numbers that a chart shows, from the table of a study and from runs; nothing here draws."""
 import csv
+import dataclasses
 import io
 import math
 import pathlib
@@ -11,7 +12,8 @@ import numpy as np
 import yaml
 
 from .chart_form import Chart
-from .measure import Measure, sentence_of, taken
+from .measure import Measure, taken
+from .program import sentence_of
 from .runs import Frame, Run, open as open_run
 from .table import DAMAGE
 
@@ -25,6 +27,7 @@ class Curve:
     dx: np.ndarray | None = None
     dy: np.ndarray | None = None
     reference: bool = False
+    straight: bool = False  # of distributions: a law, straight from place to place, where data rise in steps
 
 
 @dataclass
@@ -34,9 +37,10 @@ class Front:
     labels: list[str]
     shares: np.ndarray  # of resamples in which the point is on the front; NaN for one seed
     marks: dict[int, str]  # point: what it is called
-    scatter: float  # of single runs of the reference, in the unit of the error
+    scatter: float  # of single runs of the reference, in the unit of the error; NaN of a closed form
     reference: str
     relative: bool
+    gone: list[str] = field(default_factory=list)  # points whose cost or error is not known
 
 
 @dataclass
@@ -186,7 +190,7 @@ def asked_radii(run: Run) -> Curve | None:
     even = radius["law"] == "uniform"
     z = np.linspace(-1, 1, 101) if even else np.linspace(-2, 2, 101)
     below = (z + 1) / 2 if even else np.array([0.5 * (1 + math.erf(one / math.sqrt(2))) for one in z])
-    return Curve("asked", mean * (1 + spread * z), (below - below[0]) / (below[-1] - below[0]), reference=True)
+    return Curve("asked", mean * (1 + spread * z), (below - below[0]) / (below[-1] - below[0]), reference=True, straight=True)
 
 
 # ---- lines of a chart: one for each group ----
@@ -262,8 +266,9 @@ def draw_distribution(chart: Chart, groups: list[Group], _which=-1) -> Picture:
         picture.x = chart.field, found[0][0][1]
         for _, one in found:
             if one:
-                asked[one.x.tobytes()] = one
-    picture.curves += list(asked.values())
+                asked.setdefault(one.x.tobytes(), (one, group.label))
+    for one, label in asked.values():
+        picture.curves.append(dataclasses.replace(one, label=f"{one.label}, {label}") if len(asked) > 1 else one)
     return picture
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from . import chart_labels, errors
 from .chart_data import Curve, Picture
 from .program import QuernError
+from .table import SURE
 
 # Okabe and Ito's colours but for yellow, which is faint on white, and black, which is the reference's.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -23,15 +24,16 @@ STYLE = {"font.family": "DejaVu Sans", "font.size": 9.0, "svg.fonttype": "none",
 PREFIXED = {"m", "s", "Pa", "J", "N", "W", "N/m", "J/m"}
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 MOST_NAMED = 12  # points with their names beside them; more get numbers and a key
-SURE, MAYBE = 0.95, 0.05
+MAYBE = 0.05
 WIDTH, HEIGHT = 5.2, 3.6  # inches, of the axes
+FIGURE_SPACE = "\N{FIGURE SPACE}"  # as wide as a digit
 KEY_PITCH = 11.0  # points from line to line
 PNG_DPI = 200
 
 
 def scaled(unit: str, arrays: list[np.ndarray]) -> tuple[float, str]:
     """What to divide by so that numbers stay short, and the unit then."""
-    most = max((float(np.nanmax(np.abs(data))) for data in arrays if np.isfinite(data).any()), default=0.0)
+    most = max((float(np.max(np.abs(data[np.isfinite(data)]))) for data in arrays if np.isfinite(data).any()), default=0.0)
     if unit not in PREFIXED or most <= 0:
         return 1.0, unit
     power = min(9, max(-9, 3 * math.floor(math.log10(most) / 3 + 1e-9)))
@@ -53,11 +55,11 @@ def write_ticks(axis, span: float = 0) -> None:
     from matplotlib import ticker
     plain = ticker.FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}"))
     axis.set_major_formatter(plain)
-    if span:
+    if span >= 10:
         axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if span < 200 else (1,), numticks=30))
-        axis.set_minor_locator(ticker.NullLocator())
-    else:
+    else:  # 1, 2, 5 could all be beyond the ends
         axis.set_major_locator(ticker.MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
+    axis.set_minor_locator(ticker.NullLocator())
 
 
 def style_of(number: int, one: Curve, references: int) -> dict:
@@ -84,7 +86,7 @@ def draw_lines(axes, picture: Picture, x_by: float, y_by: float) -> None:
         alone = there & ~np.append(there[1:], False) & ~np.append(False, there[:-1])  # a line does not show these
         many = len(x) > 12 and not alone.any()
         axes.plot(x, y, label=one.label, markersize=4, markevery=(plain * max(1, len(x) // 40), max(1, len(x) // 8)) if many else None,
-                  drawstyle="steps-post" if picture.kind == "distribution" and one.label != "asked" else "default", **style)
+                  drawstyle="steps-post" if picture.kind == "distribution" and not one.straight else "default", **style)
 
 
 def draw_words(axes, picture: Picture, by: float) -> None:
@@ -121,6 +123,12 @@ CLASSES = (("surely on the front", {"marker": "o", "markersize": 7, "markerfacec
            ("of one seed: not known", {"marker": "s", "markersize": 4.5, "markerfacecolor": "#BBBBBB", "markeredgecolor": "#555555"}))
 
 
+def x_bars(one: Curve) -> np.ndarray:
+    """One standard error to each side; to the left it ends before 0, which a logarithmic axis does not have."""
+    dx = np.nan_to_num(one.dx)
+    return np.array([np.minimum(dx, 0.9 * one.x), dx])
+
+
 def draw_front(axes, picture: Picture, y_by: float) -> None:
     """Points with one standard error, the steps of the front of the means, the scatter of the reference."""
     one, front = picture.curves[0], picture.front
@@ -129,8 +137,7 @@ def draw_front(axes, picture: Picture, y_by: float) -> None:
         axes.axhspan(0, front.scatter / y_by, color="#999999", alpha=0.18, linewidth=0, label=f"scatter of single runs of {front.reference}")
     if front.relative:
         axes.axvline(1, color=REFERENCE, linestyle=DASHES[2], linewidth=1, label=f"cost of {front.reference}")
-    dx, dy = np.nan_to_num(one.dx), np.nan_to_num(one.dy / y_by)
-    axes.errorbar(x, y, dy, np.minimum(dx, 0.9 * x), linestyle="", color="#AAAAAA", elinewidth=0.9, zorder=2)
+    axes.errorbar(x, y, np.nan_to_num(one.dy / y_by), x_bars(one), linestyle="", color="#AAAAAA", elinewidth=0.9, zorder=2)
     on = np.flatnonzero(errors.front(x, y))
     on = on[np.argsort(x[on], kind="stable")]
     axes.step(x[on], y[on], where="post", color="#D55E00", linewidth=0.9, linestyle=DASHES[1], zorder=1.5, label="front of the means")
@@ -157,10 +164,10 @@ def extents(figure, axes, texts: list[str]) -> np.ndarray:
 
 def bars(axes, one: Curve, y_by: float) -> np.ndarray:
     """Boxes of the error bars, upright ones and lying ones."""
-    dx, dy = np.nan_to_num(one.dx), np.nan_to_num(one.dy)
+    left_right, none, dy = x_bars(one), np.zeros_like(one.x), np.nan_to_num(one.dy)
     found = []
-    for across, along in ((np.minimum(dx, 0.9 * one.x), 0 * dy), (0 * dx, dy)):
-        ends = [axes.transData.transform(np.column_stack([one.x + side * across, (one.y + side * along) / y_by])) for side in (-1, 1)]
+    for (left, right), (down, up) in ((left_right, (none, none)), ((none, none), (dy, dy))):
+        ends = [axes.transData.transform(np.column_stack([one.x + across, (one.y + along) / y_by])) for across, along in ((-left, -down), (right, up))]
         found.append(np.hstack([ends[0] - 0.5, ends[1] + 0.5]))
     return np.concatenate(found)
 
@@ -195,11 +202,16 @@ def label_points(figure, axes, picture: Picture, y_by: float) -> str:
         axes.annotate(text, anchor, centre, "axes points", "axes points", ha="center", va="center", fontsize=8, zorder=4, annotation_clip=False)
     if count <= MOST_NAMED:
         return ""
-    return "\n".join(f"{k + 1:>{width}}  {front.labels[k]}{share_words(front.shares[k])}" for k in range(count))
+    return "\n".join(f"{str(k + 1).rjust(width, FIGURE_SPACE)}  {front.labels[k]}{share_words(front.shares[k])}" for k in range(count))
+
+
+def percent(share: float) -> str:
+    """As exact as a thousand draws are; with a digit more where rounding would make sure what is not."""
+    return f"{100 * share:.{0 if class_of(round(share, 2)) == class_of(share) else 1}f} %"
 
 
 def share_words(share: float) -> str:
-    return f" ({100 * share:.0f} %)" if class_of(share) == 1 else ""
+    return f" ({percent(share)})" if class_of(share) == 1 else ""
 
 
 def write_key(figure, axes, key: str, below: float) -> None:
@@ -228,7 +240,8 @@ def bounds_of_front(axes, picture: Picture, y_by: float) -> None:
     one = picture.curves[0]
     y, dy = one.y / y_by, np.nan_to_num(one.dy / y_by)
     scatter = picture.front.scatter / y_by if math.isfinite(picture.front.scatter) else 0
-    low, high = float(one.x.min()), float(one.x.max())
+    left, right = x_bars(one)
+    low, high = float((one.x - left).min()), float((one.x + right).max())
     if picture.front.relative:
         low, high = min(low, 1.0), max(high, 1.0)
     if low > 0:  # a clock can find that a short run has cost nothing
@@ -271,18 +284,22 @@ def figure_of(picture: Picture):
     axes.set_ylabel("" if picture.words else across)
     if picture.title:
         axes.set_title(picture.title, pad=10)
-    known = dict(zip(*reversed(axes.get_legend_handles_labels())))
-    handles = list(known.values()) if picture.front else [known[one.label] for one in picture.curves if one.label in known]
-    if len(handles) > 1 or picture.front:
-        legend = axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0, bbox_transform=axes.transAxes,
-                             fontsize=8, handlelength=3)
-        figure.canvas.draw()
-        bottom = legend.get_window_extent().y0 - axes.get_window_extent().y1
-    else:
-        bottom = 0.0
+    bottom = write_legend(figure, axes, picture)
     if key:
         write_key(figure, axes, key, bottom - 8)
     return figure
+
+
+def write_legend(figure, axes, picture: Picture) -> float:
+    """Beside the axes, if there is more than one line; returns where it ends, from the top of the axes."""
+    known = dict(zip(*reversed(axes.get_legend_handles_labels())))
+    handles = list(known.values()) if picture.front else [known[one.label] for one in picture.curves if one.label in known]
+    if len(handles) < 2 and not picture.front:
+        return 0.0
+    legend = axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0, bbox_transform=axes.transAxes,
+                         fontsize=8, handlelength=3)
+    figure.canvas.draw()
+    return legend.get_window_extent().y0 - axes.get_window_extent().y1
 
 
 def metadata_for(kind: str, about: dict[str, str]) -> dict:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """From the table of a study to the lines of its charts: which runs belong together, what the reference is, where points lie."""
+import dataclasses
 import math
 import pathlib
 from dataclasses import dataclass
@@ -9,13 +10,14 @@ import numpy as np
 
 from .chart_data import FROM_RUNS, Curve, Front, Group, Picture, over_seeds, slabs
 from .chart_form import Chart
-from .measure import Measure, Reading, sentence_of, taken
-from .points import combinations
-from .program import QuernError
+from .errors import SHARES
+from .measure import Measure, Reading, taken
+from .points import combinations, jobs_of
+from .program import QuernError, sentence_of
 from .reader import number_label
 from .runs import open as open_run
 from .study import Study
-from .table import DAMAGE
+from .table import DAMAGE, pairs_and_costs, read_run, shares_of
 
 
 @dataclass
@@ -181,39 +183,70 @@ def draw_scalar(made: Made, chart: Chart) -> Picture:
     return picture
 
 
-def cost_of(made: Made, rows: list[int]) -> tuple[float, float]:
-    """Mean of the study's cost and its standard error."""
-    mean, deviation = over_seeds([made.runs[f"cost.{made.study.front}"][k] for k in rows]) if rows else (math.nan, math.nan)
-    return float(mean), float(deviation)
+def cost_of(made: Made, point: int, relative: bool) -> tuple[float, float]:
+    """Mean of the study's cost and its standard error; or over the mean of the reference, whose own chance counts likewise: seeds that
+    both have are pairs. NaN where that is not known."""
+    column, seeds = made.runs[f"cost.{made.study.front}"], np.nan_to_num(made.runs["seed"])  # of a study without seeds all are 0
+    sides = rows_of_point(made, point), reference_rows(made, point)
+    own, twins = ({seeds[k]: column[k] for k in rows if math.isfinite(column[k])} for rows in sides)
+    if not relative:
+        mean, deviation = over_seeds(list(own.values())) if own else (math.nan, math.nan)
+        return float(mean), float(deviation)
+    both = [seed for seed in own if seed in twins]
+    x, y = np.array([own[seed] for seed in both]), np.array([twins[seed] for seed in both])
+    if not both or not y.mean() > 0:
+        return math.nan, math.nan
+    ratio = float(x.mean() / y.mean())
+    return ratio, float(np.std(x - ratio * y, ddof=1) / y.mean() / math.sqrt(len(both))) if len(both) > 1 else math.nan
+
+
+def front_shares(made: Made, chart: Chart, shown: list[int]) -> np.ndarray:
+    """In which share of resamples each of these points is on the front of just these, by cost as the chart shows it; as in the table,
+    where that has been asked of the same points and costs."""
+    name, study = chart.measure, made.study
+    known = made.points.columns.get(f"cost.{name}.front_share", np.full(len(made.points), math.nan))
+    by_reference = chart.relative_cost and study.follows
+    if len(shown) == np.isfinite(made.points[f"{name}.error"]).sum() and not by_reference:
+        return known[shown]
+    measure = measure_of(made, chart)
+    study, numbers = dataclasses.replace(study, measures=[measure]), made.numbers
+    there = set(made.runs["run"])
+    runs = [read_run(study, job, made.folder, numbers) for job in jobs_of(study) if job.key in there and (job.model or job.point in shown)]
+    if not {run.job.point for run in runs if not run.job.model} >= set(shown):
+        raise QuernError(f"{made.folder / 'table.h5'} is of another form of the study or of its scene; quern sweep {study.path} writes it anew", 2)
+    groups = [[run for run in runs if not run.job.model and run.job.point == k] for k in shown]
+    pairs, costs = pairs_and_costs(study, measure, groups, runs)
+    if by_reference:
+        wholes = [np.nanmean([made.runs[f"cost.{study.front}"][row] for row in reference_rows(made, k)]) for k in shown]
+        costs = [{seed: cost / whole for seed, cost in own.items()} for own, whole in zip(costs, wholes)]
+    return shares_of(measure, pairs, costs)
 
 
 def draw_front(made: Made, chart: Chart) -> Picture:
     """Cost and error of each point, cheapest first."""
     name, points = chart.measure, made.points
     error, deviation = points[f"{name}.error"], points[f"{name}.error.standard_error"]
-    rows = [k for k in picked(made, chart) if math.isfinite(error[k]) and rows_of_point(made, k)]
-    costs = {k: cost_of(made, rows_of_point(made, k)) for k in rows}
-    if chart.relative_cost:
-        of = {k: cost_of(made, reference_rows(made, k))[0] for k in rows}
-        costs = {k: (cost / of[k], spread / of[k]) for k, (cost, spread) in costs.items() if of[k] > 0}
-    rows = sorted(costs, key=lambda k: (costs[k][0], k))
+    costs = {k: cost_of(made, k, chart.relative_cost) for k in picked(made, chart)}
+    rows = sorted((k for k in costs if math.isfinite(error[k]) and math.isfinite(costs[k][0])), key=lambda k: (costs[k][0], k))
     axes = [axis.name for axis in made.study.axes if len(axis.values) > 1 and axis.name not in chart.where]
-    labels = [label_of(made, made.labels[k], axes) or made.study.name for k in rows]
+    names = {k: label_of(made, made.labels[k], axes) or made.study.name for k in costs}
+    labels, gone = [names[k] for k in rows], [names[k] for k in costs if k not in rows]
     marks = {i: ", ".join(f"{axis} {label}" for axis, label in chart.mark.items()) for i, k in enumerate(rows)
              if chart.mark and all(made.labels[k][axis] == label for axis, label in chart.mark.items())}
-    scatters = points[f"{name}.scatter"][rows]
+    scatters = np.full(1, math.nan) if made.study.closed else points[f"{name}.scatter"][rows]
     scatter = float(np.median(scatters[np.isfinite(scatters)])) if np.isfinite(scatters).any() else math.nan
     what = {"running": "processor time from the release on", "processor": "processor time", "wall": "time by the clock"}[made.study.front]
     x = (f"{what}, over that of {made.study.reference}", "1") if chart.relative_cost else (what, "s")
-    relative = measure_of(made, chart).kind in ("share", "relative")
+    relative = measure_of(made, chart).kind in SHARES
     place = [np.array([costs[k][part] for k in rows]) for part in (0, 1)]
     line = Curve("settings", place[0], error[rows], place[1], deviation[rows])
-    share = points.columns.get(f"cost.{name}.front_share", np.full(len(points), math.nan))[rows]
+    share = front_shares(made, chart, rows)
     y = (f"error of {name} against {made.study.reference}", "%" if relative else points.units[f"{name}.error"])
     if relative:
         line.y, line.dy, scatter = 100 * line.y, 100 * line.dy, 100 * scatter
     return Picture(chart.name, "front", chart.title, x, y, [line] if rows else [],
-                   front=Front(rows, labels, share, marks, scatter, made.study.reference, chart.relative_cost))
+                   front=Front(rows, labels, share, marks, scatter, made.study.reference, chart.relative_cost, gone),
+                   notes=[(label, "its cost or its error is not known, so that it is not shown; table.csv says how its runs ended") for label in gone])
 
 
 # ---- a closed form beside runs ----
@@ -238,7 +271,7 @@ def form_curve(made: Made, chart: Chart, measure: Measure, point: int, folder: p
     followed = label_of(made, made.labels[point], [name for name in made.study.follows if name in chart.by])
     label = ", ".join(filter(None, [made.study.reference, followed]))
     if chart.kind == "distribution":
-        return Curve(label, reading.values, reading.shares, reference=True)
+        return Curve(label, reading.values, reading.shares, reference=True, straight=True)
     return Curve(label, reading.times if chart.kind == "series" else slabs(run, measure.path, len(reading.values))[0], reading.values, reference=True)
 
 

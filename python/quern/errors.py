@@ -105,4 +105,4 @@ def share_on_front(seeds: list[list], costs: list[np.ndarray], runs: list[np.nda
     on = np.array([front(c, o) for c, o in zip(mean_cost, off)])
     known = ~np.isnan(mean_cost)
     share = on.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return np.where([len(cost) > 1 for cost in costs], share, np.nan)  # of one seed there is nothing to resample
+    return np.where(known.any(axis=0) & [len(cost) > 1 for cost in costs], share, np.nan)  # of one seed there is nothing to resample

@@ -22,7 +22,7 @@ from typing import NoReturn
 
 import numpy
 
-from .program import QuernError, call
+from .program import QuernError, call, sentence_of
 
 FORMS = (".mp4", ".webm", ".gif", ".png")
 USUAL = 0.95  # of the frames have all their values within the range of colours: one that bursts must not take them all
@@ -130,7 +130,7 @@ def by_ffmpeg(place: pathlib.Path, fps: float, film: pathlib.Path) -> None:
              ".webm": ["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-deadline", "good", "-cpu-used", "4", "-row-mt", "1"]}[form]
     words = ["ffmpeg", "-nostdin", "-loglevel", "error", "-y", "-framerate", f"{fps:g}", "-i", str(place / "%06d.png"),
              "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p", *coder, "-f", form[1:], str(film)]
-    done = subprocess.run(words, capture_output=True, text=True)
+    done = subprocess.run(words, capture_output=True, encoding="utf-8", errors="replace")
     if done.returncode:
         raise QuernError(f"ffmpeg did not make the film: {done.stderr.strip() or f'it ended with status {done.returncode}'}", 4)
 
@@ -216,6 +216,6 @@ def main(words: list[str] | None = None) -> int:
         print(f"quern film: error: {error}", file=sys.stderr)
         return error.status
     except OSError as error:
-        print(f"quern film: error: {error.filename}: {error.strerror}", file=sys.stderr)
+        print(f"quern film: error: {sentence_of(error)}", file=sys.stderr)
         return 4
     return 0

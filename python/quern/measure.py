@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
-from .program import QuernError
 from .reader import Reader
 from .runs import Run
 
@@ -273,10 +272,3 @@ def taken(measure: Measure, run: Run, summary: dict) -> Reading:
     if not np.isfinite(reading.values).all():
         raise ValueError(f"{measure.path} is not finite")
     return reading
-
-
-def sentence_of(why: Exception) -> str:
-    """What went wrong, without the quotes that a KeyError puts around it."""
-    if isinstance(why, OSError) and not isinstance(why, QuernError):
-        return f"{why.filename}: {why.strerror}"
-    return str(why.args[0] if why.args else why)

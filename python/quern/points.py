@@ -93,7 +93,7 @@ def files_named(words: list[str], folder: pathlib.Path) -> dict[str, str]:
 
 def scene_digest(base: pathlib.Path) -> str:
     """Of what a scene says, not of how: comments do not count."""
-    words = words_of(base.read_text(errors="replace"))
+    words = words_of(base.read_text(encoding="utf-8", errors="replace"))
     return digest(json.dumps([words, files_named(words, base.parent)]).encode())
 
 

@@ -80,9 +80,16 @@ def sentence(said: str) -> str:
     return "\n".join(kept or lines)
 
 
+def sentence_of(why: Exception) -> str:
+    """What went wrong, without the quotes that a KeyError puts around it. A system that has no room left names no file, and HDF5 no reason."""
+    if isinstance(why, OSError) and why.strerror:
+        return f"{why.filename}: {why.strerror}" if why.filename else why.strerror
+    return str(why.args[0] if why.args else why)
+
+
 def call(arguments: list[str], **options: Any) -> subprocess.CompletedProcess:
     """Runs the program to its end; raises what it says if that is not status 0."""
-    done = subprocess.run([find(), *arguments], capture_output=True, text=True, **options)
+    done = subprocess.run([find(), *arguments], capture_output=True, encoding="utf-8", errors="replace", **options)
     if done.returncode:
         said = sentence(done.stderr) or f"the program ended with status {done.returncode}"
         raise QuernError(said, done.returncode)

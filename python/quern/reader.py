@@ -138,7 +138,7 @@ def read_sets(reader: Reader, node: yaml.Node, where: str) -> Sets:
 def compose(path, name: str) -> yaml.Node:
     """The file as a tree of nodes; StudyError where it is none. Aliases are refused: they can stand for more than any memory holds."""
     try:
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
         for event in yaml.parse(text, Loader=yaml.SafeLoader):
             if isinstance(event, yaml.AliasEvent):
                 mark = event.start_mark

@@ -58,7 +58,11 @@ class Frame:
 
     def __getitem__(self, name: str) -> np.ndarray:
         with self._file() as file:
-            return self._find(file, name)[()]
+            data = self._find(file, name)
+            try:
+                return data[()]
+            except OSError as why:
+                raise QuernError(f"{name} of {self.path} cannot be read: {why}", 4) from None
 
     def __contains__(self, name: str) -> bool:
         return name in self.fields
@@ -119,7 +123,7 @@ class Series:
 
     def __init__(self, path: pathlib.Path):
         try:
-            text = path.read_text()
+            text = path.read_text(encoding="utf-8")
             text = text[:text.rfind("\n") + 1]  # of a run at work the last row may not be whole
             header, *rows = csv.reader(text.splitlines()) if text else [[]]
         except (OSError, UnicodeDecodeError, csv.Error) as why:
@@ -182,18 +186,18 @@ class Run:
     def summary(self) -> dict[str, Any]:
         """summary.json; empty where the run has not come to its end."""
         try:
-            return json.loads((self.folder / "summary.json").read_text())
+            return json.loads((self.folder / "summary.json").read_text(encoding="utf-8"))
         except FileNotFoundError:
             return {}
 
     @property
     def scene(self) -> dict[str, Any]:
         """The scene with every default, numbers in SI units."""
-        return read_scene((self.folder / "scene.yaml").read_text())
+        return read_scene((self.folder / "scene.yaml").read_text(encoding="utf-8"))
 
     @property
     def log(self) -> str:
-        return (self.folder / "log.txt").read_text()
+        return (self.folder / "log.txt").read_text(encoding="utf-8", errors="replace")
 
 
 def _is_held(lock: pathlib.Path) -> bool:

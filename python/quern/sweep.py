@@ -17,7 +17,7 @@ from typing import NoReturn
 
 from . import workers
 from .points import Job, jobs_of, program_digests
-from .program import QuernError
+from .program import QuernError, sentence_of
 from .reader import StudyError
 from .study import Study, read
 from .table import write_tables
@@ -126,10 +126,20 @@ def sweep(study: Study, options: argparse.Namespace, stop: int) -> int:
         job = jobs[options.only - 1]
         with held(folder, job.key):
             return status_of(workers.recorded(folder, job.key)) if make(study, [job], folder, options, stop) else 130
+    if options.table:  # while others make the runs
+        return conclude(tables(study, jobs, folder), folder, True)
     with held(folder):
-        whole = options.table or make(study, jobs, folder, options, stop)
-        rows = write_tables(study, jobs, folder)
+        whole = make(study, jobs, folder, options, stop)
+        rows = tables(study, jobs, folder)
     return conclude(rows, folder, whole)
+
+
+def tables(study: Study, jobs: list[Job], folder: pathlib.Path) -> list[dict]:
+    """One at a time reads what is there and writes it, so that the last tables have all that earlier ones had."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / ".table.lock", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        return write_tables(study, jobs, folder)
 
 
 def status_of(record: dict | None) -> int:
@@ -174,5 +184,5 @@ def main(words: list[str] | None = None) -> int:
         print(f"quern sweep: error: {error}", file=sys.stderr)
         return error.status
     except OSError as error:
-        print(f"quern sweep: error: {error.filename}: {error.strerror}", file=sys.stderr)
+        print(f"quern sweep: error: {sentence_of(error)}", file=sys.stderr)
         return 4

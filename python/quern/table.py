@@ -15,9 +15,9 @@ import numpy as np
 
 from . import errors, workers
 from .compare import Lookup, Pairs, Ran, as_rows, lookup_of, pairs_of, unlike
-from .measure import COSTS, RESULTS, UNITS, Measure, Reading, sentence_of, taken
+from .measure import COSTS, RESULTS, UNITS, Measure, Reading, taken
 from .points import Job
-from .program import QuernError
+from .program import QuernError, sentence_of
 from .reader import number_label
 from .runs import Run
 from .study import Study
@@ -127,12 +127,18 @@ def error_cells(study: Study, measure: Measure, pairs: Pairs) -> dict:
                   f"{name}.scatter": 0.0 if study.closed else errors.scatter(reference, measure.kind)}
 
 
+def costs_of(study: Study, group: list[Ran]) -> dict:
+    """By seed, of runs that came to their end."""
+    costs = {run.job.seed: run.row[f"cost.{study.front}"] for run in group if run.row["status"] == "done"}
+    return {seed: cost for seed, cost in costs.items() if cost != "" and math.isfinite(cost)}
+
+
 def point_row(study: Study, group: list[Ran], lookup: Lookup, numbers: dict[str, str]) -> tuple[dict, dict[str, Pairs], dict]:
     """The row of a point, its pairs by measure, and what each of its seeds cost."""
     first = group[0].job
     done = [run for run in group if run.row["status"] == "done"]
     row = {"point": first.point, **axis_cells(first, numbers), "runs": len(group), "done": len(done)}
-    costs = {run.job.seed: run.row[f"cost.{study.front}"] for run in done if run.row[f"cost.{study.front}"] != ""}
+    costs = costs_of(study, group)
     row["cost.mean"] = statistics.mean(costs.values()) if costs else ""
     for measure in study.measures:
         if measure.single:
@@ -145,20 +151,33 @@ def point_row(study: Study, group: list[Ran], lookup: Lookup, numbers: dict[str,
     return row, {name: found for name, found in pairs.items() if found}, costs
 
 
+def shares_of(measure: Measure, pairs: list[Pairs | None], costs: list[dict]) -> np.ndarray:
+    """In which share of resamples each point is on the front of cost and error; NaN where that is not known."""
+    there, drawn, found = [], [], np.full(len(pairs), math.nan)
+    for k, own in enumerate(pairs):
+        kept = [i for i, seed in enumerate(own.seeds) if seed in costs[k]] if own else []
+        if kept:
+            seeds = [own.seeds[i] for i in kept]
+            there.append(k)
+            drawn.append((seeds, np.array([costs[k][seed] for seed in seeds]), own.mine[kept], own.reference[kept]))
+    if drawn:
+        found[there] = errors.share_on_front(*zip(*drawn), measure.kind)
+    return found
+
+
+def pairs_and_costs(study: Study, measure: Measure, groups: list[list[Ran]], runs: list[Ran]) -> tuple[list[Pairs | None], list[dict]]:
+    """What `shares_of` takes, of points that are groups of runs; `runs` has those of the reference as well."""
+    lookup = lookup_of(study, runs)
+    return [pairs_of(measure, group, lookup) for group in groups], [costs_of(study, group) for group in groups]
+
+
 def add_fronts(study: Study, rows: list[dict], pairs: list[dict[str, Pairs]], costs: list[dict]) -> None:
-    """In which share of resamples each point is on the front of cost and error, and whether that is sure."""
+    """Those shares, and whether they are sure."""
     for measure in compared(study):
-        name, there, drawn = measure.name, [], []
-        for k, own in enumerate(pairs):
-            kept = [i for i, seed in enumerate(own[name].seeds) if seed in costs[k]] if name in own else []
-            if kept:
-                seeds = [own[name].seeds[i] for i in kept]
-                there.append(k)
-                drawn.append((seeds, np.array([costs[k][seed] for seed in seeds]), own[name].mine[kept], own[name].reference[kept]))
-        shares = errors.share_on_front(*zip(*drawn), measure.kind) if drawn else []
-        for k, share in zip(there, shares):
-            rows[k][f"cost.{name}.front_share"] = float(share)
-            rows[k][f"cost.{name}.on_front"] = int(share >= SURE)
+        name = measure.name
+        for row, share in zip(rows, shares_of(measure, [own.get(name) for own in pairs], costs)):
+            if not math.isnan(share):
+                row[f"cost.{name}.front_share"], row[f"cost.{name}.on_front"] = float(share), int(share >= SURE)
 
 
 # ---- vectors ----

@@ -86,7 +86,7 @@ def remind(fd: int, active: Active) -> None:
 def read_json(path: pathlib.Path) -> dict:
     """Empty where there is no such file, or no mapping in it."""
     try:
-        tree = json.loads(path.read_text())
+        tree = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
     return tree if isinstance(tree, dict) else {}
@@ -122,7 +122,7 @@ def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str
     code = active.process.returncode = os.waitstatus_to_exitcode(status)
     wall, key = time.monotonic() - active.began, active.job.key
     note = folder / "runs" / f"{key}.err"
-    word, message = message_of(active, code, note.read_text(errors="replace"), study)
+    word, message = message_of(active, code, note.read_text(encoding="utf-8", errors="replace"), study)
     note.unlink()
     summary = read_json(folder / "runs" / key / "summary.json") if word == "done" else {}
     processor = usage.ru_utime + usage.ru_stime
@@ -139,7 +139,7 @@ def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str
 def save(path: pathlib.Path, text: str) -> None:
     """Written aside and renamed: there is the old file or the new one, whole."""
     aside = path.with_name(f"{path.name}.{os.getpid()}.part")
-    aside.write_text(text)
+    aside.write_text(text, encoding="utf-8")
     os.replace(aside, path)
 
 

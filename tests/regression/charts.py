@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """quern chart: what is drawn is what the table and the runs say; the same table gives the same bytes; texts do not overlap, be there thirty
-settings beside each other; a page says what is true of its table; what goes wrong is said."""
+settings beside each other; what goes wrong is said."""
 import csv
 import json
 import math
@@ -24,8 +24,8 @@ except ImportError as missing:
     sys.exit(77)
 
 sys.path.insert(0, str(lab.SOURCE / "python"))
-from quern import chart_labels, page  # noqa: E402
-from quern.chart_data import Curve, Front, Picture, along, asked_radii, of_all, over_seeds  # noqa: E402
+from quern import chart_labels  # noqa: E402
+from quern.chart_data import along, asked_radii, of_all, over_seeds  # noqa: E402
 from quern.chart_form import Chart  # noqa: E402
 from quern.runs import open as open_run  # noqa: E402
 
@@ -85,7 +85,7 @@ def check_numbers(here):
         own = [float(r["cost.running"]) for r in runs if not r["model"] and (r["restitution"], r["speed"]) == (one["restitution"], one["speed"])]
         twins = [float(r["cost.running"]) for r in runs if r["model"] and r["speed"] == one["speed"]]
         assert math.isclose(float(row["processor time from the release on, over that of half"]), sum(own) / sum(twins), rel_tol=1e-12), row
-        assert row["error of left against half"] == one["left.error"] and row["front_share"] == one["cost.left.front_share"], row
+        assert row["error of left against half"] == one["left.error"], row
     assert len(reference) == 2 and len(rows_of(drawn / "cost.csv")) == 6
     for row in rows_of(drawn / "over_number.csv"):
         if not row["line"].startswith("half"):
@@ -94,7 +94,8 @@ def check_numbers(here):
     halves = {row["line"] for row in rows_of(drawn / "over_number.csv")} - {"slow", "fast"}
     assert halves == {"half, slow", "half, fast"}, halves
     for row in rows_of(drawn / "shares.csv"):
-        assert any(math.isclose(float(row["error of dense against half"]), 100 * float(p["dense.error"]), abs_tol=1e-12) for p in points), row
+        assert any(math.isclose(float(row["error of dense against half"]), 100 * float(p["dense.error"]), abs_tol=1e-12)
+                   and row["front_share"] == p["cost.dense.front_share"] for p in points), row
     run = next(r["run"] for r in runs if not r["model"] and (float(r["restitution"]), r["speed"]) == (0.7, "slow"))
     series = rows_of(here / "out/runs" / run / "series.csv")
     mine = [row for row in rows_of(drawn / "energy.csv") if row["line"] == "restitution 0.7"]
@@ -171,32 +172,6 @@ def check_closed(here):
     front = rows_of(here / "out/charts/front.csv")
     assert len(front) == 2 and all(float(row["processor time from the release on"]) >= 0 for row in front)
     print("ok  a closed form beside runs")
-
-
-# ---- sentences ----
-
-def picture(x, y, shares, marks, scatter):
-    labels = [f"s{k}" for k in range(len(x))]
-    front = Front(list(range(len(x))), labels, np.array(shares), marks, scatter, "grains", True)
-    nothing = np.full(len(x), math.nan)
-    return Picture("a", "front", "", ("cost", "1"), ("error", "%"), [Curve("settings", np.array(x), np.array(y), nothing, nothing)], front=front)
-
-
-def check_sentences(_here):
-    one = picture([0.2, 0.5, 0.8, 0.9], [5.0, 2.0, 3.0, 1.0], [1.0, 0.97, 0.2, 0.0], {2: "as it stands"}, 2.5)
-    assert page.about_front(one.front) == ["Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, are *s0* and *s1*.",
-                                           "Chance decides about *s2* (20 %)."]
-    assert page.about_mark(one, 2) == "The marked *s2* costs 0.8 and is off by 3 %; in the means it is beaten by *s1*, which costs 38 % less and is off by 2 %."
-    assert page.about_mark(one, 1).endswith("; it is itself surely on the front.")
-    assert page.about_mark(one, 3).endswith("; no point that is surely on the front is at most as dear and at most as wrong.")
-    assert page.about_scatter(one) == ["Single runs of grains scatter by 2.5 %; 2 of 4 points are off by no more: *s1* and *s3*.",
-                                       "The cheapest of those is *s1*, at a cost of 0.5."]
-    none = picture([0.2, 0.5], [5.0, 2.0], [0.5, math.nan], {}, 1.0)
-    assert page.about_front(none.front) == ["No point is surely on the front of cost and error: none is there in 95 % of the resamples of the seeds.",
-                                            "Chance decides about *s0* (50 %).", "Nothing can be said of *s1*, of one seed."]
-    assert page.about_scatter(none) == ["Single runs of grains scatter by 1 %; every point is off by more."]
-    assert page.number(0.12345, 0.0123) == "0.123 ± 0.012" and page.number(12345.6, 250) == "12346 ± 250" and page.number(3.0) == "3"
-    print("ok  sentences follow from their numbers")
 
 
 # ---- fields ----
@@ -353,7 +328,7 @@ def check_faults(here):
 
 
 with lab.workplace() as name:
-    for check in (check_numbers, check_closed, check_sentences, check_fields, check_labels, check_browser, check_faults):
+    for check in (check_numbers, check_closed, check_fields, check_labels, check_browser, check_faults):
         place = pathlib.Path(name) / check.__name__
         place.mkdir()
         check(place)

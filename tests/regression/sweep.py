@@ -241,9 +241,11 @@ def check_lock(here):
     while not processes(here / "long"):
         time.sleep(0.01)
     assert "another sweep is at work" in sweep(path, here / "long", status=4)
+    sweep(path, here / "long", "--table")
+    assert table(here / "long")[0]["status"] == "missing"
     first.send_signal(signal.SIGINT)
     assert first.wait(timeout=20) == 130 and table(here / "long")[0]["status"] == "missing"
-    print("ok  one sweep in a folder; an interrupted one ends with 130 and its table")
+    print("ok  one sweep in a folder, tables of what is there meanwhile; an interrupted one ends with 130 and its table")
 
 
 def check_settled(here):
