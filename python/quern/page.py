@@ -133,6 +133,8 @@ def about_mark(picture: Picture, k: int) -> str:
     said = f"The marked {quoted(front.labels[k])} {costs(picture, k)} and is off by {off(picture, k)}"
     if class_of(front.shares[k]) == 0:
         return f"{said}; it is itself surely on the front."
+    if np.isnan(front.shares).all():  # of one seed
+        return f"{said}."
     better = [j for j in range(len(x)) if class_of(front.shares[j]) == 0 and x[j] <= x[k] and y[j] <= y[k] and (x[j] < x[k] or y[j] < y[k])]
     if not better:
         return f"{said}; no point that is surely on the front is at most as dear and at most as wrong."

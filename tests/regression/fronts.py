@@ -101,12 +101,15 @@ def check_subset(here):
     (here / "page.md").write_bytes(b"\xff<!-- quern chart --><!-- end -->\n")
     assert "page.md is not text in UTF-8" in call("chart", study, "-o", here / "out", status=2)
     once = write(here / "once.yaml", axes={"e": {"key": E, "list": [0.5]}}, reference={"name": "hard", "set": {E: 0.4}},
-                 measure=[{"name": "left", "series": "energy.grains"}], charts=[{"name": "over", "relative_cost": "yes", **front}])
+                 measure=[{"name": "left", "series": "energy.grains", "relative": True}, {"name": "count", "frame": "grain.radius", "of": "count"}],
+                 charts=[{"name": "over", "relative_cost": "yes", **front}])
     call("sweep", once, "-o", here / "once", "--quiet")
     price(once, here / "once", lambda row: 3 if row["model"] else 2)
     call("chart", once, "-o", here / "once")
     row, = rows_of(here / "once/charts/over.csv")
     assert float(row["processor time from the release on, over that of hard"]) == 2 / 3 and not row["standard_error_x"] and not row["front_share"], row
+    text = page.points_table(read_made(read(once), here / "once"))  # errors are per cent where they are shares, not of numbers without a unit
+    assert "| error of left [%] | count | of hard | error of count | runs |" in text, text
     print("ok  costs that nobody knows are told; a page in a locale of plain letters")
 
 
@@ -182,6 +185,7 @@ def check_sentences(_here):
         beaten = picture([cost, 3.0], [1.0, 2.0], [1.0, 0.0], {}, 1.0, relative=False)
         assert page.about_mark(beaten, 1) == 'The marked *s1* costs 3 s and is off by 2 %; in the means it is beaten by *s0*, ' \
             f'which {words} and is off by 1 %.'
+    assert page.about_mark(picture([0.5], [1.0], [math.nan], {}, 1.0), 0) == "The marked *s0* costs 0.5 times as much as grains and is off by 1 %."
     assert "costs as much" in page.about_mark(picture([0.0, 0.0], [1.0, 2.0], [1.0, 0.0], {}, 1.0), 1)
     print("ok  sentences follow from their numbers")
 
