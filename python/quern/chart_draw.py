@@ -167,7 +167,8 @@ def bars(axes, one: Curve, y_by: float) -> np.ndarray:
     left_right, none, dy = x_bars(one), np.zeros_like(one.x), np.nan_to_num(one.dy)
     found = []
     for (left, right), (down, up) in ((left_right, (none, none)), ((none, none), (dy, dy))):
-        ends = [axes.transData.transform(np.column_stack([one.x + across, (one.y + along) / y_by])) for across, along in ((-left, -down), (right, up))]
+        ends = [axes.transData.transform(np.column_stack([one.x + across, (one.y + along) / y_by]))
+                for across, along in ((-left, -down), (right, up))]
         found.append(np.hstack([ends[0] - 0.5, ends[1] + 0.5]))
     return np.concatenate(found)
 

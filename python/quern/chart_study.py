@@ -246,7 +246,7 @@ def draw_front(made: Made, chart: Chart) -> Picture:
         line.y, line.dy, scatter = 100 * line.y, 100 * line.dy, 100 * scatter
     return Picture(chart.name, "front", chart.title, x, y, [line] if rows else [],
                    front=Front(rows, labels, share, marks, scatter, made.study.reference, chart.relative_cost, gone),
-                   notes=[(label, "its cost or its error is not known, so that it is not shown; table.csv says how its runs ended") for label in gone])
+                   notes=[(label, "its cost or error is not known, so that it is not shown; table.csv says how its runs ended") for label in gone])
 
 
 # ---- a closed form beside runs ----

@@ -94,7 +94,7 @@ def check_subset(here):
     tree["charts"][0]["title"] = "Höhe, µ"
     study.write_text(yaml.safe_dump(tree, allow_unicode=True, sort_keys=False), encoding="utf-8")
     said = call("chart", study, "-o", here / "out", **ASCII)
-    assert "warning: whole: e 0.5, fast: its cost or its error is not known, so that it is not shown" in said, said
+    assert "warning: whole: e 0.5, fast: its cost or error is not known, so that it is not shown" in said, said
     text = (here / "page.md").read_text(encoding="utf-8")
     assert 'Cost or error of *e 0.5, fast* is not known.' in text and "![Höhe, µ](page_whole.svg)" in text, text
     assert "All 12 runs came to their end." in text, text
@@ -107,7 +107,8 @@ def check_subset(here):
     price(once, here / "once", lambda row: 3 if row["model"] else 2)
     call("chart", once, "-o", here / "once")
     row, = rows_of(here / "once/charts/over.csv")
-    assert float(row["processor time from the release on, over that of hard"]) == 2 / 3 and not row["standard_error_x"] and not row["front_share"], row
+    assert float(row["processor time from the release on, over that of hard"]) == 2 / 3, row
+    assert not row["standard_error_x"] and not row["front_share"], row
     text = page.points_table(read_made(read(once), here / "once"))  # errors are per cent where they are shares, not of numbers without a unit
     assert "| error of left [%] | count | of hard | error of count | runs |" in text, text
     print("ok  costs that nobody knows are told; a page in a locale of plain letters")
@@ -165,7 +166,8 @@ def picture(x, y, shares, marks, scatter, relative=True, dx=None, gone=()):
 def check_sentences(_here):
     one = picture([0.2, 0.5, 0.8, 0.9], [5.0, 2.0, 3.0, 1.0], [1.0, 0.97, 0.2, 0.0], {2: "as it stands"}, 2.5)
     assert page.about_front(one.front) == [
-        "Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, are *s0* and *s1*.", 'Chance decides about *s2* (20 %).']
+        "Surely on the front of cost and error, in at least 95 % of the resamples of the seeds, are *s0* and *s1*.",
+        'Chance decides about *s2* (20 %).']
     assert page.about_mark(one, 2) == 'The marked *s2* costs 0.8 times as much as grains and is off by 3 %; in the means it is beaten by ' \
         '*s1*, which costs 38 % less and is off by 2 %.'
     assert page.about_mark(one, 1).endswith("; it is itself surely on the front.")
@@ -179,7 +181,8 @@ def check_sentences(_here):
     assert page.about_scatter(none) == ["Single runs of grains scatter by 1 %; every point is off by more."]
     # what is not sure is not told as 95 %
     assert page.about_front(picture([1.0], [1.0], [0.949], {}, 1.0).front)[1] == 'Chance decides about *s0* (94.9 %).'
-    assert [percent(share) for share in (0.949, 0.946, 0.95, 0.054, 0.05, 0.126, 1.0)] == ["94.9 %", "94.6 %", "95 %", "5.4 %", "5 %", "13 %", "100 %"]
+    assert [percent(share) for share in (0.949, 0.946, 0.95, 0.054, 0.05, 0.126, 1.0)] \
+        == ["94.9 %", "94.6 %", "95 %", "5.4 %", "5 %", "13 %", "100 %"]
     # as dear, much cheaper, for nothing
     for cost, words in ((3.0, "costs as much"), (2.99, "costs as much"), (0.006, "costs 99.8 % less"), (0.0, "costs 100 % less")):
         beaten = picture([cost, 3.0], [1.0, 2.0], [1.0, 0.0], {}, 1.0, relative=False)
