@@ -107,7 +107,7 @@ static bool read_view(options *o, int dimension, quern_text *why) {
 	if (!read_list("view", o->view, "m", 2 * d, RENDER_FAR, at, why)) return false;
 	for (size_t k = 0; k < d; k++) {
 		o->wish.low[k] = at[k], o->wish.high[k] = at[d + k];
-		if (at[d + k] - at[k] > 1e-9 * fmax(fabs(at[k]), fabs(at[d + k]))) continue;
+		if (at[d + k] - at[k] > fmax(1e-9 * fmax(fabs(at[k]), fabs(at[d + k])), 1e-12)) continue;
 		quern_text_add(why, "--view %s: nothing lies between %g m and %g m: give the lower corner first",
 			o->view, at[k], at[d + k]);
 		return false;
@@ -156,11 +156,13 @@ static cairo_status_t keep(void *to, const unsigned char *data, unsigned length)
 static int draw(const options *o, const render_frame *frame, const char *path) {
 	bytes file = { 0 };
 	char why[256] = "the picture cannot be made: out of memory";
+	cairo_status_t status = CAIRO_STATUS_SUCCESS;
 	cairo_surface_t *page = quern_render_page(frame, &o->wish, (int)o->width, o->form, keep, &file);
-	if (o->form == RENDER_PNG) cairo_surface_write_to_png_stream(page, keep, &file);
+	if (o->form == RENDER_PNG) status = cairo_surface_write_to_png_stream(page, keep, &file);
 	cairo_surface_finish(page);
-	const bool good = cairo_surface_status(page) == CAIRO_STATUS_SUCCESS && file.n &&
-					  quern_save_bytes(path, file.data, file.n, why);
+	if (status == CAIRO_STATUS_SUCCESS) status = cairo_surface_status(page);
+	const bool good =
+		status == CAIRO_STATUS_SUCCESS && file.n && quern_save_bytes(path, file.data, file.n, why);
 	cairo_surface_destroy(page);
 	free(file.data);
 	if (good) puts(path);

@@ -112,7 +112,8 @@ typedef struct render_range {
 render_range quern_render_range_of(const render_frame *, const render_wish *);
 /* "1.5 mm/s": a value in a unit with a fitting prefix. */
 void quern_render_quantity(char *out, size_t size, double value, const char *unit);
-/* The least of n numbers that at least the part `share` does not exceed; sorts them. 0 if there are none. */
+/* The number that stands at the part `share` of the way from the least to the greatest of n, or the next one; sorts them. 0
+ * if there are none. */
 double quern_render_quantile(double *values, size_t n, double share);
 /* The least and greatest that colours stand for lie within it; what is beyond has none. */
 #define RENDER_MOST_VALUE 1e150
@@ -139,7 +140,7 @@ void quern_render_project(
 /* False for what is left out: fixed grains beside what moves. */
 bool quern_render_shown(const render_view *, const render_frame *, const render_cloud *, size_t i);
 
-/* ---- quern_render_plane.c, quern_render_space.c: what lies in the picture, with its upper left corner at the origin ---- */
+/* ---- render_plane.c, render_space.c: what lies in the picture, with its upper left corner at the origin ---- */
 
 typedef struct render_style {
 	const render_frame *frame;
@@ -174,7 +175,7 @@ void quern_render_chains(cairo_t *, const render_style *);
 void quern_render_arrows(cairo_t *, const render_style *);
 void quern_render_arrow(cairo_t *, double x, double y, double dx, double dy, double line);
 
-/* ---- quern_render_page.c: the picture with its heading, colour bar, scale and legend ---- */
+/* ---- render_page.c: the picture with its heading, colour bar, scale and legend ---- */
 
 typedef enum { RENDER_PNG, RENDER_SVG, RENDER_PDF } render_form;
 

@@ -92,17 +92,11 @@ static void read_grains(hid_t group, render_cloud *cloud) {
 	free(fixed);
 }
 
-static int by_size(const void *a, const void *b) {
-	const double x = *(const double *)a, y = *(const double *)b;
-	return (x > y) - (x < y);
-}
-
 /* Spray has an open volume, which says nothing about how much is there: it is not drawn larger than the rest. */
 static void limit_sizes(render_cloud *cloud) {
 	double *sorted = quern_take(cloud->n + 1, sizeof(double));
 	memcpy(sorted, cloud->size, cloud->n * sizeof(double));
-	qsort(sorted, cloud->n, sizeof(double), by_size);
-	const double most = 1.2 * sorted[cloud->n / 2];
+	const double most = 1.2 * quern_render_quantile(sorted, cloud->n, 0.5);
 	for (size_t i = 0; i < cloud->n; i++)
 		if (!(cloud->size[i] < most)) cloud->size[i] = most;
 	free(sorted);

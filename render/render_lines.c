@@ -14,7 +14,7 @@ double quern_render_widest(const render_frame *f) {
 	double *force = quern_take(f->n_links + 1, sizeof(double));
 	size_t n = 0;
 	for (size_t i = 0; i < f->n_links; i++)
-		if (f->link[i].force > 0) force[n++] = f->link[i].force;
+		if (f->link[i].force > 1 / RENDER_MOST_VALUE) force[n++] = f->link[i].force;
 	const double widest = quern_render_quantile(force, n, usual);
 	free(force);
 	return widest;
@@ -71,7 +71,7 @@ double quern_render_longest(const render_frame *f) {
 	for (int k = 0; k < 3; k++)
 		for (size_t i = 0; clouds[k]->vector && i < clouds[k]->n; i++) {
 			const double size = length_of(clouds[k]->vector[i]);
-			if (size > 0 && size <= RENDER_MOST_VALUE) length[n++] = size;
+			if (size > 1 / RENDER_MOST_VALUE && size <= RENDER_MOST_VALUE) length[n++] = size;
 		}
 	const double longest = quern_render_quantile(length, n, usual);
 	free(length);

@@ -134,11 +134,14 @@ bool quern_render_links_read(render_frame *f, hid_t file, const char *path, quer
 
 /* ---- with the scene ---- */
 
-/* To the nearest place of the body, unless that is not what the grain touches. */
-static void reach_body(render_link *l, int dimension, const quern_filling *body, const quern_pose *pose) {
+/* The body's place that is nearest to the grain, of one feature or (NULL) of all, and the force along the way there; false
+ * if the grain does not touch it. */
+static bool find_place(const render_link *l, int dimension, const quern_filling *body, const quern_pose *pose,
+	const int32_t *feature, render_link *to) {
 	enum { ROOM = 8 }; /* columns are at least that long */
 	_Alignas(64) quern_real x[3][ROOM] = { 0 }, radius[ROOM] = { 0 }, gap[ROOM] = { 0 },
 							normal[3][ROOM] = { 0 }, velocity[3][ROOM] = { 0 };
+	_Alignas(64) int32_t which[ROOM] = { feature ? *feature : 0 };
 	for (int k = 0; k < 3; k++) x[k][0] = l->from[k];
 	radius[0] = l->radius;
 	const quern_body_batch batch = { .n = 1,
@@ -147,13 +150,30 @@ static void reach_body(render_link *l, int dimension, const quern_filling *body,
 		.pose = pose,
 		.position = { x[0], x[1], x[2] },
 		.radius = radius,
+		.feature = feature ? which : NULL,
 		.gap = gap,
 		.normal = { normal[0], normal[1], normal[2] },
 		.velocity = { velocity[0], velocity[1], velocity[2] } };
 	((const quern_body_ops *)body->instance->ops)->closest(body->instance->self, &batch);
-	if (!(fabs(gap[0]) < l->radius)) return;
-	for (int k = 0; k < dimension; k++) l->to[k] = l->from[k] - (l->radius + gap[0]) * normal[k][0];
-	set_force(l);
+	*to = *l;
+	for (int k = 0; k < dimension; k++) to->to[k] = l->from[k] - (l->radius + gap[0]) * normal[k][0];
+	set_force(to);
+	return fabs(gap[0]) < l->radius;
+}
+
+/* To where the grain touches the body. In an inside corner it touches several features, each with a force of its own: the
+ * frame does not say which is which, but a force presses most towards its own one. */
+static void reach_body(render_link *l, int dimension, const quern_filling *body, const quern_pose *pose) {
+	enum { MOST = 64 };
+	const quern_body_ops *ops = body->instance->ops;
+	int32_t feature[MOST];
+	render_link best = *l, to;
+	uint32_t n = 0, found = 0;
+	if (ops->features) n = ops->features(body->instance->self, pose, l->from, 2 * l->radius, MOST, feature);
+	for (uint32_t k = 0; k < n && k < MOST; k++)
+		if (find_place(l, dimension, body, pose, &feature[k], &to) && (!found++ || to.force > best.force))
+			best = to;
+	if (found || find_place(l, dimension, body, pose, NULL, &to)) *l = found ? best : to;
 }
 
 /* Two halves, one at each face, of a contact through faces that are periodic. */

@@ -96,20 +96,35 @@ def forged(folder, name, grains, contacts=None, touches=None, scene=BOX):
     return folder / name
 
 
+def drawn(frame, widest):
+    """Share of the widest line, and both ends in m, of each line of a frame in VIEW."""
+    page = frame.with_suffix(".svg")
+    run("render", frame, "--chains", "-o", page, "--view", ",".join(map(str, VIEW)), "--widest", widest)
+    return sorted((round(width / 16, 4), *sorted(tuple(np.round([at[0] / SCALE, VIEW[3] - at[1] / SCALE], 5)) for at in ends))
+                  for width, *ends in chains(page))
+
+
 def places(folder):
     """Where lines begin and end: grains, walls, periodic faces; what is listed twice; what pulls; friction does not tilt."""
     discs = [(0.02, 0.005, 0), (0.03, 0.005, 0), (0.003, 0.03, 0), (0.095, 0.03, 0)]
     frame = forged(folder, "places", discs, [(0, 1, (-2, 1, 0)), (0, 1, (-2, 1, 0)), (2, 3, (1, 0, 0)), (1, 2, (-3, 3, 0))],
                    [(0, 0, (1, 4, 0))])
-    run("render", frame, "--chains", "-o", folder / "places.svg", "--view", "0,0,0.1,0.05", "--widest", "4 N")
-    lines = chains(folder / "places.svg")
-    found = sorted((round(width / 16, 4), *sorted(tuple(np.round([at[0] / SCALE, VIEW[3] - at[1] / SCALE], 5)) for at in ends))
-                   for width, *ends in lines)
+    found = drawn(frame, "4 N")
     # the line between the first two is as wide as the force along it, and so is that to the floor, straight down
     wanted = sorted([(0.5, (0.02, 0.005), (0.03, 0.005)), (1.0, (0.02, 0.0), (0.02, 0.005)),
                      (0.25, (-0.001, 0.03), (0.003, 0.03)), (0.25, (0.095, 0.03), (0.099, 0.03))])
     assert found == wanted, f"{found}\nnot {wanted}"
     print("lines from centre to centre, to the wall, in halves through a periodic face, once each")
+
+
+def corner(folder):
+    """A disc in an inside corner touches both edges of one body: each force goes to its own, be there friction."""
+    angle = BOX.replace("{plane: {point: [0, 0], normal: [0, 1]}}",
+                        "{polygon: {vertices: [[0, 0], [0.1, 0], [0.1, 0.01], [0.02, 0.01], [0.02, 0.05], [0, 0.05]]}}")
+    frame = forged(folder, "corner", [(0.0249, 0.0149, 0)], touches=[(0, 0, (3, 1, 0)), (0, 0, (-1, 4, 0))], scene=angle)
+    found = drawn(frame, "4 N")
+    assert found == [(0.75, (0.02, 0.0149), (0.0249, 0.0149)), (1.0, (0.0249, 0.01), (0.0249, 0.0149))], found
+    print("a disc in a corner: a line to each of its walls")
 
 
 def vectors(folder):
@@ -167,5 +182,5 @@ def damage(folder):
 
 
 with tempfile.TemporaryDirectory() as at:
-    for test in (stacked, places, vectors, pages, damage):
+    for test in (stacked, places, corner, vectors, pages, damage):
         test(pathlib.Path(at))
