@@ -37,15 +37,19 @@ int quern_render_watch(const char *folder, int (*draw)(void *), void *arg) {
 	const struct timespec pause = { .tv_nsec = 200000000 };
 	const sigset_t stops = hold_signals();
 	int64_t drawn = -1;
-	for (int status = QUERN_EXIT_DONE;;) {
+	for (;;) {
 		/* first whether it goes on: what comes after the last look is drawn then */
 		const bool goes_on = is_at_work(folder);
 		const int64_t last = quern_render_frame_last(folder);
-		if (last != drawn || (!goes_on && last < 0)) {
-			status = draw(arg);
+		/* a run that begins anew has none for a while; where there never was one, drawing says so */
+		if (last < 0 ? drawn < 0 && !goes_on : last != drawn) {
+			const int status = draw(arg);
+			/* what it takes away under one's eyes is no fault */
+			if (status != QUERN_EXIT_DONE && (!goes_on || quern_render_frame_last(folder) == last))
+				return status;
 			drawn = last;
 		}
-		if (!goes_on || status != QUERN_EXIT_DONE) return status;
+		if (!goes_on) return QUERN_EXIT_DONE;
 		if (sigtimedwait(&stops, NULL, &pause) > 0) return QUERN_EXIT_INTERRUPTED;
 	}
 }

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """`quern render`: pictures of frames of every sort, looked at pixel by pixel, and its refusals."""
+import fcntl
 import json
 import pathlib
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -171,6 +173,25 @@ def watching(folder):
     print(f"watched: {drawn} pictures, the last one of the last frame")
 
 
+def begins_anew(folder):
+    """A run that somebody starts anew by --force has no frames for a while: whoever watches waits for the next one."""
+    out, picture = folder / "anew", folder / "anew.png"
+    write_frame(out, 2, "old", cloud(30, 0.5), 3)
+    with open(out / ".quern.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        watch = subprocess.Popen([str(QUERN), "render", str(out), "--watch", "--width", "600", "-o", str(picture)], stdout=subprocess.DEVNULL)
+        until_true(lambda: inode(picture))
+        before = inode(picture)
+        shutil.rmtree(out / "frames")
+        time.sleep(0.5)
+        assert watch.poll() is None, "it does not wait for the first frame"
+        write_frame(folder / "aside", 2, "new", cloud(30, 0.5), 0)
+        (folder / "aside/frames").rename(out / "frames")
+        until_true(lambda: inode(picture) != before)
+    assert watch.wait(timeout=20) == 0
+    print("a run that begins anew is watched on")
+
+
 def refusals(folder):
     damaged = folder / "damaged/frames"
     damaged.mkdir(parents=True)
@@ -193,6 +214,7 @@ def refusals(folder):
                                 ([folder / "h2", "--view", "0,0,1"], 1, "needs 4 numbers between commas, found 3"),
                                 ([folder / "h3", "--view", "0,0,1,1"], 1, "needs 6 numbers"),
                                 ([folder / "h2", "--view", "1,0,0,1"], 1, "give the lower corner first"),
+                                ([folder / "h2", "--view", "0,0,1e-310,1e-310"], 1, "nothing lies between"),
                                 ([folder / "h2", "--view", "0,0,1 s,1"], 1, "1 s"),
                                 ([folder / "h2", "--view", "0,0,1e99,1"], 1, "beyond"),
                                 ([folder / "h2", "--range", "1,1"], 1, "give the lower end first"),
@@ -214,4 +236,5 @@ with tempfile.TemporaryDirectory() as name:
     pictures(pathlib.Path(name))
     views(pathlib.Path(name))
     watching(pathlib.Path(name))
+    begins_anew(pathlib.Path(name))
     refusals(pathlib.Path(name))
