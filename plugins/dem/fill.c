@@ -355,6 +355,7 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 		for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++)
 			if (item[i].fixed == fixed) status = fill_item(f, i);
 	if (status != QUERN_OK) return status;
+	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
 	if (!f->n && !d->source.n && d->from && !d->fill.n)
 		return s->host->stop(s->run, QUERN_E_PARAM, "from", -1,
 			"that state has no grains left: name a frame from before, RUN:FRAME, or give a source");
