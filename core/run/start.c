@@ -39,7 +39,7 @@ void quern_start_let_go(quern_run *run) {
 char *quern_start_held(const quern_run *run, const char *path) {
 	for (size_t i = 0; run->held && i < run->scene->n_sections; i++)
 		if (run->held[i].file >= 0 && !strcmp(run->held[i].path, path))
-			return quern_format("/proc/self/fd/%d", run->held[i].file);
+			return quern_start_file_name(&run->held[i]);
 	return quern_copy(path);
 }
 
@@ -364,7 +364,7 @@ static void note_plugins(starting *s) {
 static quern_status start(quern_run *run, const quern_section *section, const char *path, bool rest) {
 	starting s = { .run = run, .section = section, .path = path };
 	const char **groups = groups_of(&s);
-	const hid_t held = run->held ? run->held[section - run->scene->sections].h5 : -1;
+	const quern_held *held = run->held ? &run->held[section - run->scene->sections] : NULL;
 	const bool good =
 		quern_start_file_open(&s.file, path, held, groups, &s.why) && scenes_fit(&s) && take_sets(&s, rest);
 	if (good) tell(&s, rest), note_plugins(&s);

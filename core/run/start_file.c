@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -23,6 +24,27 @@ static bool is_plain_hdf5(const char *path) {
 	return plain;
 }
 
+/* HDF5 opens files by their names alone, and what has that name may be another file by then: what is held is read from
+ * memory. */
+static hid_t open_image(int fd) {
+	struct stat is;
+	if (fstat(fd, &is) || is.st_size <= 0) return -1;
+	const size_t size = (size_t)is.st_size;
+	void *image = mmap(NULL, size, PROT_READ, MAP_PRIVATE, fd, 0);
+	if (image == MAP_FAILED) return -1;
+	const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+	hid_t file = -1;
+	if (H5Pset_fapl_core(access, 1 << 20, 0) >= 0 && H5Pset_file_image(access, image, size) >= 0)
+		file = H5Fopen("frame", H5F_ACC_RDONLY, access);
+	H5Pclose(access);
+	munmap(image, size);
+	return file;
+}
+
+static hid_t open_plain(const char *path, const quern_held *held) {
+	return held && held->file >= 0 ? open_image(held->file) : H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+}
+
 static bool read_head(quern_start_file *f) {
 	const hid_t file = f->h5.file;
 	char is[32];
@@ -34,6 +56,7 @@ static bool read_head(quern_start_file *f) {
 
 typedef struct {
 	const char *path, *const *sets;
+	const quern_held *held;
 } trial;
 
 static herr_t try_field(hid_t group, const char *name, const H5L_info_t *info, void *arg) {
@@ -56,7 +79,7 @@ static herr_t try_field(hid_t group, const char *name, const H5L_info_t *info, v
 static void try_reading(void *arg) {
 	const trial *t = arg;
 	if (!freopen("/dev/null", "w", stderr)) return;
-	const hid_t file = H5Fopen(t->path, H5F_ACC_RDONLY, H5P_DEFAULT);
+	const hid_t file = open_plain(t->path, t->held);
 	if (file >= 0) read_head(&(quern_start_file) { .h5 = { .file = file } });
 	for (const char *const *set = t->sets; file >= 0 && *set; set++) {
 		const hid_t group = quern_h5_find(file, *set);
@@ -67,31 +90,35 @@ static void try_reading(void *arg) {
 	if (file >= 0) H5Fclose(file);
 }
 
-static bool can_be_read(const char *path, const char *const *sets, quern_text *why) {
-	trial t = { path, sets };
+static bool can_be_read(trial t, quern_text *why) {
 	if (quern_child_is_one()) return true;
 	const quern_child how = quern_child_run(try_reading, &t, SECONDS);
+	char what[80];
 	if (how.end == QUERN_CHILD_DONE || how.end == QUERN_CHILD_NONE) return true;
-	quern_text_add(why, "it is damaged: the library that reads it does not come to an end");
+	quern_child_say(&how, SECONDS, what);
+	quern_text_add(why, "it is damaged: reading it %s", what);
 	return false;
 }
 
 /* A frame of a run lies in RUN/frames; elsewhere it is a copy, and what lies beside that is another scene. */
 static quern_tree *scene_beside(const char *path, quern_report *report) {
-	static const char own[] = "/frames";
+	static const char own[] = "frames";
+	enum { LENGTH = sizeof own - 1 };
 	const char *slash = strrchr(path, '/');
 	const size_t n = slash ? (size_t)(slash - path) : 0;
-	if (n < sizeof own - 1 || strncmp(slash - (sizeof own - 1), own, sizeof own - 1) != 0) return NULL;
-	char *name = quern_format("%.*s/../scene.yaml", slash ? (int)(slash - path) : 1, slash ? path : ".");
+	if (n < LENGTH || strncmp(slash - LENGTH, own, LENGTH) != 0) return NULL;
+	if (n > LENGTH && slash[-LENGTH - 1] != '/') return NULL;
+	char *name = quern_format("%.*s/../scene.yaml", (int)n, path);
 	quern_tree *tree = access(name, R_OK) ? NULL : quern_tree_read(name, report);
 	free(name);
 	return tree;
 }
 
-static bool open_frame(quern_start_file *f, const char *path, const char *const *sets, quern_text *why) {
+static bool open_frame(
+	quern_start_file *f, const char *path, const quern_held *held, const char *const *sets, quern_text *why) {
 	f->frame = true;
-	if (!can_be_read(path, sets, why)) return false;
-	f->h5.file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+	if (!can_be_read((trial) { path, sets, held }, why)) return false;
+	f->h5.file = open_plain(path, held);
 	const bool good = f->h5.file >= 0 && read_head(f);
 	if (!good) return quern_text_add(why, "it is no frame of this program, or it is damaged"), false;
 	quern_report *report = quern_report_create();
@@ -127,9 +154,9 @@ static bool read_time(quern_start_file *f) {
 	return true;
 }
 
-static bool open_checkpoint(quern_start_file *f, const char *path, hid_t held, quern_text *why) {
+static bool open_checkpoint(quern_start_file *f, const char *path, const quern_held *held, quern_text *why) {
 	char is[32], broken[256];
-	if (held >= 0) f->h5.file = H5Freopen(held);
+	if (held && held->h5 >= 0) f->h5.file = H5Freopen(held->h5);
 	else if (!quern_h5_open(&f->h5, path, broken)) return quern_text_add(why, "%s", broken), false;
 	const hid_t file = f->h5.file;
 	bool good = quern_h5_read_text(file, "format", is, sizeof is) && !strcmp(is, "quern-checkpoint 3");
@@ -144,17 +171,20 @@ static bool open_checkpoint(quern_start_file *f, const char *path, hid_t held, q
 
 /* ---- one moment of a run that is still at work ---- */
 
+char *quern_start_file_name(const quern_held *held) { return quern_format("/proc/self/fd/%d", held->file); }
+
 /* HDF5 opens files by their names alone, so that the one which was opened may be another by then. */
 static bool open_held(quern_held *held, const char *path) {
 	char why[256];
 	quern_h5 h;
 	held->file = quern_open_file(path);
-	if (held->file < 0 || is_plain_hdf5(path)) return true;
-	char *name = quern_format("/proc/self/fd/%d", held->file);
-	if (quern_h5_open(&h, name, why)) held->h5 = h.file;
+	if (held->file < 0) return true;
+	char *name = quern_start_file_name(held);
+	const bool frame = is_plain_hdf5(name);
+	if (!frame && quern_h5_open(&h, name, why)) held->h5 = h.file;
 	free(name);
 	struct stat is, was;
-	return held->h5 >= 0 || stat(path, &is) || fstat(held->file, &was) || is.st_ino == was.st_ino;
+	return frame || held->h5 >= 0 || stat(path, &is) || fstat(held->file, &was) || is.st_ino == was.st_ino;
 }
 
 quern_held quern_start_file_hold(const char *path) {
@@ -172,11 +202,13 @@ void quern_start_file_let_go(quern_held *held) {
 /* ---- both ---- */
 
 bool quern_start_file_open(
-	quern_start_file *f, const char *path, hid_t held, const char *const *sets, quern_text *why) {
+	quern_start_file *f, const char *path, const quern_held *held, const char *const *sets, quern_text *why) {
 	*f = (quern_start_file) { .h5 = { .file = -1 } };
-	const bool frame = held < 0 && is_plain_hdf5(path);
-	const bool good = frame ? open_frame(f, path, sets, why) : open_checkpoint(f, path, held, why);
+	char *name = held && held->file >= 0 ? quern_start_file_name(held) : quern_copy(path);
+	const bool good =
+		is_plain_hdf5(name) ? open_frame(f, path, held, sets, why) : open_checkpoint(f, path, held, why);
 	if (!f->scene) f->scene = quern_take(1, sizeof *f->scene);
+	free(name);
 	return good;
 }
 

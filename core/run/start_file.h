@@ -22,11 +22,12 @@ typedef struct quern_held {
 } quern_held;
 quern_held quern_start_file_hold(const char *path); /* NULL: nothing */
 void quern_start_file_let_go(quern_held *);
+char *quern_start_file_name(const quern_held *); /* by which its bytes are read; malloc'ed */
 
-/* False with a reason; finish it in any case. `held`: of a checkpoint, what is held of it; -1: it is read from `path`.
- * `sets`: of a frame those that a child reads first, since it has no checksum; NULL-terminated, as the file calls them. */
+/* False with a reason; finish it in any case. `held`: what is held of it; NULL: it is read from `path`. `sets`: of a frame
+ * those that a child reads first, since it has no checksum; NULL-terminated, as the file calls them. */
 bool quern_start_file_open(
-	quern_start_file *, const char *path, hid_t held, const char *const *sets, quern_text *why);
+	quern_start_file *, const char *path, const quern_held *held, const char *const *sets, quern_text *why);
 void quern_start_file_finish(quern_start_file *);
 
 /* The group of a set and how many entries it has; below 0 if there is none, or none that makes sense. */

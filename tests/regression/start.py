@@ -297,6 +297,13 @@ def put(name, value):
     return change
 
 
+def within(place, flat):
+    """A frame is its run's also where it is named from within the run's folder."""
+    write(place / "elastic", "within", flat.replace("from: elastic", "from: frames/000004.h5").replace("cell: 0.1", "cell: 0.05"))
+    done = subprocess.run([lab.QUERN, "plan", "within.yaml"], cwd=place / "elastic", capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and "continuum.cell was 0.1 and is 0.05" in done.stderr, done.stderr
+
+
 def what_does_not_fit(place):
     bed = started(BED, "bed", 0.25, "[4, -9]")
     flat = started(layer(2, ELASTIC), "elastic", 0.25, "[2, -10]")
@@ -310,6 +317,7 @@ def what_does_not_fit(place):
     refused(place, "other_kind", flat.replace("from: elastic", "from: bed"), "it holds no points")
     refused(place, "both", layer(2, ELASTIC).replace("  fill:", f"  from: {place / 'elastic'}\n  fill:"), "from", "fill")
     refused(place, "cell", flat.replace("cell: 0.1", "cell: 0.05"), "continuum.cell was 0.1 and is 0.05")
+    within(place, flat)
     refused(place, "narrow", bed.replace("upper: [0.25, 0.25]", "upper: [0.2, 0.25]"), "lies outside of the domain")
     refused(place, "short", flat.replace("upper: [2, 1]", "upper: [0.4, 1]"), "lies outside of the domain")
     refused(place, "body", bed.replace("output:", "  - {box: {lower: [0.1, 0], upper: [0.15, 0.05]}}\noutput:"), "starts in body 3, a body.box")

@@ -6,6 +6,7 @@ import pathlib
 import re
 import shutil
 import threading
+import time
 
 import h5py
 import numpy
@@ -113,27 +114,29 @@ def huge_numbers(place):
 
 
 def still_at_work(place):
-    """A run whose checkpoint is replaced all the time: what is known of the state, what is read and what is copied are one moment's."""
-    moments = []
+    """A run whose files are replaced all the time: what is known of the state, what is read and what is copied are one moment's."""
+    work, ends, files = place / "work", threading.Event(), {"checkpoint.h5": [], "frames/000000.h5": []}
     for k in range(2):
         lab.run(place / "bed.yaml", place / f"moment{k}", f"--set=time.end={0.03125 * (k + 1)}")
-        moments.append((place / f"moment{k}" / "checkpoint.h5").read_bytes())
-    work, ends = place / "work", threading.Event()
-    work.mkdir()
-    (work / "checkpoint.h5").write_bytes(moments[0])
+        for path, moments in files.items():
+            moments.append((lab.frames(place / f"moment{k}")[-1] if "/" in path else place / f"moment{k}" / path).read_bytes())
+    (work / "frames").mkdir(parents=True)
 
     def replace():
         k = 0
         while not ends.is_set():
             k += 1
-            (work / "part").write_bytes(moments[k % 2])
-            os.replace(work / "part", work / "checkpoint.h5")
+            for path, moments in files.items():
+                (work / "part").write_bytes(moments[k % 2])
+                os.replace(work / "part", work / path)
 
     writer = threading.Thread(target=replace)
     writer.start()
     try:
-        scene = write(place, "watches", started(BED, "work", 0.03125, REST))
+        while not (work / "frames/000000.h5").exists():
+            time.sleep(0.01)
         for k in range(12):
+            scene = write(place, f"watches{k}", started(BED, "work:0" if k % 2 else "work", 0.03125, REST))
             lab.run(scene, place / f"watches{k}", "--until=0")
     finally:
         ends.set()
