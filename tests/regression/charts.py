@@ -310,9 +310,9 @@ def check_faults(here):
         assert said in text, f"{words}\n{text}"
     for words in (["--series", "energy.grains,energy.stored"], ["--profile", "profile.x", "--frame", "3"], ["--distribution", "grain.radius"],
                   ["--line", "grain.velocity.x", "--from", "-50mm,0", "--to", "50 mm,0"]):
-        for kind in ("svg", "pdf"):
-            call("chart", run, *words, "-o", here / f"run.{kind}")
-            assert (here / f"run.{kind}").stat().st_size > 3000
+        kind = "pdf" if "--profile" in words else "svg"
+        call("chart", run, *words, "-o", here / f"run.{kind}")
+        assert (here / f"run.{kind}").stat().st_size > 3000
     other = study.read_text()
     study.write_text(other.replace("- 0.7", "- 0.71", 1).replace("restitution: 0.7", "restitution: 0.71"))
     assert "is of another form of the study" in call("chart", study, "-o", out, status=2)
