@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { MOST_ENTRIES = 1 << 30, MOST_TEXT = 1 << 26, SECONDS = 600, MOST_TRIES = 100 };
+enum { MOST_ENTRIES = 1 << 30, MOST_TEXT = 1 << 26, SECONDS = 600, MOST_TRIES = 1000 };
 static const int64_t most_id = (int64_t)1 << 53;
 
 /* ---- frames ---- */

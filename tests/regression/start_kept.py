@@ -129,6 +129,7 @@ def still_at_work(place):
             for path, moments in files.items():
                 (work / "part").write_bytes(moments[k % 2])
                 os.replace(work / "part", work / path)
+            time.sleep(2e-4)
 
     writer = threading.Thread(target=replace)
     writer.start()
