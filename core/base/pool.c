@@ -34,7 +34,7 @@ struct quern_pool {
 	void (*_Atomic body)(void *, uint32_t, uint32_t);
 	void *_Atomic arg;
 	_Atomic bool stop, caller_waits, busy;
-	_Atomic uint32_t asleep;
+	_Atomic uint32_t asleep, begun;
 	pthread_mutex_t lock;
 	pthread_cond_t work, end;
 	uint32_t workers, started;
@@ -80,6 +80,7 @@ static void *help(void *arg) {
 	const helper *h = arg;
 	quern_pool *p = h->pool;
 	uint32_t round = 0;
+	atomic_fetch_add(&p->begun, 1);
 	for (;;) {
 		WAIT_WHILE(round_of(atomic_load(&p->ticket)) == round && !atomic_load(&p->stop))
 		if (round_of(atomic_load(&p->ticket)) == round) {
@@ -118,6 +119,9 @@ static void start(quern_pool *p) {
 	}
 	pthread_sigmask(SIG_SETMASK, &before, NULL);
 	p->workers = p->started + 1;
+#ifdef QUERN_SANITIZED /* a child that is forked while a thread begins would find the sanitizer's allocator locked */
+	while (atomic_load(&p->begun) < p->started) sched_yield();
+#endif
 }
 
 static uint32_t wished(uint32_t workers) {
