@@ -31,6 +31,10 @@ typedef struct quern_material_ops {
 	void (*assign[2])(const void *self, const quern_material_batch *);
 	/* [setup] moduli for step limits (Pa) and the density without stress (kg/m^3) */
 	void (*moduli)(const void *self, uint32_t dim, quern_real *bulk, quern_real *shear, quern_real *density);
+	/* since 2.1; NULL: none. [setup] shear stress over pressure in steady flow, slow + (fast - slow)/(1 + number/I) with the
+	 * inertial number I = rate x diameter x sqrt(density/pressure); density, kg/m^3, is that of a grain */
+	void (*friction)(const void *self, uint32_t dim, quern_real *slow, quern_real *fast, quern_real *number,
+		quern_real *density);
 } quern_material_ops;
 
 QUERN_KIND(material, quern_material_ops, "The stress of a continuum.", QUERN_EACH(quern_material_ops, update),

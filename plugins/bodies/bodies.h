@@ -15,6 +15,7 @@ typedef struct body_item {
 	const char *name;    /* NULL: it has none */
 	body_motion motion;
 	const char *material; /* a word; NULL: it has none */
+	quern_real slip;      /* grain diameters, of a rough boundary; NaN: it is none */
 } body_item;
 
 enum { BODY_WORDS = 120 };

@@ -5,6 +5,7 @@
 #include "../common/account.h"
 #include "../common/source.h"
 #include "../common/tools.h"
+#include "rough.h"
 #include "rows.h"
 #include <quern/grid.h>
 #include <quern/material.h>
@@ -23,6 +24,8 @@ typedef struct mpm {
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
 	quern_real share_wall, share_next;          /* of a wall's nodes */
 	uint32_t dim;
+	bool rough; /* a body is */
+	rough_law rubbing;
 } mpm;
 
 enum { STRESS_NONE, STRESS_AT_REST };
@@ -37,10 +40,11 @@ typedef struct mpm_fill {
 
 enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
 
-/* Lanes of a node's row (mass, momentum, force) and of its motion (velocity, change, density). */
+/* Lanes of a node's row (mass, momentum, force) and of its motion (velocity, change, density, grip). */
 QUERN_INLINE uint32_t node_force(uint32_t dim) { return 1 + dim; }
 QUERN_INLINE uint32_t motion_change(uint32_t dim) { return dim; }
 QUERN_INLINE uint32_t motion_density(uint32_t dim) { return 2 * dim; }
+QUERN_INLINE uint32_t motion_grip(uint32_t dim) { return 2 * dim + 1; }
 
 quern_status quern_mpm_fill(const void *self, const quern_step *);
 /* The n points of another run's state, which are there before the fill: checks and adopts them. */

@@ -16,6 +16,7 @@ typedef struct {
 	uint32_t n_bodies;
 	const body_pose *pose; /* by body */
 	bool twists;           /* moments and work are booked too */
+	bool again;            /* after a coupling */
 	body_books books;      /* on the material; the last one of a block: by faces and for light nodes */
 } grid_work;
 
@@ -23,11 +24,11 @@ typedef struct {
 	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
 } near_nodes;
 
-/* Volume of a node over that of one inside: less at and next to a wall. */
-static quern_real node_share(const grid_work *w, const int32_t at[3]) {
+/* Volume of a node over that of one inside, along all axes but one: less at and next to a wall. */
+static quern_real node_share(const grid_work *w, const int32_t at[3], uint32_t but) {
 	quern_real share = 1;
 	for (uint32_t k = 0; k < w->g->dim; k++) {
-		if (w->g->periodic[k]) continue;
+		if (w->g->periodic[k] || k == but) continue;
 		const int32_t from_wall = at[k] < w->g->cells[k] - at[k] ? at[k] : w->g->cells[k] - at[k];
 		if (from_wall == 0) share *= w->p->share_wall;
 		else if (from_wall == 1) share *= w->p->share_next;
@@ -42,6 +43,45 @@ QUERN_INLINE void change_velocity(
 	(*motion)[k] = v;
 	(*motion)[motion_change(dim) + k] += jump;
 	impulse[k] += mass * jump;
+}
+
+/* m^2 (2-D: m): the part of a body's surface that the node bears. Nodes of one column along the axis that the normal is
+ * nearest to share the column's part; where more than one of them is in the body each is taken for the only one. */
+static quern_real node_area(const grid_work *w, const near_nodes *n, uint32_t b, uint32_t i) {
+	uint32_t axis = 0;
+	quern_real area = 1;
+	int32_t at[3];
+	quern_grid_cell_of(w->g, b * N + i, at);
+	for (uint32_t k = 1; k < w->g->dim; k++) {
+		if (fabs(n->normal[k][i]) > fabs(n->normal[axis][i])) axis = k;
+		area *= w->g->cell;
+	}
+	return area * node_share(w, at, axis) / fabs(n->normal[axis][i]);
+}
+
+/* Between slip and sticky: what presses the node on the body lets it rub. After a coupling that is what has come since;
+ * of what sticking has not used before, `grip` is the rest. */
+static void rub_node(const grid_work *w, const body_item *item, const near_nodes *n, uint32_t b, uint32_t i,
+	quern_real mass, quern_row *motion, quern_real *impulse) {
+	const uint32_t dim = w->s->dim;
+	quern_real into = 0, along2 = 0, along[3] = { 0 };
+	for (uint32_t k = 0; k < dim; k++) into += ((*motion)[k] - n->velocity[k][i]) * n->normal[k][i];
+	const quern_real pressed = into < 0 ? -into : 0, grip = w->again ? (*motion)[motion_grip(dim)] : 0;
+	if (!(pressed > 0 || grip > 0)) return;
+	for (uint32_t k = 0; k < dim; k++) {
+		along[k] = (*motion)[k] - n->velocity[k][i] - into * n->normal[k][i];
+		along2 += along[k] * along[k];
+	}
+	const rough_law *law = &w->p->rubbing;
+	const quern_real speed = sqrt(along2), moving = speed > grip ? speed - grip : 0;
+	const quern_real pressure = mass * pressed / (node_area(w, n, b, i) * w->s->dt);
+	const quern_real left = rough_slide(law, rough_half(law, item->slip, pressure), moving, pressed);
+	const quern_real kept = speed > 0 ? left / speed : 0, unused = pressed * law->slow + grip - speed;
+	for (uint32_t k = 0; k < dim; k++)
+		change_velocity(motion, k, dim,
+			n->velocity[k][i] + kept * along[k] + (into + pressed) * n->normal[k][i], mass, impulse);
+	if (!w->again) (*motion)[motion_grip(dim)] += unused > 0 ? unused : 0;
+	else (*motion)[motion_grip(dim)] = unused > 0 ? unused : 0;
 }
 
 static void meet_body(const body_item *item, const near_nodes *n, uint32_t i, uint32_t dim, quern_real mass,
@@ -64,12 +104,13 @@ static void meet_body(const body_item *item, const near_nodes *n, uint32_t i, ui
 }
 
 /* The same, with the moment of what it takes and the work that this does, if somebody asks for them. */
-static void touch_node(const grid_work *w, uint32_t j, const near_nodes *n, uint32_t i, quern_real mass,
-	quern_row *motion, quern_real *booked) {
+static void touch_node(const grid_work *w, uint32_t j, const near_nodes *n, uint32_t b, uint32_t i,
+	quern_real mass, quern_row *motion, quern_real *booked) {
 	const body_item *item = w->s->slot[SLOT_BODIES][j].item;
 	const uint32_t dim = w->s->dim;
 	quern_real given[3] = { 0 };
-	meet_body(item, n, i, dim, mass, motion, given);
+	if (isnan(item->slip)) meet_body(item, n, i, dim, mass, motion, given);
+	else rub_node(w, item, n, b, i, mass, motion, given);
 	for (uint32_t k = 0; k < dim; k++) booked[B_IMPULSE + k] += given[k];
 	if (!w->twists) return;
 	quern_real x[3] = { 0 };
@@ -132,7 +173,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 		for (uint32_t i = 0; i < N; i++) {
 			const quern_real mass = w->node[(size_t)b * N + i][0];
 			if (mass > 0 && n->gap[i] <= 1e-9 * w->g->cell)
-				touch_node(w, j, n, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
+				touch_node(w, j, n, b, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
 		}
 	}
 }
@@ -189,7 +230,7 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 			out[motion_change(dim) + k] = change;
 			left[k] -= mass > cut ? 0 : s->dt * force * (1 - mass * limited);
 		}
-		out[motion_density(dim)] = mass > 0 ? mass / (volume * node_share(w, at)) : 0;
+		out[motion_density(dim)] = mass > 0 ? mass / (volume * node_share(w, at, 3)) : 0;
 		w->motion[(size_t)b * N + i] = out;
 	}
 	meet_walls(arg, b, worker);
@@ -218,7 +259,7 @@ quern_status quern_mpm_nodes(const void *self, const quern_step *s) {
 
 /* Without a coupling in between, the conditions still hold. */
 quern_status quern_mpm_walls(const void *self, const quern_step *s) {
-	grid_work w = { .p = self, .s = s };
+	grid_work w = { .p = self, .s = s, .again = true };
 	if (!s->host->has(s->run, "hybrid")) return QUERN_OK;
 	w.twists = s->use[WALLS_TWIST].real[0] || s->use[WALLS_WORK].real[0];
 	if (!prepare(&w, s->use[WALLS_NODE], s->use[WALLS_MOTION])) return QUERN_E_MEMORY;

@@ -86,7 +86,9 @@ QUERN_USE_ENUM(SCATTER_USES);
 	X(NODES_DENSITY, "motion.density", "kg/m^3", QUERN_WRITE, QUERN_SCALAR, \
 		.doc = "Mass of a node over its volume.") \
 	X(NODES_NODE_MOMENTUM, "node.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
-	X(NODES_NODE_FORCE, "node.force", "N", QUERN_READ, QUERN_VECTOR)
+	X(NODES_NODE_FORCE, "node.force", "N", QUERN_READ, QUERN_VECTOR) \
+	X(NODES_GRIP, "motion.grip", "m/s", QUERN_WRITE, QUERN_SCALAR, .when = "rough", \
+		.doc = "Change of velocity that rough bodies could still have held.")
 QUERN_USE_ENUM(NODES_USES);
 
 #define WALLS_USES(X) \
@@ -96,7 +98,8 @@ QUERN_USE_ENUM(NODES_USES);
 	X(WALLS_FACES, FACES_USE) \
 	X(WALLS_TWIST, TWIST_USE) \
 	X(WALLS_WORK, WORK_USE) \
-	X(WALLS_CHANGE, "motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR)
+	X(WALLS_CHANGE, "motion.change", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(WALLS_GRIP, "motion.grip", "m/s", QUERN_UPDATE, QUERN_SCALAR, .when = "rough")
 QUERN_USE_ENUM(WALLS_USES);
 
 /* point.affine is written if somebody wants it sent; that it shall be written out does not make it */

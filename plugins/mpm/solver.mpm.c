@@ -42,6 +42,9 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, sources, NULL, "Keep books of sources; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, rough, NULL,
+		"Remember what rough bodies could still hold; set by itself where there is one.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
 		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
@@ -226,6 +229,26 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
+/* A rough body rubs as the material does, which must have a friction for that. */
+static quern_status find_rough(mpm *p, const quern_setup *setup, const quern_bound *material,
+	const quern_bound *body, uint32_t n, quern_err *err) {
+	const quern_material_ops *ops = material->ops;
+	char word[BODY_WORDS];
+	for (uint32_t i = 0; i < n; i++) {
+		if (isnan(((const body_item *)body[i].item)->slip)) continue;
+		if (!ops->friction)
+			return setup->host->fail(err, QUERN_E_PARAM, "material",
+				"%s has no friction, by which %s, which is rough, could rub: take mu_i, or make it sticky or "
+				"frictional",
+				material->id, quern_body_say(&body[i], i, word));
+		p->rough = true;
+	}
+	rough_law *law = &p->rubbing;
+	if (p->rough)
+		ops->friction(material->self, setup->dim, &law->slow, &law->fast, &law->number, &law->density);
+	return QUERN_OK;
+}
+
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	mpm *p = self;
@@ -253,6 +276,8 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
+	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)
+		return QUERN_E_PARAM;
 	setup->host->publish(setup, "continuum.density", "kg/m^3", p->density);
 	setup->host->publish(setup, "continuum.bulk_modulus", "Pa", p->bulk);
 	return QUERN_OK;

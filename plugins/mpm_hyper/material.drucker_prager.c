@@ -181,10 +181,20 @@ static void moduli(const void *self, uint32_t dim, quern_real *bulk, quern_real 
 	*density = law->density;
 }
 
+static void friction(const void *self, uint32_t dim, quern_real *slow, quern_real *fast, quern_real *number,
+	quern_real *density) {
+	const drucker_prager *law = self;
+	(void)dim;
+	*slow = *fast = law->friction;
+	*number = 0;
+	*density = law->density;
+}
+
 static const quern_material_ops ops = { .size = sizeof ops,
 	.update = { update_2d, update_3d },
 	.assign = { assign_2d, assign_3d },
-	.moduli = moduli };
+	.moduli = moduli,
+	.friction = friction };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
