@@ -24,7 +24,7 @@ typedef struct mpm {
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
 	quern_real share_wall, share_next;          /* of a wall's nodes */
 	uint32_t dim;
-	bool rough; /* a body is */
+	bool rough, still; /* whether a body is */
 	rough_law rubbing;
 } mpm;
 
@@ -56,3 +56,4 @@ quern_status quern_mpm_scatter(const void *self, const quern_step *);
 quern_status quern_mpm_nodes(const void *self, const quern_step *);
 quern_status quern_mpm_walls(const void *self, const quern_step *);
 quern_status quern_mpm_gather(const void *self, const quern_step *);
+quern_status quern_mpm_hold(const void *self, const quern_step *);

@@ -45,6 +45,8 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, rough, NULL,
 		"Remember what rough bodies could still hold; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, still, NULL, "Keep points out of bodies; set by itself where one stands still.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
 		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
@@ -105,6 +107,7 @@ static const quern_slot slots[] = { { .name = "source.region",
 static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
 static const quern_use pour_uses[] = QUERN_USE_ROWS(POUR_USES);
 static const quern_use outlet_uses[] = QUERN_USE_ROWS(OUTLET_USES);
+static const quern_use hold_uses[] = QUERN_USE_ROWS(HOLD_USES);
 static const quern_use sort_uses[] = QUERN_USE_ROWS(SORT_USES);
 static const quern_use scatter_uses[] = QUERN_USE_ROWS(SCATTER_USES);
 static const quern_use nodes_uses[] = QUERN_USE_ROWS(NODES_USES);
@@ -149,6 +152,12 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 		.phase = QUERN_ADVANCE,
 		.uses = gather_uses,
 		.run = quern_mpm_gather },
+	{ .name = "mpm.hold",
+		.doc = "Keeps points out of bodies.",
+		.phase = QUERN_ADVANCE,
+		.uses = hold_uses,
+		.run = quern_mpm_hold,
+		.when = "still" },
 	{ .name = "mpm.outlets",
 		.doc = "Takes out what has passed an open face.",
 		.phase = QUERN_ADVANCE,
@@ -243,6 +252,8 @@ static quern_status find_rough(mpm *p, const quern_setup *setup, const quern_bou
 				material->id, quern_body_say(&body[i], i, word));
 		p->rough = true;
 	}
+	for (uint32_t i = 0; i < n; i++)
+		p->still = p->still || !quern_motion_is_any(&((const body_item *)body[i].item)->motion);
 	rough_law *law = &p->rubbing;
 	if (p->rough)
 		ops->friction(material->self, setup->dim, &law->slow, &law->fast, &law->number, &law->density);
