@@ -29,9 +29,9 @@ static const quern_param rows[] = {
 	QUERN_PARAM_AS(body_item, friction, "boundary.frictional", "1",
 		"Coulomb friction on the continuum's grid, in place of slip or sticky.", .flags = QUERN_MAYBE,
 		.min = 0, .max = 100),
-	QUERN_PARAM_AS(body_item, slip, "boundary.rough.slip_length", "1",
-		"Friction on the continuum's grid that grows with the speed as the material's own does with its rate, in "
-		"place of slip or sticky: the speed along the body is that over so many grain diameters inside.",
+	QUERN_PARAM_AS(body_item, slip, "boundary.rough", "1",
+		"Slip length in grain diameters, in place of slip or sticky: friction that grows with the speed as the "
+		"material's own does with its rate, so that the speed along the body is that over so many diameters inside.",
 		.flags = QUERN_MAYBE, .unless = "boundary.frictional", .min = 0, .max = 1e6),
 	QUERN_PARAM(body_item, name, NULL, "A word that messages call it by, and observers may: its own.",
 		.flags = QUERN_MAYBE),

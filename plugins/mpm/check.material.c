@@ -124,7 +124,7 @@ static double stress_size(const quern_check_kernel *k, uint32_t i, bool found) {
 }
 
 typedef struct {
-	quern_check_tally moduli, again, held, yields, turned, violent;
+	quern_check_tally moduli, friction, again, held, yields, turned, violent;
 } tallies;
 
 static void check_moduli(const quern_check_kernel *assign, tallies *t) {
@@ -132,6 +132,17 @@ static void check_moduli(const quern_check_kernel *assign, tallies *t) {
 	assign->host->expect(&t->moduli,
 		m.bulk > 0 && m.shear >= 0 && m.density > 0 && isfinite(m.bulk + m.shear + m.density),
 		"%u-D: bulk %.3g Pa, shear %.3g Pa, density %.3g kg/m^3", assign->dim, m.bulk, m.shear, m.density);
+}
+
+/* What a rough boundary takes, where there is one. */
+static void check_friction(const quern_check_kernel *k, tallies *t) {
+	quern_real slow = 0, fast = 0, number = 0, density = 1;
+	const quern_material_ops *ops = k->ops;
+	if (ops->friction) ops->friction(k->self, k->dim, &slow, &fast, &number, &density);
+	k->host->expect(&t->friction,
+		slow >= 0 && fast >= slow && number >= 0 && density > 0 && isfinite(fast + number + density),
+		"%u-D: from %.3g to %.3g with I_0 = %.3g and grains of %.3g kg/m^3; it must not fall with the rate",
+		k->dim, slow, fast, number, density);
 }
 
 /* Assigned twice is assigned once; without stress the density is that of moduli(), and pressure raises it by 1/K. */
@@ -266,6 +277,7 @@ static void try_dimension(const quern_check *c, const quern_check_instance *it, 
 	enum { POINTS = 300 };
 	quern_check_kernel *k = create(c, it, QUERN_MATERIAL_ASSIGN, false, POINTS);
 	check_moduli(k, t);
+	check_friction(k, t);
 	check_assign(c, it, k, t);
 	c->host->kernel_destroy(k);
 	k = create(c, it, QUERN_MATERIAL_UPDATE, true, POINTS);
@@ -280,15 +292,16 @@ static void try_dimension(const quern_check *c, const quern_check_instance *it, 
 }
 
 static void law(const quern_check *c) {
-	tallies t = { { .name = "moduli and density" }, { .name = "assign twice" },
-		{ .name = "assign and read back" }, { .name = "yield" }, { .name = "rotation" },
-		{ .name = "large gradients" } };
+	tallies t = { { .name = "moduli and density" }, { .name = "friction at walls" },
+		{ .name = "assign twice" }, { .name = "assign and read back" }, { .name = "yield" },
+		{ .name = "rotation" }, { .name = "large gradients" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it) try_dimension(c, it, &t);
 		c->host->instance_destroy(it);
 	}
 	c->host->tell(c, &t.moduli, NULL);
+	c->host->tell(c, &t.friction, NULL);
 	c->host->tell(c, &t.again, NULL);
 	c->host->tell(c, &t.held, NULL);
 	c->host->tell(c, &t.yields, NULL);

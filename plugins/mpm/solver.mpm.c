@@ -247,8 +247,8 @@ static quern_status find_rough(mpm *p, const quern_setup *setup, const quern_bou
 		if (isnan(((const body_item *)body[i].item)->slip)) continue;
 		if (!ops->friction)
 			return setup->host->fail(err, QUERN_E_PARAM, "material",
-				"%s has no friction, by which %s, which is rough, could rub: take mu_i, or make it sticky or "
-				"frictional",
+				"%s has no friction, which a rough boundary takes from the material: take mu_i, or another "
+				"boundary for %s",
 				material->id, quern_body_say(&body[i], i, word));
 		p->rough = true;
 	}

@@ -41,7 +41,7 @@ static quern_run *open_silo(const silo *s) {
 		"{quern: 1, dimension: 2, gravity: [0, -9.81], time: {end: 10}, output: {every: 0.1},\n"
 		"domain: {lower: [0, 0], upper: [0.048, 0.16], open: [lower_y]},\n"
 		"bodies: [{box: {lower: [-0.02, %g], upper: [%g, %g], boundary: sticky}},\n"
-		"  {box: {lower: [%g, %g], upper: [0.1, %g], boundary: {rough: {slip_length: 1}}}},\n"
+		"  {box: {lower: [%g, %g], upper: [0.1, %g], boundary: {rough: 1}}},\n"
 		"  {plane: {point: [0, 0], normal: [1, 0]}}, {plane: {point: [0.048, 0], normal: [-1, 0]}}],\n"
 		"%s%s}\n",
 		under, s->edge, top, end, under, top, continuum,

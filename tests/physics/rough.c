@@ -64,8 +64,8 @@ static quern_run *open_couette(const couette *c) {
 	quern_run *run = harness_open(c->workers,
 		"{quern: 1, dimension: %u, gravity: %s, domain: {lower: %s, upper: %s, periodic: %s},\n"
 		"time: {end: 10}, output: {every: 0.1}, \n"
-		"bodies: [{plane: {point: %s, normal: %s, boundary: {rough: {slip_length: %g}}, motion: {velocity: %s}}},\n"
-		"  {plane: {point: %s, normal: %s, boundary: {rough: {slip_length: %g}}, motion: {velocity: %s}}}],\n"
+		"bodies: [{plane: {point: %s, normal: %s, boundary: {rough: %g}, motion: {velocity: %s}}},\n"
+		"  {plane: {point: %s, normal: %s, boundary: {rough: %g}, motion: {velocity: %s}}}],\n"
 		"continuum: {cell: %.17g, fill: [{region: {box: {lower: %s, upper: %s}}}],\n"
 		"  material: {mu_i: {bulk_modulus: %g, diameter: %g, grain_density: 2500, critical_density: %g,\n"
 		"    static_friction: 0.26, limit_friction: 0.6, inertial_number: 0.36}}}}\n",
@@ -188,7 +188,7 @@ static quern_run *open_layer(double angle, double slip, const char *material) {
 		"{quern: 1, dimension: 2, gravity: [%.17g, %.17g], domain: {lower: [0, 0], upper: [0.016, 0.048], periodic: "
 		"[true, false]},\n"
 		"time: {end: 10}, output: {every: 0.1, fields: [body.impulse]},\n"
-		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: {slip_length: %g}}}}],\n"
+		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: %g}}}],\n"
 		"continuum: {cell: 0.004, fill: [{region: {box: {lower: [0, 0], upper: [0.016, 0.04]}}, stress: at_rest,\n"
 		"  lateral: 1}], material: {%s}}}\n",
 		gravity * s, -gravity * c, slip, material);

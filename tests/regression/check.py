@@ -62,6 +62,8 @@ PAIR = "if (n < cap) out[n] = (quern_pair) { (int32_t)i, (int32_t)k };\n\t\t\t\t
 NO_FEATURES = "static uint32_t none(const void *self, const quern_pose *pose, const quern_real x[3], quern_real reach,\n" \
               "\tuint32_t cap, int32_t *feature) { (void)self, (void)pose, (void)x, (void)reach, (void)cap, (void)feature; " \
               "return 0; }\n"
+RUB = "static void rub(const void *self, uint32_t dim, quern_real *slow, quern_real *fast, quern_real *number,\n" \
+      "\tquern_real *density) { (void)self, (void)dim; *slow = 0.5, *fast = 0.4, *number = 0.3, *density = 1000; }\n"
 FIXED = '{ .field = "grain.fixed", .unit = "1", .access = QUERN_READ, .shape = QUERN_SCALAR }, QUERN_END_USES'
 
 # a plugin's source or the template of a kind, change, the property that must fail
@@ -163,6 +165,9 @@ BROKEN = [
                                  ("static const quern_body_ops", NO_FEATURES + "static const quern_body_ops")], "features"),
     ("is denser than it says", "material", [("*density = m->density;", "*density = 1.1 * m->density;")],
      "moduli and density"),
+    ("rubs less when fast", "material", [(".moduli = moduli", ".moduli = moduli, .friction = rub"),
+                                         ("static const quern_material_ops", RUB + "static const quern_material_ops")],
+     "friction at walls"),
     ("relaxes", "material", [("quern_max(-trace / dim, 0)", "0.9 * quern_max(-trace / dim, 0)")], "assign twice"),
     ("bursts", "material", [("open ? 0 :", "open ? 0 : b->density[i] > 1.05 * m->density ? 0.0 / 0.0 :")],
      "large gradients"),
