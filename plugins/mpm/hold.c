@@ -10,7 +10,8 @@ typedef struct {
 	const quern_step *s;
 	const quern_grid_view *g;
 	const uint32_t *point;
-	const body_pose *pose;
+	const body_pose *pose; /* by body */
+	bool *holds;
 	int32_t *left; /* by block: whether a point has left the tile */
 } hold_work;
 
@@ -19,11 +20,16 @@ typedef struct {
 		normal[3][STENCIL], velocity[3][STENCIL];
 } held_points;
 
-/* Bodies that stand still; one that moves meets points with its nodes, and may pass some. */
-static bool holds(const quern_bound *body, bool settling) {
+/* Bodies that stand still, within the domain. One that moves meets points with its nodes, and may pass some. */
+static bool holds(const quern_bound *body, const quern_step *s) {
 	const body_item *item = body->item;
-	return quern_body_is_there(body, settling) && !quern_motion_is_any(&item->motion) &&
-		   (item->boundary != BOUNDARY_NONE || !isnan(item->friction));
+	quern_real lower[3], upper[3];
+	if (!quern_body_is_there(body, s->settling) || quern_motion_is_any(&item->motion)) return false;
+	if (item->boundary == BOUNDARY_NONE && isnan(item->friction)) return false;
+	((const quern_body_ops *)body->ops)->bounds(body->self, s->dim, lower, upper);
+	for (uint32_t k = 0; k < s->dim; k++)
+		if (!s->periodic[k] && (upper[k] <= s->lower[k] || lower[k] >= s->upper[k])) return false;
+	return true;
 }
 
 /* Points reach half a cell beyond their block. */
@@ -76,7 +82,7 @@ static void hold_block(void *arg, uint32_t b, uint32_t worker) {
 	held_points *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
 	if (!m || begin == end) return;
 	for (uint32_t j = 0; j < w->s->n_slot[SLOT_BODIES]; j++) {
-		if (!holds(&w->s->slot[SLOT_BODIES][j], w->s->settling) || is_far(w, j, b)) continue;
+		if (!w->holds[j] || is_far(w, j, b)) continue;
 		for (uint32_t i = begin; i < end; i += STENCIL)
 			hold_chunk(w, j, b, i, end - i < STENCIL ? end - i : STENCIL, m);
 	}
@@ -89,7 +95,9 @@ quern_status quern_mpm_hold(const void *self, const quern_step *s) {
 	if (!points.n) return QUERN_OK;
 	w.pose = quern_body_poses_now(s, SLOT_BODIES);
 	w.left = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
-	if (!w.pose || !w.left) return QUERN_E_MEMORY;
+	w.holds = s->host->memory(s->run, (s->n_slot[SLOT_BODIES] + (size_t)1) * sizeof(bool));
+	if (!w.pose || !w.left || !w.holds) return QUERN_E_MEMORY;
+	for (uint32_t j = 0; j < s->n_slot[SLOT_BODIES]; j++) w.holds[j] = holds(&s->slot[SLOT_BODIES][j], s);
 	for (uint32_t b = 0; b < w.g->n_blocks; b++) w.left[b] = 0;
 	s->host->parallel(s->run, w.g->n_blocks, hold_block, &w);
 	for (uint32_t b = 0; b < w.g->n_blocks; b++)
