@@ -250,9 +250,33 @@ static void layers_on_inclines(void **unused) {
 	assert_true(good);
 }
 
+/* Grains that slide without friction on the floor hang on a continuum of half their weight, everywhere. Before the coupling
+ * the floor holds the continuum with room to spare; that rest must hold the grains after it. */
+static void floor_holds_grains_too(void **unused) {
+	(void)unused;
+	const double angle = 7 * degree;
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [%.17g, %.17g], domain: {lower: [0, 0], upper: [0.04, 0.06], periodic: [true, "
+		"false]},\n"
+		"time: {end: 10}, output: {every: 0.1}, bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 4},\n"
+		"  contact: {friction: 0}}}], grains: {material: {density: 2500, radius: {mean: 1 mm}}, overlap: {most: 0},\n"
+		"  contact: {linear: {stiffness: 2e5, friction: 0.4}}, fill: {region: {box: {lower: [0, 0], upper: [0.04, 0.03]}},\n"
+		"  packer: lattice}}, continuum: {cell: 0.004, material: {%s}}, hybrid: {substeps: 20,\n"
+		"  oracle: [{fixed: {boxes: [{lower: [-1, -1], upper: [1, 1], zone: hybrid}]}}]}}\n",
+		gravity * sin(angle), -gravity * cos(angle), soft);
+	table_head("a layer of grains and continuum on an incline of 7 degrees");
+	harness_until(run, 0.2);
+	const double before = mean_speed(run);
+	harness_until(run, 0.4);
+	const double after = mean_speed(run);
+	table_note("speed after 0.2 s, m/s", before);
+	assert_true(table_row("held: speed after 0.4 s, m/s", after, 0, 5e-4));
+	harness_close(run);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(law_holds), cmocka_unit_test(slip_is_its_length),
 		cmocka_unit_test(everywhere_the_same), cmocka_unit_test(workers_do_not_matter),
-		cmocka_unit_test(layers_on_inclines) };
+		cmocka_unit_test(layers_on_inclines), cmocka_unit_test(floor_holds_grains_too) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
