@@ -250,28 +250,32 @@ static void layers_on_inclines(void **unused) {
 	assert_true(good);
 }
 
-/* Grains that slide without friction on the floor hang on a continuum of half their weight, everywhere. Before the coupling
- * the floor holds the continuum with room to spare; that rest must hold the grains after it. */
+/* Settled grains that slide without friction on the floor hang on a continuum of half their weight, everywhere. Before the
+ * coupling the floor holds the continuum with room to spare; that rest must hold the grains after it, or all creeps. */
 static void floor_holds_grains_too(void **unused) {
 	(void)unused;
-	const double angle = 7 * degree;
+	enum { LOOKS = 20 };
+	const double angle = 9 * degree;
 	quern_run *run = harness_open(1,
 		"{quern: 1, dimension: 2, gravity: [%.17g, %.17g], domain: {lower: [0, 0], upper: [0.04, 0.06], periodic: [true, "
 		"false]},\n"
-		"time: {end: 10}, output: {every: 0.1}, bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 4},\n"
-		"  contact: {friction: 0}}}], grains: {material: {density: 2500, radius: {mean: 1 mm}}, overlap: {most: 0},\n"
-		"  contact: {linear: {stiffness: 2e5, friction: 0.4}}, fill: {region: {box: {lower: [0, 0], upper: [0.04, 0.03]}},\n"
-		"  packer: lattice}}, continuum: {cell: 0.004, material: {%s}}, hybrid: {substeps: 20,\n"
+		"time: {end: 10}, output: {every: 0.1}, bodies: [{plane: {point: [0, 0], normal: [0, 1], while: settling}},\n"
+		"  {plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 4}, contact: {friction: 0}, while: running}}],\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}}, overlap: {most: 0},\n"
+		"  contact: {linear: {stiffness: 2e5, friction: 0.4}}, fill: {region: {box: {lower: [0, 0], upper: [0.04, 0.035]}},\n"
+		"  settle: true}}, continuum: {cell: 0.004, material: {%s}}, hybrid: {substeps: 20,\n"
 		"  oracle: [{fixed: {boxes: [{lower: [-1, -1], upper: [1, 1], zone: hybrid}]}}]}}\n",
 		gravity * sin(angle), -gravity * cos(angle), soft);
-	table_head("a layer of grains and continuum on an incline of 7 degrees");
+	harness_settle(run);
 	harness_until(run, 0.2);
-	const double before = mean_speed(run);
-	harness_until(run, 0.4);
-	const double after = mean_speed(run);
-	table_note("speed after 0.2 s, m/s", before);
-	assert_true(table_row("held: speed after 0.4 s, m/s", after, 0, 5e-4));
+	double creep = 0;
+	for (int k = 1; k <= LOOKS; k++) {
+		harness_until(run, 0.2 + 0.01 * k);
+		creep += mean_speed(run) / LOOKS;
+	}
 	harness_close(run);
+	table_head("a layer of grains and continuum on an incline of 9 degrees");
+	assert_true(table_row("mean speed of the continuum, m/s", creep, 0, 2e-4));
 }
 
 int main(void) {
