@@ -85,9 +85,9 @@ static bool watch(const silo *s, double time) {
 	harness_close(run);
 	bool good = table_row(s->what, deep / cell, 0, 0);
 	table_note("  points at the end", n);
-	if (s->hybrid) return good & (n > 100);
+	if (s->hybrid) return good && n > 100;
 	table_note("  share of the mass that has left", left);
-	return good & (left > 0 && left < 0.9);
+	return good && left > 0 && left < 0.9;
 }
 
 static void no_point_in_a_floor(void **unused) {

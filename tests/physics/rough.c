@@ -218,8 +218,9 @@ static bool stays(const char *what, const char *material) {
 				 y = harness_field(run, "body.impulse").real[1][0];
 	harness_close(run);
 	printf("  %s\n", what);
-	return table_row("  held below its angle: speed, m/s", creep, 0, 2e-3) &
-		   table_row("  what the floor bears, along over across", -x / y, tan(15 * degree), 2e-3);
+	bool good = table_row("  held below its angle: speed, m/s", creep, 0, 2e-3);
+	good &= table_row("  what the floor bears, along over across", -x / y, tan(15 * degree), 2e-3);
+	return good;
 }
 
 static double acceleration(double angle, double slip, const char *material) {
