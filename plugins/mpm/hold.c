@@ -32,12 +32,12 @@ static bool holds(const quern_bound *body, const quern_step *s) {
 	return true;
 }
 
-/* Points reach half a cell beyond their block. */
+/* Points reach half a cell beyond their block, and a cell farther in the step that they leave it. */
 static bool is_far(const hold_work *w, uint32_t j, uint32_t b) {
 	quern_real x[3] = { 0 };
 	quern_grid_corner(w->g, b * QUERN_BLOCK_CELLS, x);
 	for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * w->g->edge * w->g->cell;
-	const quern_real reach = 0.9 * (w->g->edge + 1) * w->g->cell; /* sqrt(3)/2 and a little */
+	const quern_real reach = 0.9 * (w->g->edge + 3) * w->g->cell; /* sqrt(3)/2 and a little */
 	return quern_body_gap(&w->s->slot[SLOT_BODIES][j], &w->pose[j], w->s->dim, x, reach, NULL) > 0;
 }
 
