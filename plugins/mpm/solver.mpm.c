@@ -42,13 +42,13 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, sources, NULL, "Keep books of sources; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
+		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rough, NULL,
 		"Remember what rough bodies could still hold; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, still, NULL, "Keep points out of bodies; set by itself where one stands still.",
 		.flags = QUERN_ADVANCED),
-	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
-		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
