@@ -16,7 +16,11 @@
 
 static const char *const transfers[] = { "{picflip: {rate: 0}}", "{picflip: {rate: 1e300}}",
 	"{picflip: {rate: 20}}", "mixed" };
+#ifdef QUERN_EXACT
+static const char *const couplings[] = { "affine", "lumped", "exact" };
+#else
 static const char *const couplings[] = { "affine", "lumped" };
+#endif
 
 /* A block of grains in empty space, so loosely bound that nothing but the coupling acts on it. */
 static quern_run *block(int dim, const char *size, const char *oracle, const char *velocity, const char *time,
@@ -199,6 +203,10 @@ static void affine_keeps_strain_and_rotation(void **state) {
 			char name[96];
 			snprintf(name, sizeof name, "%d-D affine, %s", dim, flows[f].name);
 			good = table_row(name, disturbed(dim, "affine", flows[f].l), 0, 1e-12) && good;
+#ifdef QUERN_EXACT
+			snprintf(name, sizeof name, "%d-D exact, %s", dim, flows[f].name);
+			good = table_row(name, disturbed(dim, "exact", flows[f].l), 0, 1e-12) && good;
+#endif
 			const double lumped = disturbed(dim, "lumped", flows[f].l);
 			snprintf(name, sizeof name, "%d-D lumped, %s: not kept", dim, flows[f].name);
 			table_note(name, lumped);
