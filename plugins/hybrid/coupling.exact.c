@@ -22,22 +22,21 @@ static void couple(const void *self, const quern_coupling_job *job) { (void)self
 
 typedef SuiteSparse_long whole;
 
-/* A = M + sum of m/s N N^T over grains, by rows; it is symmetric. A = P^T L D L^T P. */
+/* A = M + sum of m/s N N^T over grains, by rows, with its loose nodes lumped; it is symmetric. A = P^T L D L^T P. */
 typedef struct {
 	const quern_coupling_system *c;
 	whole n, *begin, *other; /* n + 1; by entry */
 	quern_real *value;
-	quern_real *light;       /* by node: what stands in for its mass beyond the mass */
 	quern_real *held;        /* by grain: weighted mass over the sum of its row */
+	quern_real *loose;       /* by node: share of what it has to do with others that is lumped */
 	whole *meets;            /* by node and one more: its entries in */
 	uint32_t *grain, *entry; /* the matrix of shapes by columns */
 	whole *seen;             /* by node: where the present row of A has it, or less than where that begins */
 	whole *order, *place;    /* P and its inverse */
-	whole *low_begin, *low_at;  /* of L, by columns */
-	quern_real *low, *diagonal; /* L, D */
-	quern_real *right, *change; /* by node: of one component */
-	quern_real *solved,
-		*behind; /* by node; by grain: what it lags behind its nodes, in all that it reaches */
+	whole *low_begin, *low_at;   /* of L, by columns */
+	quern_real *low, *diagonal;  /* L, D */
+	quern_real *change, *solved; /* by node: of one component; the same in the order of P */
+	quern_real *behind;          /* by grain: what it lags behind its nodes, in all that it reaches */
 } exact;
 
 static void *take(const exact *e, whole n, size_t size) {
@@ -53,6 +52,24 @@ static void weigh_grains(const exact *e) {
 		quern_real reach = 0;
 		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) reach += c->value[q];
 		e->held[g] = c->grain_weight[g] * c->grain_mass[g] / reach;
+	}
+}
+
+/* A light node that grains only just reach would have to move at many times their speed for them to be where it says: it
+ * exchanges with them as if by itself. A trace of that everywhere settles what neither mass nor grain holds. */
+static void weigh_nodes(const exact *e) {
+	const quern_coupling_system *c = e->c;
+	const quern_real least = 0.05, trace = 1e-13;
+	for (whole i = 0; i < e->n; i++) {
+		quern_real firm = c->mass[i], lumped = c->mass[i];
+		for (whole k = e->meets[i]; k < e->meets[i + 1]; k++) {
+			const uint32_t g = e->grain[k];
+			const quern_real value = c->value[e->entry[k]];
+			firm += e->held[g] * value * value;
+			lumped += c->grain_weight[g] * c->grain_mass[g] * value;
+		}
+		const quern_real loose = 1 - firm / (least * lumped);
+		e->loose[i] = loose > trace ? loose : trace;
 	}
 }
 
@@ -72,13 +89,13 @@ static void list_by_node(const exact *e) {
 	e->meets[e->n] = c->row[c->n_grains];
 }
 
-/* Row i of A, which begins at `at`; returns where it ends. Without values its length alone is found. */
+/* Row i of A, which begins at `at`, with the diagonal first; returns where it ends. Without values its length alone is found.
+ * What is lumped goes to the diagonal, so that a sum over the row, the momentum, stays as it is. */
 static whole add_row(const exact *e, whole i, whole at, bool write) {
 	const quern_coupling_system *c = e->c;
 	const whole begin = at;
-	quern_real brought = 0;
+	if (write) e->other[at] = i, e->value[at] = c->mass[i];
 	e->seen[i] = at++;
-	if (write) e->other[begin] = i, e->value[begin] = 0;
 	for (whole k = e->meets[i]; k < e->meets[i + 1]; k++) {
 		const uint32_t g = e->grain[k];
 		const quern_real mine = e->held[g] * c->value[e->entry[k]];
@@ -88,15 +105,13 @@ static whole add_row(const exact *e, whole i, whole at, bool write) {
 				if (write) e->other[at] = j, e->value[at] = 0;
 				e->seen[j] = at++;
 			}
-			if (write) e->value[e->seen[j]] += mine * c->value[q];
+			if (!write) continue;
+			const quern_real all = mine * c->value[q],
+							 lumped = all * (e->loose[i] > e->loose[j] ? e->loose[i] : e->loose[j]);
+			e->value[begin] += lumped;
+			e->value[e->seen[j]] += all - lumped;
 		}
-		brought += mine * c->value[e->entry[k]];
 	}
-	if (!write) return at;
-	/* Light nodes that one grain alone reaches move against each other by hardly any mass: less than round-off. */
-	const quern_real least = 1e-12 * brought;
-	e->light[i] = c->mass[i] < least ? least - c->mass[i] : 0;
-	e->value[begin] += c->mass[i] + e->light[i];
 	return at;
 }
 
@@ -106,10 +121,11 @@ static bool make_matrix(exact *e) {
 	if (!(e->held = take(e, c->n_grains, sizeof(quern_real))) ||
 		!(e->meets = take(e, e->n + 1, sizeof(whole))) || !(e->grain = take(e, values, sizeof(uint32_t))) ||
 		!(e->entry = take(e, values, sizeof(uint32_t))) || !(e->seen = take(e, e->n, sizeof(whole))) ||
-		!(e->begin = take(e, e->n + 1, sizeof(whole))) || !(e->light = take(e, e->n, sizeof(quern_real))))
+		!(e->begin = take(e, e->n + 1, sizeof(whole))) || !(e->loose = take(e, e->n, sizeof(quern_real))))
 		return false;
 	weigh_grains(e);
 	list_by_node(e);
+	weigh_nodes(e);
 	for (whole i = 0; i < e->n; i++) e->seen[i] = -1;
 	for (whole i = 0; i < e->n; i++) e->begin[i + 1] = add_row(e, i, e->begin[i], false);
 	if (!(e->other = take(e, e->begin[e->n], sizeof(whole))) ||
@@ -149,15 +165,6 @@ static quern_status factorise(exact *e) {
 	return QUERN_OK;
 }
 
-/* right -> solved */
-static void solve_factors(const exact *e) {
-	const whole n = e->n;
-	for (whole i = 0; i < n; i++) e->solved[i] = e->right[e->order[i]];
-	ldl_l_lsolve(n, e->solved, e->low_begin, e->low_at, e->low);
-	ldl_l_dsolve(n, e->solved, e->diagonal);
-	ldl_l_ltsolve(n, e->solved, e->low_begin, e->low_at, e->low);
-}
-
 /* ---- one component ---- */
 
 /* What grains bring to the nodes beyond what these have. */
@@ -169,24 +176,19 @@ static void gather(const exact *e, uint32_t a) {
 			e->behind[g] += c->value[q] * (c->grain_velocity[a][g] - c->velocity[a][c->node[q]]);
 	}
 	for (whole i = 0; i < e->n; i++) {
-		e->right[i] = e->change[i] = 0;
+		e->change[i] = 0;
 		for (whole k = e->meets[i]; k < e->meets[i + 1]; k++)
-			e->right[i] += e->held[e->grain[k]] * c->value[e->entry[k]] * e->behind[e->grain[k]];
+			e->change[i] += e->held[e->grain[k]] * c->value[e->entry[k]] * e->behind[e->grain[k]];
 	}
 }
 
-static void add_solved(const exact *e) {
-	solve_factors(e);
-	for (whole i = 0; i < e->n; i++) e->change[e->order[i]] += e->solved[i];
-}
-
-/* What the factors have left over, with the true masses. */
-static void take_residual(const exact *e) {
-	for (whole i = 0; i < e->n; i++) {
-		quern_real sum = -e->light[i] * e->change[i];
-		for (whole q = e->begin[i]; q < e->begin[i + 1]; q++) sum += e->value[q] * e->change[e->other[q]];
-		e->right[i] -= sum;
-	}
+/* From momentum to velocity. */
+static void apply_factors(const exact *e) {
+	for (whole i = 0; i < e->n; i++) e->solved[i] = e->change[e->order[i]];
+	ldl_l_lsolve(e->n, e->solved, e->low_begin, e->low_at, e->low);
+	ldl_l_dsolve(e->n, e->solved, e->diagonal);
+	ldl_l_ltsolve(e->n, e->solved, e->low_begin, e->low_at, e->low);
+	for (whole i = 0; i < e->n; i++) e->change[e->order[i]] = e->solved[i];
 }
 
 static void move(const exact *e, uint32_t a) {
@@ -202,16 +204,14 @@ static void move(const exact *e, uint32_t a) {
 static quern_status solve(const void *self, const quern_coupling_system *c) {
 	exact e = { .c = c, .n = c->n_nodes };
 	(void)self;
-	if (!make_matrix(&e) || !(e.right = take(&e, e.n, sizeof(quern_real))) ||
-		!(e.change = take(&e, e.n, sizeof(quern_real))) || !(e.solved = take(&e, e.n, sizeof(quern_real))) ||
+	if (!make_matrix(&e) || !(e.change = take(&e, e.n, sizeof(quern_real))) ||
+		!(e.solved = take(&e, e.n, sizeof(quern_real))) ||
 		!(e.behind = take(&e, c->n_grains, sizeof(quern_real))))
 		return QUERN_E_MEMORY;
 	const quern_status status = factorise(&e);
 	for (uint32_t a = 0; a < c->dim && status == QUERN_OK; a++) {
 		gather(&e, a);
-		add_solved(&e);
-		take_residual(&e);
-		add_solved(&e);
+		apply_factors(&e);
 		move(&e, a);
 	}
 	return status;

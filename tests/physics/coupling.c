@@ -140,7 +140,7 @@ static void impose(quern_run *run, int dim, const double l[3][3], const double c
 
 /* True if there are points within reach on both sides along every axis. A grain with a node without continuum in reach
  * does not know L, and it disturbs those with whom it shares nodes: they all are nearer to the points' rim. */
-static bool is_inside(quern_run *run, int dim, const quern_column *x, uint32_t i) {
+static bool is_inside(quern_run *run, int dim, const quern_column *x, uint32_t i, double cells) {
 	const double h = 0.004;
 	const quern_column p = harness_field(run, "point.position");
 	bool side[6] = { false };
@@ -150,7 +150,7 @@ static bool is_inside(quern_run *run, int dim, const quern_column *x, uint32_t i
 		for (int k = 0; k < dim; k++)
 			for (int j = 0; j < dim; j++) across[k] = j == k ? across[k] : fmax(across[k], fabs(way[j]));
 		for (int k = 0; k < dim; k++)
-			if (across[k] < h && fabs(way[k]) > 2.6 * h) side[2 * k + (way[k] > 0)] = true;
+			if (across[k] < h && fabs(way[k]) > cells * h) side[2 * k + (way[k] > 0)] = true;
 	}
 	for (int k = 0; k < 2 * dim; k++)
 		if (!side[k]) return false;
@@ -158,7 +158,7 @@ static bool is_inside(quern_run *run, int dim, const quern_column *x, uint32_t i
 }
 
 /* Largest change of a hybrid grain's velocity in one step, over |L| h, away from the rim. */
-static double disturbed(int dim, const char *coupling, const double l[3][3]) {
+static double disturbed(int dim, const char *coupling, const double l[3][3], double cells) {
 	const double centre[3] = { 0.06, 0.05, 0.026 }, h = 0.004;
 	double worst = 0, size = 0;
 	uint32_t seen = 0;
@@ -178,7 +178,7 @@ static double disturbed(int dim, const char *coupling, const double l[3][3]) {
 					   w = harness_field(run, "grain.weight");
 	for (int k = 0; k < dim * dim; k++) size = fmax(size, fabs(l[k / dim][k % dim]));
 	for (uint32_t i = 0; i < n; i++) {
-		if (w.real[0][i] != 0.5 || !is_inside(run, dim, &x, i)) continue;
+		if (w.real[0][i] != 0.5 || !is_inside(run, dim, &x, i, cells)) continue;
 		seen++;
 		for (int k = 0; k < dim; k++) worst = fmax(worst, fabs(now.real[k][i] - before[3 * i + (uint32_t)k]));
 	}
@@ -187,6 +187,21 @@ static double disturbed(int dim, const char *coupling, const double l[3][3]) {
 	assert_true(seen > 50);
 	return worst / (size * h);
 }
+
+#ifdef QUERN_EXACT
+/* One system for all: a grain at the rim, which does not know the strain, disturbs all others, by a tenth as much a cell
+ * farther. Where no grain reaches beyond the continuum nothing is off: tests/physics/exact.c */
+static bool exact_forgets_the_rim(int dim, const char *flow, const double l[3][3]) {
+	char name[96];
+	snprintf(name, sizeof name, "%d-D exact, %s", dim, flow);
+	const double near = disturbed(dim, "exact", l, 2.6);
+	bool good = table_row(name, near, 0, 1e-3);
+	if (dim == 2)
+		good = table_row("  a cell farther, over that", disturbed(dim, "exact", l, 3.6) / near, 0.1, 0.05) &&
+			   good;
+	return good;
+}
+#endif
 
 static void affine_keeps_strain_and_rotation(void **state) {
 	static const struct {
@@ -202,12 +217,11 @@ static void affine_keeps_strain_and_rotation(void **state) {
 		for (size_t f = 0; f < sizeof flows / sizeof *flows; f++) {
 			char name[96];
 			snprintf(name, sizeof name, "%d-D affine, %s", dim, flows[f].name);
-			good = table_row(name, disturbed(dim, "affine", flows[f].l), 0, 1e-12) && good;
+			good = table_row(name, disturbed(dim, "affine", flows[f].l, 2.6), 0, 1e-12) && good;
 #ifdef QUERN_EXACT
-			snprintf(name, sizeof name, "%d-D exact, %s", dim, flows[f].name);
-			good = table_row(name, disturbed(dim, "exact", flows[f].l), 0, 1e-12) && good;
+			good = exact_forgets_the_rim(dim, flows[f].name, flows[f].l) && good;
 #endif
-			const double lumped = disturbed(dim, "lumped", flows[f].l);
+			const double lumped = disturbed(dim, "lumped", flows[f].l, 2.6);
 			snprintf(name, sizeof name, "%d-D lumped, %s: not kept", dim, flows[f].name);
 			table_note(name, lumped);
 			assert_true(lumped > 1e-3); /* or the test would not see a thing */

@@ -55,7 +55,8 @@ static double uniform(uint64_t *state, double low, double high) {
 }
 
 /* Nodes on a lattice, grains anywhere between them, linear functions of shape: so a linear field is exact. */
-static void lay_out(setting *s, uint64_t *random, uint32_t side, uint32_t grains) {
+static void lay_out(setting *s, uint64_t *random, uint32_t side, uint32_t grains, bool apart) {
+	const uint32_t lines = 2 * (side - 1);
 	s->nodes = s->dim == 2 ? side * side : side * side * side;
 	s->grains = grains;
 	for (uint32_t i = 0; i < s->nodes; i++)
@@ -64,7 +65,9 @@ static void lay_out(setting *s, uint64_t *random, uint32_t side, uint32_t grains
 	for (uint32_t g = 0; g < grains; g++) {
 		s->row[g + 1] = s->row[g];
 		s->reach[g] = 0;
-		for (uint32_t a = 0; a < s->dim; a++) s->at[g][a] = uniform(random, 0, side - 1);
+		for (uint32_t a = 0; a < s->dim; a++)
+			s->at[g][a] = apart ? 0.5 * (a ? g / lines : g % lines) + uniform(random, 0.1, 0.4)
+								: uniform(random, 0, side - 1);
 		for (uint32_t i = 0; i < s->nodes; i++) {
 			double value = 1;
 			for (uint32_t a = 0; a < s->dim; a++) value *= fmax(0, 1 - fabs(s->at[g][a] - s->place[i][a]));
@@ -202,14 +205,11 @@ static sums add_up(const setting *s) {
 static const struct {
 	const char *name;
 	uint32_t dim, side, grains;
-	double missing, decades;
-} kinds[] = { { "2-D, few grains", 2, 4, 6, 0, 1 }, { "2-D, more grains than nodes", 2, 4, 80, 0, 1 },
-	{ "2-D, at the continuum's rim", 2, 5, 60, 0.4, 1 }, { "3-D", 3, 3, 40, 0, 1 },
-	{ "3-D, more grains than nodes, rim", 3, 3, 90, 0.4, 1 },
-	{ "nodes of very unequal masses", 2, 5, 60, 0.4, 9 } };
+	double missing;
+} kinds[] = { { "2-D, few grains", 2, 4, 6, 0 }, { "2-D, more grains than nodes", 2, 4, 80, 0 },
+	{ "2-D, at the continuum's rim", 2, 5, 60, 0.4 }, { "3-D", 3, 3, 40, 0 },
+	{ "3-D, more grains than nodes, rim", 3, 3, 90, 0.4 } };
 
-/* Velocities of light nodes that one grain holds are as uncertain as their masses are small beside its own: what is compared
- * there is momentum. */
 static void agrees_with_a_dense_solution(void **state) {
 	uint64_t random = 7;
 	(void)state;
@@ -219,18 +219,16 @@ static void agrees_with_a_dense_solution(void **state) {
 		double worst = 0, made = 0, gained = -1, node[NODES], grain[GRAINS];
 		for (int tries = 0; tries < 10; tries++) {
 			setting s = { .dim = kinds[k].dim };
-			lay_out(&s, &random, kinds[k].side, kinds[k].grains);
+			lay_out(&s, &random, kinds[k].side, kinds[k].grains, false);
 			thin_out(&s, &random, kinds[k].missing);
-			fill(&s, &random, kinds[k].decades);
+			fill(&s, &random, 1);
 			const setting before = s;
 			const sums old = add_up(&s);
 			assert_int_equal(solve(&s), QUERN_OK);
 			const sums now = add_up(&s);
 			for (uint32_t a = 0; a < s.dim; a++) {
 				reference(&before, a, node, grain);
-				for (uint32_t i = 0; i < s.nodes; i++)
-					worst = fmax(
-						worst, fabs(s.velocity[a][i] - node[i]) * (kinds[k].decades > 1 ? s.mass[i] : 1));
+				for (uint32_t i = 0; i < s.nodes; i++) worst = fmax(worst, fabs(s.velocity[a][i] - node[i]));
 				for (uint32_t g = 0; g < s.grains; g++)
 					worst = fmax(worst, fabs(s.grain_velocity[a][g] - grain[g]));
 				made = fmax(made, fabs(now.momentum[a] - old.momentum[a]) / old.size);
@@ -245,27 +243,33 @@ static void agrees_with_a_dense_solution(void **state) {
 	assert_true(good);
 }
 
-/* Nodes that hold next to nothing: no velocity grows, and momentum is kept. */
+/* Nodes that hold next to nothing beside others, grains half a cell apart: no velocity grows, and momentum is kept. */
 static void light_nodes_do_no_harm(void **state) {
+	static const double decades[] = { 3, 10, 30 };
 	uint64_t random = 11;
 	(void)state;
-	double made = 0, fastest = 0;
-	for (int tries = 0; tries < 50; tries++) {
-		setting s = { .dim = 2 };
-		lay_out(&s, &random, 6, 12);
-		fill(&s, &random, 30);
-		const sums old = add_up(&s);
-		assert_int_equal(solve(&s), QUERN_OK);
-		const sums now = add_up(&s);
-		for (uint32_t a = 0; a < s.dim; a++) {
-			made = fmax(made, fabs(now.momentum[a] - old.momentum[a]) / old.size);
-			for (uint32_t i = 0; i < s.nodes; i++) fastest = fmax(fastest, fabs(s.velocity[a][i]));
+	bool good = true;
+	table_head("masses over so many decades: momentum made; fastest node, of 1 m/s before");
+	for (int k = 0; k < 3; k++) {
+		double made = 0, fastest = 0;
+		for (int tries = 0; tries < 50; tries++) {
+			setting s = { .dim = 2 };
+			lay_out(&s, &random, 6, 90, true);
+			fill(&s, &random, decades[k]);
+			const sums old = add_up(&s);
+			assert_int_equal(solve(&s), QUERN_OK);
+			const sums now = add_up(&s);
+			for (uint32_t a = 0; a < s.dim; a++) {
+				made = fmax(made, fabs(now.momentum[a] - old.momentum[a]) / old.size);
+				for (uint32_t i = 0; i < s.nodes; i++) fastest = fmax(fastest, fabs(s.velocity[a][i]));
+			}
 		}
+		char name[40];
+		snprintf(name, sizeof name, "%g", decades[k]);
+		good = table_row(name, made, 0, 1e-14) && good;
+		good = table_row("  fastest", fastest, 0, 40) && good;
 	}
-	table_head("masses over thirty decades");
-	const bool good = table_row("momentum", made, 0, 1e-14);
-	table_note("fastest node, of 1 m/s before", fastest);
-	assert_true(good && fastest < 30);
+	assert_true(good);
 }
 
 /* Also past grains that reach beyond the continuum. */
@@ -279,7 +283,7 @@ static void fields_pass(void **state) {
 		for (uint32_t dim = 2; dim <= 3; dim++) {
 			double worst = 0, l[3][4];
 			setting s = { .dim = dim };
-			lay_out(&s, &random, dim == 2 ? 6 : 4, 90);
+			lay_out(&s, &random, dim == 2 ? 6 : 4, 90, false);
 			if (!field) thin_out(&s, &random, 0.4);
 			fill(&s, &random, 2);
 			for (int a = 0; a < 3; a++)
@@ -313,7 +317,7 @@ static void nonsense_is_told(void **state) {
 	uint64_t random = 17;
 	(void)state;
 	setting s = { .dim = 2 };
-	lay_out(&s, &random, 4, 6);
+	lay_out(&s, &random, 4, 6, false);
 	fill(&s, &random, 1);
 	s.grain_mass[3] = NAN;
 	assert_int_equal(solve(&s), QUERN_E_NUMERIC);
@@ -324,7 +328,7 @@ static void bits_are_repeated(void **state) {
 	uint64_t random = 19;
 	(void)state;
 	setting s = { .dim = 3 };
-	lay_out(&s, &random, 4, 90);
+	lay_out(&s, &random, 4, 90, false);
 	thin_out(&s, &random, 0.3);
 	fill(&s, &random, 3);
 	setting one = s, two = s;
