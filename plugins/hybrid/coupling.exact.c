@@ -22,14 +22,15 @@ static void couple(const void *self, const quern_coupling_job *job) { (void)self
 
 typedef SuiteSparse_long whole;
 
-/* A = M + sum of m/s N N^T over grains, by rows, with its loose nodes lumped; it is symmetric. A = P^T L D L^T P. */
+/* A = M + sum of m/s N N^T over grains, by rows, with light nodes lumped; it is symmetric. A = P^T L D L^T P. */
 typedef struct {
 	const quern_coupling_system *c;
 	whole n, *begin, *other; /* n + 1; by entry */
 	quern_real *value;
-	quern_real *held;        /* by grain: weighted mass over the sum of its row */
-	quern_real *loose;       /* by node: share of what it has to do with others that is lumped */
-	whole *meets;            /* by node and one more: its entries in */
+	quern_real *lumped; /* by node: share of what it has to do with others that it settles by itself */
+	quern_real *shape;  /* N, by entry of the system's matrix; less where a node hardly holds continuum */
+	quern_real *share;  /* by grain: of its mass that moves with the continuum */
+	whole *meets;       /* by node and one more: its entries in */
 	uint32_t *grain, *entry; /* the matrix of shapes by columns */
 	whole *seen;             /* by node: where the present row of A has it, or less than where that begins */
 	whole *order, *place;    /* P and its inverse */
@@ -44,34 +45,6 @@ static void *take(const exact *e, whole n, size_t size) {
 }
 
 /* ---- the matrix ---- */
-
-/* A grain is held by the share s of its reach that continuum has; the rest of its mass knows nothing of it. */
-static void weigh_grains(const exact *e) {
-	const quern_coupling_system *c = e->c;
-	for (uint32_t g = 0; g < c->n_grains; g++) {
-		quern_real reach = 0;
-		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) reach += c->value[q];
-		e->held[g] = c->grain_weight[g] * c->grain_mass[g] / reach;
-	}
-}
-
-/* A light node that grains only just reach would have to move at many times their speed for them to be where it says: it
- * exchanges with them as if by itself. A trace of that everywhere settles what neither mass nor grain holds. */
-static void weigh_nodes(const exact *e) {
-	const quern_coupling_system *c = e->c;
-	const quern_real least = 0.05, trace = 1e-13;
-	for (whole i = 0; i < e->n; i++) {
-		quern_real firm = c->mass[i], lumped = c->mass[i];
-		for (whole k = e->meets[i]; k < e->meets[i + 1]; k++) {
-			const uint32_t g = e->grain[k];
-			const quern_real value = c->value[e->entry[k]];
-			firm += e->held[g] * value * value;
-			lumped += c->grain_weight[g] * c->grain_mass[g] * value;
-		}
-		const quern_real loose = 1 - firm / (least * lumped);
-		e->loose[i] = loose > trace ? loose : trace;
-	}
-}
 
 /* Which grains reach a node, in their order. */
 static void list_by_node(const exact *e) {
@@ -89,6 +62,41 @@ static void list_by_node(const exact *e) {
 	e->meets[e->n] = c->row[c->n_grains];
 }
 
+/* A node that holds next to no continuum must not bind grains to each other, nor be thrown about by them: with less than `least`
+ * of what they weigh there it fades, and it settles with them by itself. So nothing jumps when a point's rim comes to reach a
+ * node. A trace of that everywhere settles what neither mass nor grain holds. */
+static void weigh_nodes(const exact *e) {
+	const quern_coupling_system *c = e->c;
+	const quern_real least = 0.02, trace = 1e-13;
+	for (whole i = 0; i < e->n; i++) {
+		quern_real brought = 0;
+		for (whole k = e->meets[i]; k < e->meets[i + 1]; k++)
+			brought += c->grain_weight[e->grain[k]] * c->grain_mass[e->grain[k]] * c->value[e->entry[k]];
+		const quern_real ratio = c->mass[i] / (least * brought), lumped = 2 - ratio;
+		for (whole k = e->meets[i]; k < e->meets[i + 1]; k++)
+			e->shape[e->entry[k]] = c->value[e->entry[k]] * (ratio < 1 ? ratio : 1);
+		e->lumped[i] = lumped > 1 ? 1 : lumped > trace ? lumped : trace;
+	}
+}
+
+/* A grain is held where continuum has all of its reach, and not at all with a tenth less: its velocity would be compared with one
+ * beside it, and a wave would find the zone's rim rigid. */
+static void weigh_grains(const exact *e) {
+	const quern_coupling_system *c = e->c;
+	const quern_real least = 0.9;
+	for (uint32_t g = 0; g < c->n_grains; g++) {
+		quern_real reach = 0;
+		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) reach += e->shape[q];
+		const quern_real share = (reach - least) / (1 - least);
+		e->share[g] = share > 1 ? 1 : share > 0 ? share : 0;
+		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) e->shape[q] /= reach > least ? reach : 1;
+	}
+}
+
+static quern_real held_mass(const exact *e, uint32_t g) {
+	return e->share[g] * e->c->grain_weight[g] * e->c->grain_mass[g];
+}
+
 /* Row i of A, which begins at `at`, with the diagonal first; returns where it ends. Without values its length alone is found.
  * What is lumped goes to the diagonal, so that a sum over the row, the momentum, stays as it is. */
 static whole add_row(const exact *e, whole i, whole at, bool write) {
@@ -98,7 +106,7 @@ static whole add_row(const exact *e, whole i, whole at, bool write) {
 	e->seen[i] = at++;
 	for (whole k = e->meets[i]; k < e->meets[i + 1]; k++) {
 		const uint32_t g = e->grain[k];
-		const quern_real mine = e->held[g] * c->value[e->entry[k]];
+		const quern_real mine = held_mass(e, g) * e->shape[e->entry[k]];
 		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) {
 			const uint32_t j = c->node[q];
 			if (e->seen[j] < begin) {
@@ -106,8 +114,8 @@ static whole add_row(const exact *e, whole i, whole at, bool write) {
 				e->seen[j] = at++;
 			}
 			if (!write) continue;
-			const quern_real all = mine * c->value[q],
-							 lumped = all * (e->loose[i] > e->loose[j] ? e->loose[i] : e->loose[j]);
+			const quern_real all = mine * e->shape[q],
+							 lumped = all * (e->lumped[i] > e->lumped[j] ? e->lumped[i] : e->lumped[j]);
 			e->value[begin] += lumped;
 			e->value[e->seen[j]] += all - lumped;
 		}
@@ -118,14 +126,15 @@ static whole add_row(const exact *e, whole i, whole at, bool write) {
 static bool make_matrix(exact *e) {
 	const quern_coupling_system *c = e->c;
 	const whole values = c->row[c->n_grains];
-	if (!(e->held = take(e, c->n_grains, sizeof(quern_real))) ||
+	if (!(e->share = take(e, c->n_grains, sizeof(quern_real))) ||
 		!(e->meets = take(e, e->n + 1, sizeof(whole))) || !(e->grain = take(e, values, sizeof(uint32_t))) ||
 		!(e->entry = take(e, values, sizeof(uint32_t))) || !(e->seen = take(e, e->n, sizeof(whole))) ||
-		!(e->begin = take(e, e->n + 1, sizeof(whole))) || !(e->loose = take(e, e->n, sizeof(quern_real))))
+		!(e->begin = take(e, e->n + 1, sizeof(whole))) || !(e->lumped = take(e, e->n, sizeof(quern_real))) ||
+		!(e->shape = take(e, values, sizeof(quern_real))))
 		return false;
-	weigh_grains(e);
 	list_by_node(e);
 	weigh_nodes(e);
+	weigh_grains(e);
 	for (whole i = 0; i < e->n; i++) e->seen[i] = -1;
 	for (whole i = 0; i < e->n; i++) e->begin[i + 1] = add_row(e, i, e->begin[i], false);
 	if (!(e->other = take(e, e->begin[e->n], sizeof(whole))) ||
@@ -173,12 +182,12 @@ static void gather(const exact *e, uint32_t a) {
 	for (uint32_t g = 0; g < c->n_grains; g++) {
 		e->behind[g] = 0;
 		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++)
-			e->behind[g] += c->value[q] * (c->grain_velocity[a][g] - c->velocity[a][c->node[q]]);
+			e->behind[g] += e->shape[q] * (c->grain_velocity[a][g] - c->velocity[a][c->node[q]]);
 	}
 	for (whole i = 0; i < e->n; i++) {
 		e->change[i] = 0;
 		for (whole k = e->meets[i]; k < e->meets[i + 1]; k++)
-			e->change[i] += e->held[e->grain[k]] * c->value[e->entry[k]] * e->behind[e->grain[k]];
+			e->change[i] += held_mass(e, e->grain[k]) * e->shape[e->entry[k]] * e->behind[e->grain[k]];
 	}
 }
 
@@ -196,8 +205,8 @@ static void move(const exact *e, uint32_t a) {
 	for (whole i = 0; i < e->n; i++) c->velocity[a][i] += e->change[i];
 	for (uint32_t g = 0; g < c->n_grains; g++) {
 		quern_real gained = 0;
-		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) gained += c->value[q] * e->change[c->node[q]];
-		c->grain_velocity[a][g] += gained - e->behind[g];
+		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) gained += e->shape[q] * e->change[c->node[q]];
+		c->grain_velocity[a][g] += e->share[g] * (gained - e->behind[g]);
 	}
 }
 

@@ -45,7 +45,7 @@ typedef struct {
 	uint32_t dim, nodes, grains, row[GRAINS + 1], node[GRAINS * REACH];
 	double value[GRAINS * REACH], mass[NODES], velocity[3][NODES];
 	double grain_mass[GRAINS], weight[GRAINS], grain_velocity[3][GRAINS];
-	double reach[GRAINS]; /* sum of a row */
+	double reach[GRAINS], share[GRAINS]; /* sum of a row; what is held of a grain */
 	double place[NODES][3], at[GRAINS][3];
 } setting;
 
@@ -97,11 +97,12 @@ static void thin_out(setting *s, uint64_t *random, double share) {
 
 static void fill(setting *s, uint64_t *random, double decades) {
 	for (uint32_t i = 0; i < s->nodes; i++) {
-		s->mass[i] = pow(10, uniform(random, -decades, 0));
+		s->mass[i] = 10 * pow(10, uniform(random, -decades, 0));
 		for (uint32_t a = 0; a < s->dim; a++) s->velocity[a][i] = uniform(random, -1, 1);
 	}
 	for (uint32_t g = 0; g < s->grains; g++) {
 		s->grain_mass[g] = uniform(random, 0.1, 1);
+		s->share[g] = fmin(1, fmax(0, (s->reach[g] - 0.9) / 0.1));
 		s->weight[g] = uniform(random, 0.02, 1);
 		for (uint32_t a = 0; a < s->dim; a++) s->grain_velocity[a][g] = uniform(random, -1, 1);
 	}
@@ -164,7 +165,11 @@ static void reference(const setting *s, uint32_t a, double *node, double *grain)
 		m->a[i][n] = (long double)s->mass[i] * s->velocity[a][i];
 	}
 	for (uint32_t g = 0; g < s->grains; g++) {
-		m->a[v + g][v + g] = (long double)s->reach[g] * s->weight[g] * s->grain_mass[g];
+		if (s->share[g] <= 0) { /* as if it were not there */
+			m->a[v + g][v + g] = m->a[l + g][l + g] = 1;
+			continue;
+		}
+		m->a[v + g][v + g] = (long double)s->share[g] * s->weight[g] * s->grain_mass[g];
 		m->a[v + g][n] = m->a[v + g][v + g] * s->grain_velocity[a][g];
 		m->a[v + g][l + g] = m->a[l + g][v + g] = -1;
 		for (uint32_t q = s->row[g]; q < s->row[g + 1]; q++)
@@ -174,7 +179,7 @@ static void reference(const setting *s, uint32_t a, double *node, double *grain)
 	for (uint32_t i = 0; i < s->nodes; i++) node[i] = (double)m->a[i][n];
 	for (uint32_t g = 0; g < s->grains; g++)
 		grain[g] =
-			(double)(s->reach[g] * m->a[v + g][n] + (1 - (long double)s->reach[g]) * s->grain_velocity[a][g]);
+			(double)(s->share[g] * m->a[v + g][n] + (1 - (long double)s->share[g]) * s->grain_velocity[a][g]);
 	free(m);
 }
 
@@ -267,7 +272,7 @@ static void light_nodes_do_no_harm(void **state) {
 		char name[40];
 		snprintf(name, sizeof name, "%g", decades[k]);
 		good = table_row(name, made, 0, 1e-14) && good;
-		good = table_row("  fastest", fastest, 0, 40) && good;
+		good = table_row("  fastest", fastest, 0, 10) && good;
 	}
 	assert_true(good);
 }
