@@ -31,6 +31,8 @@ CHANGES = [
     ("neighbours, of grains alone", ["model=grains", "grains.neighbours=all_pairs"], "neighbours.all_pairs",
      "neighbours.cells"),
     ("neighbours", ["grains.neighbours=all_pairs"], "neighbours.all_pairs", "neighbours.cells")]
+if (lab.PLUGINS / "coupling.exact.so").exists():
+    CHANGES.append(("coupling of all at once", ["hybrid.coupling=exact"], "coupling.exact", "coupling.affine"))
 
 
 def hashes():
