@@ -22,13 +22,13 @@ static void couple(const void *self, const quern_coupling_job *job) { (void)self
 
 typedef SuiteSparse_long whole;
 
-/* A = M + sum of m/s N N^T over grains, by rows, with light nodes lumped; it is symmetric. A = P^T L D L^T P. */
+/* A = M + sum of m N N^T over what is held of grains, by rows, with light nodes lumped; it is symmetric. A = P^T L D L^T P. */
 typedef struct {
 	const quern_coupling_system *c;
 	whole n, *begin, *other; /* n + 1; by entry */
 	quern_real *value;
 	quern_real *lumped; /* by node: share of what it has to do with others that it settles by itself */
-	quern_real *shape;  /* N, by entry of the system's matrix; less where a node hardly holds continuum */
+	quern_real *shape;  /* N, by entry of the system's matrix: without light nodes, a held grain's sum to 1 */
 	quern_real *share;  /* by grain: of its mass that moves with the continuum */
 	whole *meets;       /* by node and one more: its entries in */
 	uint32_t *grain, *entry; /* the matrix of shapes by columns */
@@ -37,7 +37,7 @@ typedef struct {
 	whole *low_begin, *low_at;   /* of L, by columns */
 	quern_real *low, *diagonal;  /* L, D */
 	quern_real *change, *solved; /* by node: of one component; the same in the order of P */
-	quern_real *behind;          /* by grain: what it lags behind its nodes, in all that it reaches */
+	quern_real *ahead;           /* by grain: what it is ahead of the continuum at its centre */
 } exact;
 
 static void *take(const exact *e, whole n, size_t size) {
@@ -180,14 +180,14 @@ static quern_status factorise(exact *e) {
 static void gather(const exact *e, uint32_t a) {
 	const quern_coupling_system *c = e->c;
 	for (uint32_t g = 0; g < c->n_grains; g++) {
-		e->behind[g] = 0;
+		e->ahead[g] = 0;
 		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++)
-			e->behind[g] += e->shape[q] * (c->grain_velocity[a][g] - c->velocity[a][c->node[q]]);
+			e->ahead[g] += e->shape[q] * (c->grain_velocity[a][g] - c->velocity[a][c->node[q]]);
 	}
 	for (whole i = 0; i < e->n; i++) {
 		e->change[i] = 0;
 		for (whole k = e->meets[i]; k < e->meets[i + 1]; k++)
-			e->change[i] += held_mass(e, e->grain[k]) * e->shape[e->entry[k]] * e->behind[e->grain[k]];
+			e->change[i] += held_mass(e, e->grain[k]) * e->shape[e->entry[k]] * e->ahead[e->grain[k]];
 	}
 }
 
@@ -206,7 +206,7 @@ static void move(const exact *e, uint32_t a) {
 	for (uint32_t g = 0; g < c->n_grains; g++) {
 		quern_real gained = 0;
 		for (uint32_t q = c->row[g]; q < c->row[g + 1]; q++) gained += e->shape[q] * e->change[c->node[q]];
-		c->grain_velocity[a][g] += e->share[g] * (gained - e->behind[g]);
+		c->grain_velocity[a][g] += e->share[g] * (gained - e->ahead[g]);
 	}
 }
 
@@ -215,7 +215,7 @@ static quern_status solve(const void *self, const quern_coupling_system *c) {
 	(void)self;
 	if (!make_matrix(&e) || !(e.change = take(&e, e.n, sizeof(quern_real))) ||
 		!(e.solved = take(&e, e.n, sizeof(quern_real))) ||
-		!(e.behind = take(&e, c->n_grains, sizeof(quern_real))))
+		!(e.ahead = take(&e, c->n_grains, sizeof(quern_real))))
 		return QUERN_E_MEMORY;
 	const quern_status status = factorise(&e);
 	for (uint32_t a = 0; a < c->dim && status == QUERN_OK; a++) {

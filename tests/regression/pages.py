@@ -107,5 +107,8 @@ notebook()
 for page, fewest in PAGES.items():
     play(page, fewest)
 for tool in "reference", "manual":
+    if tool == "reference" and not (pathlib.Path(os.environ["QUERN_PLUGINS_DIR"]) / "coupling.exact.so").exists():
+        print("built without coupling.exact: docs/scene.md, which names it, is not compared")
+        continue
     subprocess.run([SOURCE / "tools" / tool, "--check"], check=True)
 print("ok  docs/scene.md and docs/quern.1 are what the program says")
