@@ -14,7 +14,8 @@ enum {
 	QUERN_SURFACE_WALLS = 2, /* walls and bodies count as surface */
 	QUERN_SURFACE_VOIDS = 4  /* since 2.1: with FLOOD, outside counts also where it is not connected */
 };
-enum { QUERN_ORACLE_GAP = 1, QUERN_ORACLE_WEIGHT = 2 }; /* since 2.1: what an oracle wants in its batches */
+/* since 2.1: what an oracle wants in its batches */
+enum { QUERN_ORACLE_GAP = 1, QUERN_ORACLE_WEIGHT = 2, QUERN_ORACLE_MARKED = 4 };
 
 typedef struct quern_cell_batch {
 	uint32_t n, cap, dim, pad;
@@ -36,6 +37,9 @@ typedef struct quern_cell_batch {
 	/* deciding: the continuum's share in the cell if it becomes hybrid, from 0 to 1; the least of all oracles wins; -1:
 	 * what the solver takes. NULL where the oracle does not want it */
 	quern_real *weight;
+	/* marking: 1 where this oracle's level was 0 or less at the last update and there has been material since, else 0; only
+	 * the first 31 oracles of a list have this memory. NULL where the oracle does not want it */
+	const int32_t *marked;
 } quern_cell_batch;
 
 typedef struct quern_oracle_ops {
@@ -51,12 +55,15 @@ typedef struct quern_oracle_ops {
 	/* [setup] faces of the domain beyond which is open space, bit 2 axis for the lower and 2 axis + 1 for the upper
 	 * one; others count as closed, though no body stands there. NULL: all */
 	uint32_t (*faces)(const void *self);
+	/* [setup] ways that a surface with open space must look, bits as of `faces`, to count: 8, the upper face along y,
+	 * means tops alone. Walls look all ways. NULL: all */
+	uint32_t (*looks)(const void *self);
 } quern_oracle_ops;
 
 QUERN_KIND(oracle, quern_oracle_ops, "Where grains are needed.", QUERN_ONE(quern_oracle_ops, mark),
 	QUERN_ONE(quern_oracle_ops, decide), QUERN_OPTIONALLY(quern_oracle_ops, surface),
 	QUERN_OPTIONALLY(quern_oracle_ops, wants), QUERN_OPTIONALLY(quern_oracle_ops, means),
-	QUERN_OPTIONALLY(quern_oracle_ops, faces));
+	QUERN_OPTIONALLY(quern_oracle_ops, faces), QUERN_OPTIONALLY(quern_oracle_ops, looks));
 
 #ifdef __cplusplus
 }

@@ -225,60 +225,6 @@ bool quern_hybrid_contact_stress(const update *d, uint32_t cell, quern_real stre
 	return samples > 0;
 }
 
-/* Pressure of both clouds in their shares; only the sum is the material's. */
-static quern_real pressure_of(const update *d, uint32_t c) {
-	const uint32_t dim = d->s->dim;
-	quern_real stress[6], grains = 0, points = 0, mass = 0;
-	const quern_real share = 1 - old_share(d, (int32_t)c);
-	quern_hybrid_contact_stress(d, c, stress);
-	for (uint32_t k = 0; k < dim; k++) grains -= stress[k] / dim;
-	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const int32_t i = d->point[q];
-		for (uint32_t k = 0; k < dim; k++)
-			points -= d->u[U_POINT_MASS].real[0][i] * d->u[U_POINT_STRESS].real[k][i] / dim;
-		mass += d->u[U_POINT_MASS].real[0][i];
-	}
-	return share * grains + (1 - share) * (mass > 0 ? points / mass : 0);
-}
-
-/* Shear rate from the mean velocities of neighbouring cells; one-sided where one of them is empty. */
-static quern_real shear_rate(const update *d, const int32_t cell[3]) {
-	const uint32_t dim = d->s->dim;
-	quern_real l[3][3] = { { 0 } }, sum = 0, trace = 0;
-	for (uint32_t b = 0; b < dim; b++) {
-		int32_t other[3];
-		const int32_t up = quern_hybrid_beside(d, cell, b, 1, other),
-					  down = quern_hybrid_beside(d, cell, b, -1, other);
-		const int32_t here = quern_grid_entry(d->g, cell);
-		const int32_t high = up >= 0 && d->mass[up] > 0 ? up : here,
-					  low = down >= 0 && d->mass[down] > 0 ? down : here;
-		const quern_real way = ((high != here) + (low != here)) * d->g->cell;
-		for (uint32_t a = 0; a < dim && way > 0; a++)
-			l[a][b] = (d->velocity[a][high] - d->velocity[a][low]) / way;
-		trace += l[b][b];
-	}
-	for (uint32_t a = 0; a < dim; a++)
-		for (uint32_t b = 0; b < dim; b++) {
-			const quern_real rate = 0.5 * (l[a][b] + l[b][a]) - (a == b ? trace / dim : 0);
-			sum += rate * rate;
-		}
-	return sqrt(2 * sum);
-}
-
-void quern_hybrid_rates(update *d) {
-	quern_real *rate = d->u[U_SHEAR_RATE].real[0], *inertial = d->u[U_INERTIAL].real[0];
-	if (!rate && !inertial) return;
-	for (uint32_t c = 0; c < d->n_cells; c++) {
-		int32_t cell[3];
-		const bool there = quern_grid_cell_of(d->g, c, cell) && d->mass[c] > 0;
-		const quern_real shear = there ? shear_rate(d, cell) : 0;
-		if (rate) rate[c] = shear;
-		if (!inertial) continue;
-		const quern_real p = there ? pressure_of(d, c) : 0;
-		inertial[c] = p > 0 ? shear * d->h->diameter * sqrt(d->h->density / p) : 0;
-	}
-}
-
 /* The unit vector along which the continuum's share grows at a cell, zero where it does not. */
 static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 	int32_t cell[3], other[3];

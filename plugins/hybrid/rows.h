@@ -37,6 +37,22 @@
 		.doc = "Of the mean velocity of both.") \
 	X(U_INERTIAL, "cell.inertial_number", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
 		.doc = "Shear rate times d sqrt(rho/p).") \
+	X(U_RATE_CHANGE, "cell.rate_change", "1/s", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Of the shear rate over a mean diameter.") \
+	X(U_PRESSURE, "cell.pressure", "Pa", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Of contacts and points, in their shares.") \
+	X(U_AGITATION, "cell.agitation", "1", QUERN_WRITE, QUERN_SCALAR, .flags = QUERN_OPTIONAL, \
+		.doc = "Grain density times granular temperature over the pressure; 0 without pressure.") \
+	X(U_AVERAGED, "cell.averaged", "1", QUERN_UPDATE, QUERN_INDEX, .when = "averages", \
+		.doc = "Updates that the means are of.") \
+	X(U_MEAN_VELOCITY, "cell.mean_velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR, .when = "averages", \
+		.doc = "Of both, mean over the last updates.") \
+	X(U_MEAN_PRESSURE, "cell.mean_pressure", "Pa", QUERN_UPDATE, QUERN_SCALAR, .when = "averages", \
+		.doc = "Of both, mean over the last updates.") \
+	X(U_MEAN_SCATTER, "cell.mean_scatter", "m^2/s^2", QUERN_UPDATE, QUERN_SCALAR, .when = "averages", \
+		.doc = "Mean square of velocities less that of their mean, mean over the last updates.") \
+	X(U_MARKED, "cell.marked", "1", QUERN_UPDATE, QUERN_INDEX, .when = "marks", \
+		.doc = "Bit o: oracle o has marked the cell.") \
 	X(U_GRAIN_OWED, "cell.grain_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the grains.") \
 	X(U_POINT_OWED, "cell.point_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the continuum.") \
 	X(U_GRAIN_OWED_MOMENTUM, "cell.grain_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \

@@ -27,6 +27,20 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.choices = weightings),
 	QUERN_PARAM(hybrid, ramped, NULL, "Keep shares by cell; set by itself where they are not all a half.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, average, "1",
+		"Updates over which the velocity and the pressure of cells are averaged for oracles that look at the "
+		"flow: single ones are noise where it is slow.",
+		.def = 1, .min = 1, .max = 1e6),
+	QUERN_PARAM(hybrid, most_changes, "1",
+		"Share of the cells with material that may change zone in one update; others wait. Not at the first one.",
+		.def = 1, .min = 0, .max = 1, .flags = QUERN_MIN_OPEN),
+	QUERN_PARAM(hybrid, oracle_cells, "1",
+		"Cells along each axis of the blocks over which levels of oracles are averaged: 1, 2 or 4.", .def = 1,
+		.min = 1, .max = 4),
+	QUERN_PARAM(hybrid, averages, NULL, "Keep means; set by itself where they are asked for.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, marks, NULL, "Keep what oracles have marked; set by itself where one wants to know.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(
 		hybrid, solves, NULL, "The coupling sees all nodes at once; set by itself.", .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(hybrid, diameter, "grain.diameter", "m", "Mean diameter of grains that are placed.",
@@ -133,12 +147,15 @@ static const quern_stage stages[] = { { .name = "hybrid.update",
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	hybrid *h = self;
-	(void)err;
+	if (h->oracle_cells == 3)
+		return setup->host->fail(err, QUERN_E_PARAM, "oracle_cells",
+			"must be 1, 2 or 4, as many as go into the side of a block of cells");
 	h->dim = setup->dim;
 	h->radii.mean = 0.5 * h->diameter;
 	h->radii.law = h->law_number > 0.5 ? RADIUS_UNIFORM : RADIUS_NORMAL;
 	h->radii.stream = setup->stream;
 	h->passes = h->passes || outlets_any(setup->open) || h->pourings > 0;
+	h->averages = h->averages || h->average > 1;
 	h->every = (uint32_t)(h->update / h->substeps);
 	if (!h->every) h->every = 1;
 	h->sample_every = h->every * (uint32_t)h->substeps / (uint32_t)h->samples;
@@ -146,13 +163,14 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
-static bool wants_shares(const quern_bound *oracle, uint32_t n) {
-	bool any = false;
+/* What any of the oracles wants. */
+static uint32_t wants_of(const quern_bound *oracle, uint32_t n) {
+	uint32_t wants = 0;
 	for (uint32_t o = 0; o < n; o++) {
 		const quern_oracle_ops *ops = oracle[o].ops;
-		any = any || (ops->wants && ops->wants(oracle[o].self) & QUERN_ORACLE_WEIGHT);
+		if (ops->wants) wants |= ops->wants(oracle[o].self);
 	}
-	return any;
+	return wants;
 }
 
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
@@ -168,8 +186,9 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	h->moving = quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	h->affine = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->affine != 0;
 	h->solves = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->solve != NULL;
-	h->ramped =
-		h->ramped || h->weights == WEIGHTS_RAMP || wants_shares(slot[SLOT_ORACLE], n_slot[SLOT_ORACLE]);
+	const uint32_t wants = wants_of(slot[SLOT_ORACLE], n_slot[SLOT_ORACLE]);
+	h->ramped = h->ramped || h->weights == WEIGHTS_RAMP || wants & QUERN_ORACLE_WEIGHT;
+	h->marks = h->marks || wants & QUERN_ORACLE_MARKED;
 	return QUERN_OK;
 }
 

@@ -15,9 +15,10 @@ static quern_status reckon(update *d) {
 	if (status != QUERN_OK) return status;
 	quern_hybrid_fixed(d);
 	quern_hybrid_fractions(d);
-	quern_hybrid_rates(d);
 	if (d->failed) return QUERN_E_MEMORY;
-	status = quern_hybrid_zones(d);
+	status = quern_hybrid_rates(d);
+	if (status == QUERN_OK) status = quern_hybrid_zones(d);
+	if (status == QUERN_OK) status = quern_hybrid_limit_changes(d);
 	if (status == QUERN_OK) status = quern_hybrid_shares(d);
 	if (status != QUERN_OK) return status;
 	quern_hybrid_weigh(d);

@@ -34,6 +34,7 @@ typedef struct update {
 	const body_pose *pose;    /* by body */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
 	int32_t *zone;            /* by cell: the new one; the old one stands in the field until the end */
+	quern_real *near;         /* by cell: m to the nearest surface of any oracle */
 	quern_real *share;        /* by cell: the continuum's, in the new zone */
 	quern_real *asked;        /* by cell: what oracles ask for in its place, -1: nothing; NULL: nobody asks */
 	bool *drop_grain, *drop_point;
@@ -65,7 +66,6 @@ quern_status quern_hybrid_sort(update *);
 void quern_hybrid_averages(update *);
 void quern_hybrid_fixed(update *);
 void quern_hybrid_fractions(update *);
-void quern_hybrid_rates(update *);
 /* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is
  * none. */
 bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stress[6]);
@@ -73,6 +73,9 @@ bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stres
  * order. */
 quern_status quern_hybrid_normals(update *);
 void quern_hybrid_homes(update *);
+
+/* ---- rates.c ---- */
+quern_status quern_hybrid_rates(update *);
 
 /* ---- walls.c ---- */
 quern_status quern_hybrid_walls(update *);
@@ -90,6 +93,10 @@ quern_status quern_hybrid_nearest(update *, const bool *source, int32_t *nearest
 /* By cell with `through` set: m from its centre to the nearest cell with `source` set, from cell to cell with
  * `through`. */
 quern_status quern_hybrid_distance(update *, const bool *source, const bool *through, quern_real *distance);
+
+/* ---- changes.c ---- */
+/* Takes back what would change beyond `most_changes`. */
+quern_status quern_hybrid_limit_changes(update *);
 
 /* ---- shares.c ---- */
 quern_status quern_hybrid_shares(update *);

@@ -141,6 +141,7 @@ quern_status quern_hybrid_distance(update *d, const bool *source, const bool *th
 
 typedef struct {
 	uint32_t flags, faces;          /* what counts, and beyond which faces of the domain it is open */
+	uint32_t looks;                 /* ways that surface with open space must look */
 	const bool *meant;              /* by body: those that it means; NULL: all */
 	const quern_real *gap;          /* by cell: to these, NULL if nobody wants to know */
 	bool *outside, *solid, *inside; /* by cell */
@@ -212,12 +213,13 @@ static bool is_meant(const update *d, const surface *f, int32_t c) {
 /* Whether there is surface between a cell inside and what lies one step from it. */
 static bool is_surface(
 	const update *d, const surface *f, uint32_t c, const int32_t cell[3], uint32_t axis, int step) {
+	const bool looks = f->looks >> (2 * axis + (step > 0)) & 1;
 	int32_t other;
 	switch (beside(d, f, c, cell, axis, step, &other)) {
-	case BESIDE_OPEN: return f->flags & QUERN_SURFACE_FLOOD;
+	case BESIDE_OPEN: return looks && f->flags & QUERN_SURFACE_FLOOD;
 	case BESIDE_WALL: return f->flags & QUERN_SURFACE_WALLS;
 	case BESIDE_NOTHING: return false;
-	default: return f->outside[other] || (f->flags & QUERN_SURFACE_WALLS && is_meant(d, f, other));
+	default: return (looks && f->outside[other]) || (f->flags & QUERN_SURFACE_WALLS && is_meant(d, f, other));
 	}
 }
 
@@ -243,6 +245,7 @@ static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern
 	bool *meant = ops->means ? s->host->memory(s->run, bodies + 1u) : NULL;
 	*f = (surface) { .flags = ops->surface ? ops->surface(oracle->self) : 0,
 		.faces = ops->faces ? ops->faces(oracle->self) : ~0u,
+		.looks = ops->looks ? ops->looks(oracle->self) : ~0u,
 		.meant = meant,
 		.outside = s->host->memory(s->run, d->n_cells + 1u),
 		.solid = s->host->memory(s->run, d->n_cells + 1u),
@@ -257,6 +260,38 @@ static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern
 	return !f->meant || quern_hybrid_gaps(d, f->meant, gap) == QUERN_OK;
 }
 
+/* Whether a surface with open space beside a cell inside looks a way that counts, or one that does not. */
+static bool looks_out(const update *d, const surface *f, uint32_t c, bool counts) {
+	int32_t cell[3], other;
+	bool any = false;
+	if (!f->inside[c] || !quern_grid_cell_of(d->g, c, cell)) return false;
+	for (uint32_t k = 0; k < d->g->dim; k++)
+		for (int step = -1; step <= 1; step += 2) {
+			if ((f->looks >> (2 * k + (step > 0)) & 1) != counts) continue;
+			const int what = beside(d, f, c, cell, k, step, &other);
+			any = any || what == BESIDE_OPEN || (what == BESIDE_CELL && f->outside[other]);
+		}
+	return any;
+}
+
+/* What lies loose before a surface that does not count is deep inside for this oracle: grains there would meet the continuum
+ * without a zone between. */
+static quern_status leave_others(update *d, const surface *f, quern_real *distance) {
+	bool *source = d->s->host->memory(d->s->run, d->n_cells + 1u);
+	quern_real *way[2];
+	if (!source) return QUERN_E_MEMORY;
+	for (int counts = 0; counts < 2; counts++) {
+		way[counts] = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof **way);
+		if (!way[counts]) return QUERN_E_MEMORY;
+		for (uint32_t c = 0; c < d->n_cells; c++) source[c] = looks_out(d, f, c, counts);
+		const quern_status status = quern_hybrid_distance(d, source, f->outside, way[counts]);
+		if (status != QUERN_OK) return status;
+	}
+	for (uint32_t c = 0; c < d->n_cells; c++)
+		if (f->outside[c] && way[0][c] < way[1][c]) distance[c] = INFINITY;
+	return QUERN_OK;
+}
+
 /* Distance of a cell's centre to the nearest cell outside. */
 static quern_status surface_distance(update *d, surface *f, const quern_real *level, quern_real *distance) {
 	spreading p;
@@ -268,20 +303,29 @@ static quern_status surface_distance(update *d, surface *f, const quern_real *le
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (!f->inside[c]) distance[c] = 0;
 	free(p.heap);
-	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
+	if (p.failed) return QUERN_E_MEMORY;
+	return f->looks == ~0u ? QUERN_OK : leave_others(d, f, distance);
 }
 
 /* ---- asking the oracles ---- */
 
 typedef struct {
 	_Alignas(64) quern_real centre[3][N], shifted[N], gap[N], weight[N];
+	int32_t marked[N];
 } oracle_memory;
+
+/* Bit of an oracle in what cells remember of marks, 0 for those that the field has no room for. */
+static int32_t mark_of(const update *d, const quern_bound *oracle) {
+	const ptrdiff_t o = oracle - d->s->slot[SLOT_ORACLE];
+	return o < 31 ? (int32_t)(1u << o) : 0;
+}
 
 /* Once an oracle has been asked for levels, `distance` is known. */
 static void ask(const update *d, const quern_bound *oracle, uint32_t b, const quern_real *distance,
 	const quern_real *gap, quern_real shift, oracle_memory *m, quern_real *level, int32_t *wish) {
 	const quern_oracle_ops *ops = oracle->ops;
 	const uint32_t wants = ops->wants ? ops->wants(oracle->self) : 0;
+	const int32_t *marked = wants & QUERN_ORACLE_MARKED && !distance ? d->u[U_MARKED].index : NULL;
 	quern_column own[QUERN_MOST_USES];
 	quern_cell_batch batch = { .n = N,
 		.cap = N,
@@ -294,7 +338,8 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 		.time = d->s->time,
 		.dt = d->s->dt,
 		.gap = wants & QUERN_ORACLE_GAP ? m->gap : NULL,
-		.weight = distance && wants & QUERN_ORACLE_WEIGHT ? m->weight : NULL };
+		.weight = distance && wants & QUERN_ORACLE_WEIGHT ? m->weight : NULL,
+		.marked = marked ? m->marked : NULL };
 	for (uint32_t k = 0; k < 3; k++) batch.gravity[k] = d->s->gravity[k];
 	for (uint32_t i = 0; i < N; i++) {
 		int32_t cell[3];
@@ -305,6 +350,7 @@ static void ask(const update *d, const quern_bound *oracle, uint32_t b, const qu
 		if (distance) m->shifted[i] = distance[b * N + i] + shift;
 		if (gap) m->gap[i] = gap[b * N + i] + shift;
 		m->weight[i] = -1;
+		if (marked) m->marked[i] = d->mass[b * N + i] > 0 && marked[b * N + i] & mark_of(d, oracle);
 	}
 	for (uint32_t k = 0; k < d->s->dim; k++) batch.centre[k] = m->centre[k];
 	if (distance) batch.distance = m->shifted;
@@ -339,9 +385,39 @@ static void warn_of_closed(const update *d, const quern_bound *oracle, const sur
 	for (uint32_t c = 0; c < d->n_cells && !any; c++) any = f->inside[c] && d->mass[c] > 0;
 	if (!any || f->found || !(f->flags & QUERN_SURFACE_FLOOD) || d->u[U_UPDATES].index[0]) return;
 	d->s->host->log(d->s->run, 2,
-		"%s finds no surface: no open space reaches the material, so all becomes continuum; in a "
+		"%s finds no surface: no open space reaches the material%s, so all becomes continuum; in a "
 		"closed vessel let voids count (oracle.packing_fraction: voids)",
-		oracle->id);
+		oracle->id, f->looks == ~0u ? "" : " from where it looks");
+}
+
+/* What an oracle has marked, for its next time. */
+static void remember(const update *d, const quern_bound *oracle, const quern_real *level) {
+	const quern_oracle_ops *ops = oracle->ops;
+	int32_t *marked = d->u[U_MARKED].index;
+	const int32_t bit = mark_of(d, oracle);
+	if (!ops->wants || !(ops->wants(oracle->self) & QUERN_ORACLE_MARKED)) return;
+	for (uint32_t c = 0; c < d->n_cells; c++)
+		marked[c] = d->mass[c] > 0 && level[c] <= 0 ? marked[c] | bit : marked[c] & ~bit;
+}
+
+/* Levels become their means over so many cells along each axis, by what is open of them. The grid's blocks have sides of 8 or 4
+ * cells, so that none of these lies in two. */
+static void average_levels(const update *d, quern_real *level) {
+	const uint32_t k = (uint32_t)d->h->oracle_cells, edge = d->g->edge;
+	for (uint32_t b = 0; b < d->g->n_blocks && k > 1; b++) {
+		quern_real sum[N] = { 0 }, open[N] = { 0 };
+		uint32_t home[N];
+		for (uint32_t i = 0; i < N; i++) {
+			const uint32_t c = b * N + i, x = i % edge, y = i / edge % edge, z = i / (edge * edge);
+			int32_t cell[3];
+			home[i] = (x - x % k) + edge * (y - y % k) + edge * edge * (z - z % k);
+			if (!quern_grid_cell_of(d->g, c, cell)) continue;
+			sum[home[i]] += d->open[c] * level[c];
+			open[home[i]] += d->open[c];
+		}
+		for (uint32_t i = 0; i < N; i++)
+			if (open[home[i]] > 0) level[b * N + i] = sum[home[i]] / open[home[i]];
+	}
 }
 
 /* A zone between the two that are wished for stays. */
@@ -355,8 +431,12 @@ static quern_status wishes(update *d, const quern_bound *oracle, const wish_cell
 	if (!m) return QUERN_E_MEMORY;
 	for (uint32_t b = 0; b < d->g->n_blocks; b++)
 		ask(d, oracle, b, NULL, f.gap, 0, m, w->level + (size_t)b * N, NULL);
+	remember(d, oracle, w->level);
+	average_levels(d, w->level);
 	const quern_status status = surface_distance(d, &f, w->level, w->distance);
 	if (status != QUERN_OK) return status;
+	for (uint32_t c = 0; c < d->n_cells; c++)
+		if (distance[c] < d->near[c]) d->near[c] = distance[c];
 	warn_of_closed(d, oracle, &f);
 	for (uint32_t b = 0; b < d->g->n_blocks; b++)
 		for (int side = 0; side < 2; side++) {
@@ -389,11 +469,13 @@ quern_status quern_hybrid_zones(update *d) {
 		.gap = s->host->memory(s->run, n * sizeof(quern_real)),
 		.low = s->host->memory(s->run, n * sizeof(int32_t)),
 		.high = s->host->memory(s->run, n * sizeof(int32_t)) };
-	if (!w.level || !w.distance || !w.gap || !w.low || !w.high) return QUERN_E_MEMORY;
+	d->near = s->host->memory(s->run, n * sizeof(quern_real));
+	if (!w.level || !w.distance || !w.gap || !w.low || !w.high || !d->near) return QUERN_E_MEMORY;
 	if (d->h->ramped) d->asked = s->host->memory(s->run, n * sizeof(quern_real));
 	if (d->h->ramped && !d->asked) return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		w.low[c] = w.high[c] = QUERN_CONTINUUM;
+		d->near[c] = INFINITY;
 		if (d->asked) d->asked[c] = -1;
 	}
 	for (uint32_t o = 0; o < s->n_slot[SLOT_ORACLE]; o++) {

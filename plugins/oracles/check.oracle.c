@@ -5,7 +5,7 @@
 #include <quern/oracle.h>
 #include <stdlib.h>
 
-enum { CENTRE, DISTANCE, ZONE, LEVEL, WISH, GAP, WEIGHT };
+enum { CENTRE, DISTANCE, ZONE, LEVEL, WISH, GAP, WEIGHT, MARKED };
 enum { MARKS, DECIDES, VARIANTS };
 
 static void call(const quern_check_kernel *k, const quern_check_batch *b) {
@@ -26,6 +26,7 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	batch.wish = quern_check_integers_at(k, b, WISH);
 	batch.gap = quern_check_at(k, b, GAP, 0);
 	batch.weight = quern_check_at(k, b, WEIGHT, 0);
+	batch.marked = quern_check_integers_at(k, b, MARKED);
 	k->host->columns(k, b, k->use, use);
 	(k->pass == MARKS ? ops->mark : ops->decide)(k->self, &batch);
 }
@@ -51,6 +52,11 @@ static quern_check_kernel *make(
 	/* rows are the cells' fields in both calls, whatever their hook */
 	c->host->add_uses(k, 0, true);
 	c->host->add_uses(k, 1, true);
+	if (variant == MARKS && wants & QUERN_ORACLE_MARKED) {
+		c->host->add_integers(k, MARKED, "marked", QUERN_CHECK_IN);
+		int32_t *marked = c->host->column(k, k->at[MARKED])->given;
+		for (uint32_t i = 0; i < n; i++) marked[i] = c->host->uniform(114, i, 0, 1) > 0.5;
+	}
 	if (variant == MARKS) {
 		c->host->add(k, LEVEL, "level", QUERN_CHECK_OUT, 1);
 		return k;
