@@ -260,38 +260,6 @@ static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern
 	return !f->meant || quern_hybrid_gaps(d, f->meant, gap) == QUERN_OK;
 }
 
-/* Whether a surface with open space beside a cell inside looks a way that counts, or one that does not. */
-static bool looks_out(const update *d, const surface *f, uint32_t c, bool counts) {
-	int32_t cell[3], other;
-	bool any = false;
-	if (!f->inside[c] || !quern_grid_cell_of(d->g, c, cell)) return false;
-	for (uint32_t k = 0; k < d->g->dim; k++)
-		for (int step = -1; step <= 1; step += 2) {
-			if ((f->looks >> (2 * k + (step > 0)) & 1) != counts) continue;
-			const int what = beside(d, f, c, cell, k, step, &other);
-			any = any || what == BESIDE_OPEN || (what == BESIDE_CELL && f->outside[other]);
-		}
-	return any;
-}
-
-/* What lies loose before a surface that does not count is deep inside for this oracle: grains there would meet the continuum
- * without a zone between. */
-static quern_status leave_others(update *d, const surface *f, quern_real *distance) {
-	bool *source = d->s->host->memory(d->s->run, d->n_cells + 1u);
-	quern_real *way[2];
-	if (!source) return QUERN_E_MEMORY;
-	for (int counts = 0; counts < 2; counts++) {
-		way[counts] = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof **way);
-		if (!way[counts]) return QUERN_E_MEMORY;
-		for (uint32_t c = 0; c < d->n_cells; c++) source[c] = looks_out(d, f, c, counts);
-		const quern_status status = quern_hybrid_distance(d, source, f->outside, way[counts]);
-		if (status != QUERN_OK) return status;
-	}
-	for (uint32_t c = 0; c < d->n_cells; c++)
-		if (f->outside[c] && way[0][c] < way[1][c]) distance[c] = INFINITY;
-	return QUERN_OK;
-}
-
 /* Distance of a cell's centre to the nearest cell outside. */
 static quern_status surface_distance(update *d, surface *f, const quern_real *level, quern_real *distance) {
 	spreading p;
@@ -303,8 +271,7 @@ static quern_status surface_distance(update *d, surface *f, const quern_real *le
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (!f->inside[c]) distance[c] = 0;
 	free(p.heap);
-	if (p.failed) return QUERN_E_MEMORY;
-	return f->looks == ~0u ? QUERN_OK : leave_others(d, f, distance);
+	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
 }
 
 /* ---- asking the oracles ---- */

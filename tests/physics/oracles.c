@@ -272,9 +272,111 @@ static void closed_boxes_have_no_surface(void **state) {
 	harness_close(run);
 }
 
+static double from_right(double x, double y) { return (void)y, 0.12 - x; }
+static double from_top_or_right(double x, double y) { return fmin(0.12 - x, 0.12 - y); }
+
+/* Only the surfaces that the scene chooses count to layered, by the way they look, by a face or by a body. */
+static void layers_below_chosen_surfaces(void **state) {
+	static const char rods[] = "{cylinder: {centre: [0.06, 0.06], radius: 0.01, name: rod}}, "
+							   "{box: {lower: [0.012, 0.02], upper: [0.02, 0.05]}}";
+	static const struct {
+		const char *name, *bodies, *keys;
+		way_of way, solid;
+	} scenes[] = { { "towards the top", "", "toward: [0, 1]", from_top, NULL },
+		{ "towards the top, 24 degrees off", "", "toward: [-0.4, 0.9]", from_top, NULL },
+		{ "at the right face", "", "faces: [upper_x]", from_right, NULL },
+		{ "towards a corner", "", "toward: [1, 1]", from_top_or_right, NULL },
+		{ "the top and a face", "", "toward: [0, 3], faces: [upper_x]", from_top_or_right, NULL },
+		{ "the top beside bodies", rods, "toward: [0, 1]", from_top, from_rods },
+		{ "a rod", rods, "bodies: [rod]", from_rod, from_rods },
+		{ "the top and a rod", rods, "toward: [0, 1], bodies: [rod]", from_top_or_rod, from_rods } };
+	(void)state;
+	bool good = true;
+	table_head("cells in another zone than their distance from what is chosen says");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		char oracle[200];
+		double off;
+		snprintf(oracle, sizeof oracle, "{layered: {depth: 18 mm, half_width: 6 mm, %s}}", scenes[k].keys);
+		quern_run *run = box(scenes[k].bodies, scenes[k].solid, oracle, "half");
+		const bool round = scenes[k].solid == from_rods; /* steps count from cell to cell */
+		const double slack = round ? 1.1 * cell : 0.75e-3 + 1e-9;
+		good &= table_row(
+			scenes[k].name, misplaced(run, scenes[k].way, scenes[k].solid, 0.012, 0.012, slack, &off), 0, 0);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+/* A column in the middle of the domain, with a loose row of cells along its sides, one grain in each. */
+static double in_column(double x, double y) {
+	const double a = fabs(x - 0.06);
+	const bool loose = a > 0.02 && a < 0.024 && fmod(x, 0.004) < 0.002 && fmod(y, 0.004) < 0.002;
+	return y < 0.08 && (a < 0.02 || loose) ? 1 : -1;
+}
+
+/* At its sides, which do not count, the continuum goes up to the surface; what lies loose before it stays grains. */
+static void other_sides_are_none(void **state) {
+	(void)state;
+	quern_run *run =
+		box("", in_column, "{layered: {depth: 14 mm, half_width: 6 mm, toward: [0, 1]}}", "half");
+	const int32_t *zone = harness_field(run, "cell.zone").index;
+	const quern_grid_view *g = quern_host_table.grid(run);
+	int side = 0, inside = 0;
+	for (int j = 0; j < 20; j++)
+		for (int i = 9; i < 21; i++) {
+			const double way = 0.08 - (j + 0.5) * cell;
+			const int32_t z = zone[quern_grid_entry(g, (const int32_t[3]) { i, j, 0 })];
+			const bool loose = i == 9 || i == 20;
+			if (loose) side += z != QUERN_DISCRETE;
+			else inside += z != (way <= 0.008 ? QUERN_DISCRETE : way < 0.02 ? QUERN_HYBRID : QUERN_CONTINUUM);
+		}
+	table_head("cells of a column in another zone than the way from its top says");
+	bool good = table_row("inside", inside, 0, 0);
+	good &= table_row("loose at the sides", side, 0, 0);
+	harness_close(run);
+	assert_true(good);
+}
+
+static double from_lowered_top(double x, double y) { return (void)x, 0.112 - y; }
+static double in_hole(double x, double y) { return fmax(fabs(x - 0.05), fabs(y - 0.118)) - 0.0009; }
+static double above_top(double x, double y) { return (void)x, 0.1169 - y; }
+static double top_row(double x, double y) { return x > 0 ? above_top(x, y) : 0; }
+
+/* With `oracle_cells: 2` a hole of one cell in the surface is none, since the block of four that it is in is full to three
+ * quarters; a row that is missing is one of two, and takes the other one along. */
+static void surfaces_of_blocks(void **state) {
+	static const struct {
+		const char *name, *weights;
+		way_of way, solid;
+		bool same;
+	} scenes[] = { { "a hole, by cells", "half", from_top, in_hole, false },
+		{ "a hole, by blocks", "half, oracle_cells: 2", from_top, in_hole, true },
+		{ "half a row is missing, by blocks", "half, oracle_cells: 2", from_lowered_top, top_row, true },
+		{ "half a row is missing, by cells", "half", from_lowered_top, top_row, false } };
+	(void)state;
+	bool good = true;
+	table_head("cells in another zone than their distance from the surface says");
+	for (size_t k = 0; k < sizeof scenes / sizeof *scenes; k++) {
+		double off;
+		quern_run *run = box("", scenes[k].solid,
+			"{packing_fraction: {depth: 14 mm, half_width: 6 mm, closed: [lower_x, upper_x, lower_y]}}",
+			scenes[k].weights);
+		const int wrong = misplaced(run, scenes[k].way, NULL, 0.008, 0.012, 0.75e-3 + 1e-9, &off);
+		if (scenes[k].same) good &= table_row(scenes[k].name, wrong, 0, 0);
+		else {
+			table_note(scenes[k].name, wrong);
+			good &= wrong > 0;
+		}
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(drawn_zones), cmocka_unit_test(ramps_across_a_zone),
 		cmocka_unit_test(zones_near_bodies), cmocka_unit_test(faces_and_bodies_that_are_meant),
-		cmocka_unit_test(surfaces_that_are_asked_for), cmocka_unit_test(closed_boxes_have_no_surface) };
+		cmocka_unit_test(surfaces_that_are_asked_for), cmocka_unit_test(closed_boxes_have_no_surface),
+		cmocka_unit_test(layers_below_chosen_surfaces), cmocka_unit_test(other_sides_are_none),
+		cmocka_unit_test(surfaces_of_blocks) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
