@@ -15,7 +15,8 @@ typedef struct {
 static const quern_param params[] = { OPEN_PARAM(layered),
 	BAND_PARAMS(layered, "Depth of the middle of the hybrid zone below the surfaces that count."),
 	QUERN_PARAM(layered, toward, NULL,
-		"Surfaces that look this way count, by up to 60 degrees off: [0, 1] means those on top.",
+		"Surfaces that look this way count, by up to 60 degrees off: [0, 1] means those on top. Default, where "
+		"neither this nor faces nor bodies are given: against gravity.",
 		.flags = QUERN_MAYBE),
 	OPEN_FACES(layered, faces,
 		"Surfaces that look at these faces of the domain count, and material that lies against one of them has "
@@ -39,14 +40,14 @@ static uint32_t ways(const quern_real toward[3], uint32_t dim) {
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	layered *p = self;
-	const bool given = !isnan(p->toward[0]);
-	const uint32_t toward = given ? ways(p->toward, setup->dim) : 0;
-	if (given && !toward)
-		return setup->host->fail(err, QUERN_E_PARAM, "toward", "has no length: give a direction");
+	const bool given = !isnan(p->toward[0]), nothing = !given && !p->faces.n && !p->bodies.n;
+	const quern_real up[3] = { -setup->gravity[0], -setup->gravity[1], -setup->gravity[2] };
+	const uint32_t toward = given ? ways(p->toward, setup->dim) : nothing ? ways(up, setup->dim) : 0;
+	if ((given || nothing) && !toward)
+		return setup->host->fail(err, QUERN_E_PARAM, given ? "toward" : NULL,
+			given ? "has no length: give a direction"
+				  : "say which surfaces count, since no gravity does: toward a direction, faces or bodies");
 	p->looks = toward | open_bits(&p->faces);
-	if (!p->looks && !p->bodies.n)
-		return setup->host->fail(
-			err, QUERN_E_PARAM, NULL, "say which surfaces count: toward a direction, faces or bodies");
 	quern_status status = open_check(&p->faces, "faces", setup, err);
 	if (status == QUERN_OK) status = named_check(&p->bodies, p->count, setup, err);
 	return status == QUERN_OK ? band_check(&p->band, setup, err, "at the surface") : status;
