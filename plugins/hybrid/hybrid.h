@@ -16,19 +16,20 @@
 
 typedef struct hybrid {
 	int32_t substeps, update, samples, average; /* from the scene */
-	quern_real hysteresis, guard, gain, most_changes;
+	quern_real hysteresis, guard, gain;
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
 	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
 	bool moving;         /* some bodies do */
 	int32_t weights;
-	bool ramped;          /* shares of hybrid cells are a field: cell.weight */
-	int32_t oracle_cells; /* along each axis of the blocks that oracles' levels are averaged over */
-	bool averages;        /* oracles see means over some updates */
-	bool marks;           /* what oracles marked is kept: cell.marked */
-	bool passes;          /* books are kept of what leaves and comes */
-	quern_real pourings;  /* sources of grains */
+	bool ramped;             /* shares of hybrid cells are a field: cell.weight */
+	quern_real most_changes; /* of the cells with material, in an update */
+	int32_t oracle_cells;    /* along each axis of the blocks that oracles' levels are averaged over */
+	bool averages;           /* oracles see means over some updates */
+	bool marks;              /* what oracles marked is kept: cell.marked */
+	bool passes;             /* books are kept of what leaves and comes */
+	quern_real pourings;     /* sources of grains */
 } hybrid;
 
 enum { WEIGHTS_HALF, WEIGHTS_RAMP };

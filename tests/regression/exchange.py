@@ -20,6 +20,7 @@ CHANGES = [
      "transfer.picflip"),
     ("oracle", ["hybrid.oracle=[{strain_rate: {shear_rate: 5, %s}}]" % DEEP], "oracle.strain_rate",
      "oracle.packing_fraction"),
+    ("oracle, of the top alone", ["hybrid.oracle=[{layered: {%s}}]" % DEEP], "oracle.layered", "oracle.packing_fraction"),
     ("packer", ["hybrid.packer=random"], "packer.random", None),
     ("packer, of the first grains too", ["hybrid.packer=random", "grains.fill.0.packer=random",
                                          "grains.fill.1.packer=random"], "packer.random", "packer.two_point_tangent"),
