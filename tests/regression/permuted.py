@@ -65,7 +65,8 @@ SCENES = {
         hybrid__oracle="[{packing_fraction: {depth: 4.1 mm, half_width: 4 mm}}, {near_bodies: {distance: 3 mm, width: 8 mm}}]")]),
     "oracles that look at the flow, few changes at once": ("column", [*COLUMN, *lab.sets(
         hybrid__most_changes=0.05, hybrid__average=3, hybrid__oracle_cells=2,
-        hybrid__oracle="[{layered: {depth: 8.1 mm, half_width: 4 mm}}, {strain_rate: {rate_change: 40, shear_rate: 20, depth: 5 mm, half_width: 4 mm}}]")]),
+        hybrid__oracle="[{layered: {depth: 8.1 mm, half_width: 4 mm}}, "
+                       "{strain_rate: {rate_change: 40, shear_rate: 20, depth: 5 mm, half_width: 4 mm}}]")]),
     "continuum alone, with a source": ("column", flow.CONTINUUM),
     "a hopper that is filled and runs out": ("hopper", flow.HOPPER),
     "a drum that turns": ("drum", ["--set=time.end=0.05", "--set=output.every=10 ms"]),
