@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: MIT
+"""What a calibration leaves: calibration.yaml for scenes, options.txt for the command line, rows.csv, a page with its charts."""
+import argparse
+import csv
+import importlib.util
+import io
+import math
+import pathlib
+import shlex
+from dataclasses import dataclass
+
+import numpy as np
+import yaml
+
+from .chart_data import Curve, Picture
+from .program import call
+from .rheology import Bed, Grains, Law, Rows, Slip, law_of, slip_of
+from .workers import save
+
+AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is told
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was measured: a bed for each seed, and for each angle a chute for each seed."""
+    name: str
+    dimension: int
+    grains: Grains
+    beds: list[Bed]
+    chutes: dict[float, list[Rows]]  # by angle in degrees
+
+    def law(self) -> Law:
+        return law_of([one for rows in self.chutes.values() for one in rows])
+
+    def laws(self) -> list[Law]:
+        """Of each seed alone."""
+        return [law_of([rows[k] for rows in self.chutes.values()]) for k in range(len(self.beds))]
+
+    def slips(self) -> list[Slip]:
+        return [slip_of(one) for rows in self.chutes.values() for one in rows]
+
+
+def spread(values) -> float:
+    """Standard deviation of single seeds; NaN of one."""
+    return float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
+
+
+def constants(found: Found) -> dict[str, tuple[float, float, str]]:
+    """Key of material.mu_i: value, spread over seeds, unit."""
+    law, laws, beds = found.law(), found.laws(), found.beds
+
+    def of(values) -> tuple[float, float]:
+        return float(np.mean(values)), spread(values)
+    return {"critical_density": (*of([one.density for one in beds]), "kg/m^3"),
+            "static_friction": (law.mu_s, spread([one.mu_s for one in laws]), ""),
+            "limit_friction": (law.mu_2, spread([one.mu_2 for one in laws]), ""),
+            "inertial_number": (law.i_0, spread([one.i_0 for one in laws]), ""),
+            "bulk_modulus": (*of([one.bulk_modulus for one in beds]), "Pa")}
+
+
+def slip_length(found: Found) -> tuple[float, float]:
+    """In diameters: mean over chutes, deviation of single ones."""
+    lengths = [one.length / found.grains.diameter for one in found.slips()]
+    return float(np.mean(lengths)), spread(lengths)
+
+
+def plain(value: float, figures: int = 4) -> str:
+    return f"{value:.{figures}g}" if value < 10 ** figures else f"{float(f'{value:.{figures}g}'):.0f}"
+
+
+def with_spread(value: float, off: float) -> str:
+    return f"{plain(value)} ± {plain(off, 2)}" if math.isfinite(off) else plain(value)
+
+
+def as_yaml(tree: dict) -> str:
+    """YAML that the program and Python read alike: 1.0e+5, not 1e5."""
+    return yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, width=140)
+
+
+# ---- for scenes ----
+
+def block(found: Found, command: str) -> str:
+    """What stands in a scene's continuum."""
+    rows = {key: (plain(value), f"± {plain(off, 2)} between seeds" if math.isfinite(off) else "of one seed")
+            for key, (value, off, _) in constants(found).items()}
+    rows |= {"diameter": (plain(found.grains.diameter, 9), "of these grains"), "grain_density": (plain(found.grains.density, 9), "of these grains")}
+    low, high = inertia_range(found)
+    length, off = slip_length(found)
+    lines = [f"# {command}", f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds",
+             f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate", "continuum:", "  material:", "    mu_i:"]
+    return "\n".join(lines + [f"      {key}: {value}".ljust(40) + f"# {note}" for key, (value, note) in rows.items()]) + "\n"
+
+
+def options_text(found: Found) -> str:
+    values = {key: plain(value) for key, (value, _, _) in constants(found).items()}
+    values |= {"diameter": plain(found.grains.diameter, 9), "grain_density": plain(found.grains.density, 9)}
+    return "".join(f"--set continuum.material.mu_i.{key}={value}\n" for key, value in values.items())
+
+
+def listed(angles) -> str:
+    *most, last = [f"{angle:g}" for angle in sorted(angles)]
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def inertia_range(found: Found) -> tuple[float, float]:
+    every = np.concatenate([one.inertia[one.bulk] for rows in found.chutes.values() for one in rows])
+    return float(every.min()), float(every.max())
+
+
+# ---- for people ----
+
+def rows_csv(found: Found) -> str:
+    """Every row of every chute."""
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(["angle [degree]", "seed", "bulk", "height [m]", "density [kg/m^3]", "velocity [m/s]", "pressure [Pa]", "friction", "inertial_number"])
+    for angle, rows in sorted(found.chutes.items()):
+        for seed, one in enumerate(rows, 1):
+            for k in np.flatnonzero(one.density > 0):
+                numbers = (one.y[k], one.density[k], one.velocity[k], one.pressure[k], one.friction[k], one.inertia[k])
+                table.writerow([f"{angle:g}", seed, int(one.bulk[k]), *("" if math.isnan(x) else f"{x:.6g}" for x in numbers)])
+    return out.getvalue()
+
+
+def pictures(found: Found) -> list[Picture]:
+    d, flow, speed = found.grains.diameter, [], []
+    for angle, rows in sorted(found.chutes.items()):
+        every = [(one.inertia[one.bulk], one.friction[one.bulk]) for one in rows]
+        x, y = (np.concatenate([pair[k] for pair in every]) for k in (0, 1))
+        order = np.argsort(x)
+        flow.append(Curve(f"{angle:g}°", x[order], y[order]))
+        there = np.all([one.density > 0.5 * np.median(one.density[one.bulk]) for one in rows], axis=0)
+        speed.append(Curve(f"{angle:g}°", np.mean([one.velocity[there] for one in rows], axis=0), rows[0].y[there] / d))
+    x = np.linspace(0, inertia_range(found)[1] * 1.1, 100)
+    flow.append(Curve("the law", x, found.law()(x), reference=True))
+    return [Picture("mu", "scalar", "Friction over the inertial number", ("I", ""), ("tau/p", ""), flow),
+            Picture("velocity", "scalar", "Velocity in the chutes", ("velocity", "m/s"), ("height over d", ""), speed)]
+
+
+def constants_table(found: Found) -> list[str]:
+    return ["| key of `material.mu_i` | value ± spread between seeds | unit |", "|---|---|---|",
+            *(f"| `{key}` | {with_spread(value, off)} | {unit} |" for key, (value, off, unit) in constants(found).items())]
+
+
+def chutes_table(found: Found) -> list[str]:
+    lines = ["| angle [°] | tau/p | I | density [kg/m³] | slip at the floor [m/s] | shear rate there [1/s] | slip length over d |", "|---|---|---|---|---|---|---|"]
+    for angle, rows in sorted(found.chutes.items()):
+        slips = [slip_of(one) for one in rows]
+        parts = [[float(np.mean(one.friction[one.bulk])) for one in rows], [float(np.mean(one.inertia[one.bulk])) for one in rows],
+                 [float(np.mean(one.density[one.bulk])) for one in rows], [one.velocity for one in slips], [one.rate for one in slips],
+                 [one.length / found.grains.diameter for one in slips]]
+        lines.append(f"| {angle:g} | " + " | ".join(with_spread(float(np.mean(part)), spread(part)) for part in parts) + " |")
+    return lines
+
+
+def about_law(found: Found) -> list[str]:
+    low, high = inertia_range(found)
+    law, laws = found.law(), found.laws()
+    told = [f"{with_spread(float(law(x)), spread([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT if low / 2 < x < 2 * high]
+    said = [f"The law is measured for I from {plain(low, 2)} to {plain(high, 2)}. There it says {', '.join(told)}. The three numbers of the law scatter more "
+            "than the law does, since one can stand in for another; take them together."]
+    if law.i_0 > high * 5:
+        said.append("The flows hardly show that friction comes to an end: mu_2 and I_0 stand for a straight line, and say nothing of faster flows.")
+    return said
+
+
+def about_bed(found: Found) -> str:
+    loaded, unloaded = ([getattr(one, name) for one in found.beds] for name in ("loaded", "unloaded"))
+    return (f"Pressed by four times their own weight, grains give way with a constrained modulus of {with_spread(float(np.mean(loaded)), spread(loaded))} Pa; relieved, "
+            f"with {with_spread(float(np.mean(unloaded)), spread(unloaded))} Pa, of which the bulk modulus is made.")
+
+
+def page(found: Found, command: str, drawn: list[str]) -> str:
+    pictures_of = [f"![{name}]({name}.svg)" for name in drawn]
+    parts = [f"# Calibration of {found.name}", f"`{command}`", "\n".join(constants_table(found)), *about_law(found), about_bed(found),
+             "\n".join(chutes_table(found)), *pictures_of, "For a scene:", f"```yaml\n{block(found, command)}```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def command_of(options: argparse.Namespace) -> str:
+    words = ["quern", "calibrate", options.scene, *(word for one in options.set for word in ("--set", one))]
+    words += ["--angles", ",".join(f"{angle:g}" for angle in options.angles)] * bool(options.angles)
+    words += ["--seeds", str(options.seeds)] * (options.seeds != 3) + ["--size", f"{options.size:g}"] * (options.size != 1)
+    return shlex.join(words)
+
+
+def write(found: Found, folder: pathlib.Path, options: argparse.Namespace) -> str:
+    """All files; returns what to say."""
+    command, drawn = command_of(options), []
+    save(folder / "calibration.yaml", block(found, command))
+    save(folder / "options.txt", options_text(found))
+    save(folder / "rows.csv", rows_csv(found))
+    if importlib.util.find_spec("matplotlib"):
+        from .chart_draw import save as draw
+        for one in pictures(found):
+            draw(one, [folder / f"{one.name}.svg"], {"Title": one.title, "Creator": call(["--version"]).stdout.strip(), "Description": command,
+                                                     "Source": "rows.csv"})
+            drawn.append(one.name)
+    save(folder / "calibration.md", page(found, command, drawn))
+    return f"{block(found, command)}\n{folder / 'calibration.yaml'}; {folder / 'calibration.md'}"
