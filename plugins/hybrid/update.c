@@ -48,6 +48,7 @@ static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed
 		d.nominal = d.full / (s->dim == 2 ? 4 : 8);
 		status = reckon(&d);
 	}
+	if (status == QUERN_OK && !s->use[U_UPDATES].index[0]) quern_hybrid_packing(&d);
 	if (status == QUERN_OK) status = apply(&d);
 	free(d.points);
 	free(d.grains);

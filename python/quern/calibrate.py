@@ -4,6 +4,7 @@
 The grains of the scene, nothing else of it, are settled on a floor, pressed, and sent down chutes. The runs are those of a study: what was
 made before is not made again, and a command that was killed goes on."""
 import argparse
+import json
 import math
 import pathlib
 import sys
@@ -22,7 +23,7 @@ from .workers import recorded, save
 
 WIDTH, DEPTH = {2: (30, 24), 3: (12, 20)}, {2: 24, 3: 20}  # of a layer, in diameters
 FLOOR = 0.7  # radii by which the centres of the floor's grains lie below it, as in the scenes of configs/
-HEAVIER = 4  # times gravity, under which the bed is pressed
+HEAVIER = 1.2  # times gravity, under which the bed is pressed: more makes it pack anew
 CHUTE, EVERY, LAST = 300, 4, 1 / 3  # length and interval of output, times sqrt(d/g); share that is measured
 HOLD = 6  # time for which a load is held, over sqrt(height/g)
 FIRST = {2: (15.0, 19.0, 23.0), 3: (22.0, 25.0, 28.0)}  # degrees
@@ -87,8 +88,10 @@ class Given:
 
 def resolved(scene: str, sets: list[str]) -> Given:
     """By the program: it begins a run of one grain under the scene's own laws, and writes down every default."""
-    import json
-    dimension = json.loads(call(["plan", "--json", scene, *set_options(sets)]).stdout)["dimension"]
+    plan = json.loads(call(["plan", "--json", scene, *set_options(sets)]).stdout)
+    if not any(one["name"] == "grain" for one in plan["sets"]):
+        raise QuernError(f"{scene} has no grains to measure: give it a section grains with a material and a contact law, or --set model=all", 2)
+    dimension = plan["dimension"]
     corner = {"lower": [0.0] * dimension, "upper": [1e3] * dimension}
     alone = {"model": "grains", "domain": corner, "bodies": [], "observe": [], "stages": None, "output": None, "time": {"end": 1.0},
              **{f"grains.{key}": None for key in ("file", "from", "source", "pairs", "fill")}, "grains.place": [{"position": [5e2] * dimension}]}

@@ -94,7 +94,7 @@ def block(found: Found, command: str) -> str:
 def options_text(found: Found) -> str:
     values = {key: plain(value) for key, (value, _, _) in constants(found).items()}
     values |= {"diameter": plain(found.grains.diameter, 9), "grain_density": plain(found.grains.density, 9)}
-    return "".join(f"--set continuum.material.mu_i.{key}={value}\n" for key, value in values.items())
+    return "".join(f"--set=continuum.material.mu_i.{key}={value}\n" for key, value in values.items())
 
 
 def listed(angles) -> str:
@@ -165,9 +165,12 @@ def about_law(found: Found) -> list[str]:
 
 
 def about_bed(found: Found) -> str:
-    loaded, unloaded = ([getattr(one, name) for one in found.beds] for name in ("loaded", "unloaded"))
-    return (f"Pressed by four times their own weight, grains give way with a constrained modulus of {with_spread(float(np.mean(loaded)), spread(loaded))} Pa; relieved, "
-            f"with {with_spread(float(np.mean(unloaded)), spread(unloaded))} Pa, of which the bulk modulus is made.")
+    settled, loaded, unloaded = ([getattr(one, name) for one in found.beds] for name in ("settled", "loaded", "unloaded"))
+
+    def told(values) -> str:
+        return with_spread(float(np.mean(values)), spread(values))
+    return (f"Settled grains have {told(settled)} kg/m³ as they lie; `critical_density` is less by what their weight compresses. A fifth more weight presses the "
+            f"bed together with a constrained modulus of {told(loaded)} Pa, of which `bulk_modulus` is made; relieved, it comes back with {told(unloaded)} Pa.")
 
 
 def page(found: Found, command: str, drawn: list[str]) -> str:

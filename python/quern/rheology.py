@@ -15,7 +15,7 @@ FLOOR_ROWS, TOP_ROWS = 5, 4  # of a layer, that feel its floor or its surface
 FITTED = 5  # rows over which the slope of the profile is taken
 AT_REST = 1e-3  # inertial number below which a layer creeps at most
 HASTE = 0.02  # acceleration over that of gravity across the layer: beyond it a flow is not steady
-STEEPEST = 10.0  # I_0 beyond which the law is a straight line within any range that is measured
+STEEPEST = 5.0  # I_0 beyond which the law is a straight line within any range that is measured
 POISSON = 0.3  # of material.mu_i
 
 
@@ -68,7 +68,9 @@ class Slip:
 
 @dataclass(frozen=True)
 class Bed:
-    """Of settled grains: density of the rows in the bulk, with no stress on them; constrained moduli, loaded and unloaded."""
+    """Of settled grains: density of the rows in the bulk, as they lie and with no stress on them; constrained moduli, loaded and relieved
+    again."""
+    settled: float
     density: float
     loaded: float
     unloaded: float
@@ -145,8 +147,9 @@ def fit_law(inertia: np.ndarray, friction: np.ndarray) -> Law:
 
 
 def law_of(chutes: list[Rows]) -> Law:
-    """Over all rows in the bulk of some chutes."""
-    return fit_law(np.concatenate([one.inertia[one.bulk] for one in chutes]), np.concatenate([one.friction[one.bulk] for one in chutes]))
+    """Of some chutes, each a point: the mean of its rows. Friction is the same in all of them and I is what scatters, so that a fit over
+    rows would take its scatter for a gentler slope."""
+    return fit_law(*(np.array([getattr(one, name)[one.bulk].mean() for one in chutes]) for name in ("inertia", "friction")))
 
 
 def slip_of(one: Rows) -> Slip:
@@ -189,9 +192,9 @@ def bed(run: Run, heavier: float, grains: Grains) -> Bed:
     inside = (y > FLOOR_ROWS * grains.diameter) & (y < height - TOP_ROWS * grains.diameter)
     loaded, unloaded = (modulus(y[inside], sign * (b - a)[inside], height, (heavier - 1) * weight)
                         for sign, a, b in ((1, states[0], states[1]), (-1, states[1], states[2])))
-    bulk = unloaded * bulk_over_constrained(dimension)
+    bulk = loaded * bulk_over_constrained(dimension)
     free = settled.density[settled.bulk] * np.exp(-settled.pressure[settled.bulk] / bulk)
-    return Bed(float(free.mean()), loaded, unloaded, bulk)
+    return Bed(float(settled.density[settled.bulk].mean()), float(free.mean()), loaded, unloaded, bulk)
 
 
 def first_row(run: Run, like: Rows, grains: Grains) -> Rows:

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/* packing - whether the continuum is given the density that settled grains have. docs/calibration.md */
+#include "update.h"
+#include <math.h>
+
+enum { FEWEST = 50 }; /* cells: a cell of few grains varies by a tenth */
+#define AWAY 4        /* diameters from a body, beside which grains pack more loosely */
+#define OFF 0.01
+#define AT_REST 1e-3 /* kinetic energy over m g d, above what settling leaves */
+
+typedef struct bed {
+	quern_real mass, volume, pressure, kinetic;
+	uint32_t cells;
+} bed;
+
+/* What is deep in the grains: neither near the surface, where oracles keep them, nor near a body. */
+static bool is_bulk(const update *d, uint32_t c) {
+	return d->zone[c] != QUERN_DISCRETE && d->point_begin[c] == d->point_begin[c + 1] &&
+		   d->wall[c] > AWAY * d->h->diameter + d->g->cell;
+}
+
+static void add_cell(const update *d, uint32_t c, bed *sum) {
+	quern_real stress[6], v2 = d->spread[c] * d->spread[c];
+	quern_hybrid_contact_stress(d, c, stress);
+	for (uint32_t k = 0; k < d->s->dim; k++) {
+		sum->pressure -= stress[k] / d->s->dim;
+		v2 += d->velocity[k][c] * d->velocity[k][c];
+	}
+	sum->kinetic += 0.5 * d->mass[c] * v2;
+	sum->mass += d->mass[c];
+	sum->cells++;
+}
+
+/* Grains under their weight are a little denser than the continuum without stress: by p/K. Where they still move, or
+ * there are few of them, nobody knows. */
+void quern_hybrid_packing(const update *d) {
+	const hybrid *h = d->h;
+	const quern_bound *material = d->s->slot[SLOT_MATERIAL];
+	quern_real g2 = 0, bulk, shear, density;
+	bed sum = { 0 };
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
+		if (is_bulk(d, c)) add_cell(d, c, &sum);
+	}
+	for (uint32_t k = 0; k < d->s->dim; k++) g2 += d->s->gravity[k] * d->s->gravity[k];
+	if (sum.cells < FEWEST || sum.kinetic > AT_REST * sum.mass * sqrt(g2) * h->diameter) return;
+	((const quern_material_ops *)material->ops)->moduli(material->self, d->s->dim, &bulk, &shear, &density);
+	const quern_real found = sum.mass / (sum.cells * quern_grid_cell_volume(d->g)) /
+							 (1 + fmax(0, sum.pressure / sum.cells) / bulk);
+	const quern_real off = h->packed / found - 1;
+	if (fabs(off) > OFF)
+		d->s->host->log(d->s->run, 2,
+			"the continuum's density is %.4g kg/m^3, and these grains have settled at %.4g, without what their "
+			"weight compresses: %.1f %% %s; quern calibrate measures it, docs/calibration.md",
+			h->packed, found, 100 * fabs(off), off < 0 ? "too little" : "too much");
+}
