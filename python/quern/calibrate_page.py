@@ -14,7 +14,7 @@ import yaml
 
 from .chart_data import Curve, Picture
 from .program import call
-from .rheology import Bed, Grains, Law, Rows, Slip, law_of, slip_of
+from .rheology import Bed, Grains, Law, Rows, law_of, slip_of
 from .workers import save
 
 AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is told
@@ -33,11 +33,9 @@ class Found:
         return law_of([one for rows in self.chutes.values() for one in rows])
 
     def laws(self) -> list[Law]:
-        """Of each seed alone."""
-        return [law_of([rows[k] for rows in self.chutes.values()]) for k in range(len(self.beds))]
-
-    def slips(self) -> list[Slip]:
-        return [slip_of(one) for rows in self.chutes.values() for one in rows]
+        """Without one of the seeds each."""
+        n = len(self.beds)
+        return [law_of([rows[k] for rows in self.chutes.values() for k in range(n) if k != out]) for out in range(n)] if n > 1 else []
 
 
 def spread(values) -> float:
@@ -45,23 +43,30 @@ def spread(values) -> float:
     return float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
 
 
-def constants(found: Found) -> dict[str, tuple[float, float, str]]:
-    """Key of material.mu_i: value, spread over seeds, unit."""
-    law, laws, beds = found.law(), found.laws(), found.beds
+def mean(values) -> tuple[float, float]:
+    """Over seeds, with its standard error."""
+    return float(np.mean(values)), spread(values) / math.sqrt(len(values))
 
-    def of(values) -> tuple[float, float]:
-        return float(np.mean(values)), spread(values)
-    return {"critical_density": (*of([one.density for one in beds]), "kg/m^3"),
-            "static_friction": (law.mu_s, spread([one.mu_s for one in laws]), ""),
-            "limit_friction": (law.mu_2, spread([one.mu_2 for one in laws]), ""),
-            "inertial_number": (law.i_0, spread([one.i_0 for one in laws]), ""),
-            "bulk_modulus": (*of([one.bulk_modulus for one in beds]), "Pa")}
+
+def left_out(values) -> float:
+    """Standard error of what is found from all seeds, of what is found without one each (jackknife); NaN of one seed."""
+    n = len(values)
+    return spread(values) * (n - 1) / math.sqrt(n) if n > 1 else math.nan
+
+
+def constants(found: Found) -> dict[str, tuple[float, float, str]]:
+    """Key of material.mu_i: value, standard error over seeds, unit."""
+    law, laws, beds = found.law(), found.laws(), found.beds
+    return {"critical_density": (*mean([one.density for one in beds]), "kg/m^3"),
+            "static_friction": (law.mu_s, left_out([one.mu_s for one in laws]), ""),
+            "limit_friction": (law.mu_2, left_out([one.mu_2 for one in laws]), ""),
+            "inertial_number": (law.i_0, left_out([one.i_0 for one in laws]), ""),
+            "bulk_modulus": (*mean([one.bulk_modulus for one in beds]), "Pa")}
 
 
 def slip_length(found: Found) -> tuple[float, float]:
-    """In diameters: mean over chutes, deviation of single ones."""
-    lengths = [one.length / found.grains.diameter for one in found.slips()]
-    return float(np.mean(lengths)), spread(lengths)
+    """In diameters: mean over the angles, with its standard error over seeds."""
+    return mean([np.mean([slip_of(rows[k]).length for rows in found.chutes.values()]) / found.grains.diameter for k in range(len(found.beds))])
 
 
 def plain(value: float, figures: int = 4) -> str:
@@ -81,12 +86,12 @@ def as_yaml(tree: dict) -> str:
 
 def block(found: Found, command: str) -> str:
     """What stands in a scene's continuum."""
-    rows = {key: (plain(value), f"± {plain(off, 2)} between seeds" if math.isfinite(off) else "of one seed")
+    rows = {key: (plain(value), f"± {plain(off, 2)}" if math.isfinite(off) else "of one seed")
             for key, (value, off, _) in constants(found).items()}
     rows |= {"diameter": (plain(found.grains.diameter, 9), "of these grains"), "grain_density": (plain(found.grains.density, 9), "of these grains")}
     low, high = inertia_range(found)
     length, off = slip_length(found)
-    lines = [f"# {command}", f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds",
+    lines = [f"# {command}", f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
              f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate", "continuum:", "  material:", "    mu_i:"]
     return "\n".join(lines + [f"      {key}: {value}".ljust(40) + f"# {note}" for key, (value, note) in rows.items()]) + "\n"
 
@@ -138,7 +143,7 @@ def pictures(found: Found) -> list[Picture]:
 
 
 def constants_table(found: Found) -> list[str]:
-    return ["| key of `material.mu_i` | value ± spread between seeds | unit |", "|---|---|---|",
+    return ["| key of `material.mu_i` | value ± standard error | unit |", "|---|---|---|",
             *(f"| `{key}` | {with_spread(value, off)} | {unit} |" for key, (value, off, unit) in constants(found).items())]
 
 
@@ -149,14 +154,14 @@ def chutes_table(found: Found) -> list[str]:
         parts = [[float(np.mean(one.friction[one.bulk])) for one in rows], [float(np.mean(one.inertia[one.bulk])) for one in rows],
                  [float(np.mean(one.density[one.bulk])) for one in rows], [one.velocity for one in slips], [one.rate for one in slips],
                  [one.length / found.grains.diameter for one in slips]]
-        lines.append(f"| {angle:g} | " + " | ".join(with_spread(float(np.mean(part)), spread(part)) for part in parts) + " |")
+        lines.append(f"| {angle:g} | " + " | ".join(with_spread(*mean(part)) for part in parts) + " |")
     return lines
 
 
 def about_law(found: Found) -> list[str]:
     low, high = inertia_range(found)
     law, laws = found.law(), found.laws()
-    told = [f"{with_spread(float(law(x)), spread([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT if low / 2 < x < 2 * high]
+    told = [f"{with_spread(float(law(x)), left_out([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT if low / 2 < x < 2 * high]
     said = [f"The law is measured for I from {plain(low, 2)} to {plain(high, 2)}. There it says {', '.join(told)}. The three numbers of the law scatter more "
             "than the law does, since one can stand in for another; take them together."]
     if law.i_0 > high * 5:
@@ -168,14 +173,14 @@ def about_bed(found: Found) -> str:
     settled, loaded, unloaded = ([getattr(one, name) for one in found.beds] for name in ("settled", "loaded", "unloaded"))
 
     def told(values) -> str:
-        return with_spread(float(np.mean(values)), spread(values))
+        return with_spread(*mean(values))
     return (f"Settled grains have {told(settled)} kg/m³ as they lie; `critical_density` is less by what their weight compresses. A fifth more weight presses the "
             f"bed together with a constrained modulus of {told(loaded)} Pa, of which `bulk_modulus` is made; relieved, it comes back with {told(unloaded)} Pa.")
 
 
 def page(found: Found, command: str, drawn: list[str]) -> str:
     pictures_of = [f"![{name}]({name}.svg)" for name in drawn]
-    parts = [f"# Calibration of {found.name}", f"`{command}`", "\n".join(constants_table(found)), *about_law(found), about_bed(found),
+    parts = [f"# Calibration of {found.name}", f"`{command}`", "± is the standard error over seeds.", "\n".join(constants_table(found)), *about_law(found), about_bed(found),
              "\n".join(chutes_table(found)), *pictures_of, "For a scene:", f"```yaml\n{block(found, command)}```"]
     return "\n\n".join(parts) + "\n"
 
