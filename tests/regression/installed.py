@@ -70,7 +70,8 @@ with tempfile.TemporaryDirectory() as name:
         said = run(here / "moved/bin/quern", "sweep", here / "study.yaml", "-o", here / "study", "--quiet")
         assert said.startswith("1 runs: 1 done; "), said
         assert "holds no frames" in run(here / "moved/bin/quern", "film", here, status=2)
-        print("ok  quern sweep and quern film work where they are installed")
+        assert "cannot be opened" in run(here / "moved/bin/quern", "calibrate", here / "none.yaml", status=2)
+        print("ok  quern sweep, quern film and quern calibrate work where they are installed")
         if importlib.util.find_spec("matplotlib"):
             (here / "study.yaml").write_text((here / "study.yaml").read_text() + "charts:\n  - {name: n, kind: series, column: grains}\n")
             said = run(here / "moved/bin/quern", "chart", here / "study.yaml", "-o", here / "study")
