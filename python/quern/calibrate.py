@@ -79,34 +79,43 @@ def angle_of(parser: Parser, word: str) -> float:
 
 @dataclass(frozen=True)
 class Given:
-    """What is taken from the scene: the section `grains` with every default, and what a continuum says already."""
+    """What is taken from the scene: of its section `grains` what makes a grain, with every default."""
     name: str
     dimension: int
     grains: dict
     of: Grains
 
 
-def resolved(scene: str, sets: list[str]) -> Given:
-    """By the program: it begins a run of one grain under the scene's own laws, and writes down every default."""
-    plan = json.loads(call(["plan", "--json", scene, *set_options(sets)]).stdout)
-    if not any(one["name"] == "grain" for one in plan["sets"]):
-        raise QuernError(f"{scene} has no grains to measure: give it a section grains with a material and a contact law, or --set model=all", 2)
-    dimension = plan["dimension"]
-    corner = {"lower": [0.0] * dimension, "upper": [1e3] * dimension}
-    alone = {"model": "grains", "domain": corner, "bodies": [], "observe": [], "stages": None, "output": None, "time": {"end": 1.0},
-             **{f"grains.{key}": None for key in ("file", "from", "source", "pairs", "fill")}, "grains.place": [{"position": [5e2] * dimension}]}
+def alone(scene: str, sets: list[str], upper: list[float]) -> dict:
+    """The scene with every default, by the program: it begins a run of one grain under the scene's own laws, and writes them down."""
+    one = {"model": "grains", "domain": {"lower": [0.0] * len(upper), "upper": upper}, "bodies": [], "observe": [], "stages": None, "output": None,
+           "time": {"end": 1.0}, **{f"grains.{key}": None for key in ("file", "from", "source", "pairs", "fill")},
+           "grains.place": [{"position": [x / 2 for x in upper]}]}
     with tempfile.TemporaryDirectory(prefix="quern-calibrate-") as place:
         out = pathlib.Path(place) / "run"
-        call(["run", scene, "--quiet", "--no-cache", "--until", "0", "-o", str(out), *set_options(sets), *set_options(alone)])
-        found = read_scene((out / "scene.yaml").read_text(encoding="utf-8"))
-    grains = found["grains"]
+        call(["run", scene, "--quiet", "--no-cache", "--until", "0", "-o", str(out), *set_options(sets), *set_options(one)])
+        return read_scene((out / "scene.yaml").read_text(encoding="utf-8"))
+
+
+def radius_of(scene: str, grains: dict) -> float:
     if grains.get("materials"):
         raise QuernError(f"{scene} has several materials of grains, and a calibration is of one: name it by --set grains.materials=null and "
                          "--set grains.material={density: ..., radius: ...}", 2)
+    return grains["material"]["radius"]["mean"]
+
+
+def resolved(scene: str, sets: list[str]) -> Given:
+    plan = json.loads(call(["plan", "--json", scene, *set_options(sets)]).stdout)
+    if not any(one["name"] == "grain" for one in plan["sets"]):
+        raise QuernError(f"{scene} has no grains to measure: give it a section grains with a material and a contact law, or --set model=all", 2)
+    found = alone(scene, sets, [1e3] * plan["dimension"])
+    layer = DEPTH[plan["dimension"]] * 2 * radius_of(scene, found["grains"])
+    found = alone(scene, sets, [layer] * plan["dimension"])  # some defaults follow from how deep a fall can be
+    grains = found["grains"]
     gravity = math.sqrt(math.fsum(g * g for g in found["gravity"]))
     if gravity == 0:
         raise QuernError(f"{scene} has no gravity, without which grains neither settle nor flow down; give it by --set gravity=...", 2)
-    return Given(found["name"], dimension, {key: grains[key] for key in KEPT if key in grains},
+    return Given(found["name"], plan["dimension"], {key: grains[key] for key in KEPT if key in grains},
                  Grains(2 * grains["material"]["radius"]["mean"], grains["material"]["density"], gravity))
 
 

@@ -84,21 +84,27 @@ def as_yaml(tree: dict) -> str:
 
 # ---- for scenes ----
 
+def given(found: Found) -> dict[str, float]:
+    """Keys of material.mu_i that I is defined with."""
+    return {"diameter": found.grains.diameter, "grain_density": found.grains.density}
+
+
 def block(found: Found, command: str) -> str:
     """What stands in a scene's continuum."""
     rows = {key: (plain(value), f"± {plain(off, 2)}" if math.isfinite(off) else "of one seed")
             for key, (value, off, _) in constants(found).items()}
-    rows |= {"diameter": (plain(found.grains.diameter, 9), "of these grains"), "grain_density": (plain(found.grains.density, 9), "of these grains")}
+    rows |= {key: (plain(value, 9), "of these grains") for key, value in given(found).items()}
     low, high = inertia_range(found)
     length, off = slip_length(found)
-    lines = [f"# {command}", f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
+    lines = [f"# {command}",
+             f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
              f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate", "continuum:", "  material:", "    mu_i:"]
     return "\n".join(lines + [f"      {key}: {value}".ljust(40) + f"# {note}" for key, (value, note) in rows.items()]) + "\n"
 
 
 def options_text(found: Found) -> str:
     values = {key: plain(value) for key, (value, _, _) in constants(found).items()}
-    values |= {"diameter": plain(found.grains.diameter, 9), "grain_density": plain(found.grains.density, 9)}
+    values |= {key: plain(value, 9) for key, value in given(found).items()}
     return "".join(f"--set=continuum.material.mu_i.{key}={value}\n" for key, value in values.items())
 
 
@@ -118,7 +124,8 @@ def rows_csv(found: Found) -> str:
     """Every row of every chute."""
     out = io.StringIO()
     table = csv.writer(out, lineterminator="\n")
-    table.writerow(["angle [degree]", "seed", "bulk", "height [m]", "density [kg/m^3]", "velocity [m/s]", "pressure [Pa]", "friction", "inertial_number"])
+    table.writerow(["angle [degree]", "seed", "bulk", "height [m]", "density [kg/m^3]", "velocity [m/s]", "pressure [Pa]", "friction",
+                    "inertial_number"])
     for angle, rows in sorted(found.chutes.items()):
         for seed, one in enumerate(rows, 1):
             for k in np.flatnonzero(one.density > 0):
@@ -148,7 +155,8 @@ def constants_table(found: Found) -> list[str]:
 
 
 def chutes_table(found: Found) -> list[str]:
-    lines = ["| angle [°] | tau/p | I | density [kg/m³] | slip at the floor [m/s] | shear rate there [1/s] | slip length over d |", "|---|---|---|---|---|---|---|"]
+    lines = ["| angle [°] | tau/p | I | density [kg/m³] | slip at the floor [m/s] | shear rate there [1/s] | slip length over d |",
+             "|---|---|---|---|---|---|---|"]
     for angle, rows in sorted(found.chutes.items()):
         slips = [slip_of(one) for one in rows]
         parts = [[float(np.mean(one.friction[one.bulk])) for one in rows], [float(np.mean(one.inertia[one.bulk])) for one in rows],
@@ -162,10 +170,11 @@ def about_law(found: Found) -> list[str]:
     low, high = inertia_range(found)
     law, laws = found.law(), found.laws()
     told = [f"{with_spread(float(law(x)), left_out([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT if low / 2 < x < 2 * high]
-    said = [f"The law is measured for I from {plain(low, 2)} to {plain(high, 2)}. There it says {', '.join(told)}. The three numbers of the law scatter more "
-            "than the law does, since one can stand in for another; take them together."]
+    said = [f"The law is measured for I from {plain(low, 2)} to {plain(high, 2)}. There it says {', '.join(told)}. The three numbers of the law "
+            "scatter more than the law does, since one can stand in for another; take them together."]
     if law.i_0 > high * 5:
-        said.append("The flows hardly show that friction comes to an end: mu_2 and I_0 stand for a straight line, and say nothing of faster flows.")
+        said.append("The flows hardly show that friction comes to an end: mu_2 and I_0 stand for a straight line, "
+                    "and say nothing of faster flows.")
     return said
 
 
@@ -174,8 +183,9 @@ def about_bed(found: Found) -> str:
 
     def told(values) -> str:
         return with_spread(*mean(values))
-    return (f"Settled grains have {told(settled)} kg/m³ as they lie; `critical_density` is less by what their weight compresses. A fifth more weight presses the "
-            f"bed together with a constrained modulus of {told(loaded)} Pa, of which `bulk_modulus` is made; relieved, it comes back with {told(unloaded)} Pa.")
+    return (f"Settled grains have {told(settled)} kg/m³ as they lie; `critical_density` is less by what their weight compresses. A fifth more "
+            f"weight presses the bed together with a constrained modulus of {told(loaded)} Pa, of which `bulk_modulus` is made; relieved, it "
+            f"comes back with {told(unloaded)} Pa.")
 
 
 def page(found: Found, command: str, drawn: list[str]) -> str:

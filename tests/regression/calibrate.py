@@ -126,7 +126,8 @@ def check_command(here):
         "  cell: 4 mm\n  fill: {region: {box: {lower: [0, 0], upper: [0.04, 0.04]}}, stress: at_rest}\n"
     (here / "taken.yaml").write_text(scene)
     lab.run(here / "taken.yaml", here / "taken")
-    lab.run("column", here / "by_options", "--set=model=continuum", "--set=time.end=0.1 ms", *(here / "sand/options.txt").read_text().split("\n")[:-1])
+    words = (here / "sand/options.txt").read_text().splitlines()
+    lab.run("column", here / "by_options", "--set=model=continuum", "--set=time.end=0.1 ms", *words)
     print("ok  a scene takes the block, and the command line the options")
 
 
@@ -145,9 +146,10 @@ def check_refusals(here):
 
 def check_warning(here):
     """A settled bed of 50 x 50 diameters knows how dense it lies; the continuum says something else, or the same."""
-    bed = lab.sets(domain__upper="[0.1, 0.16]", domain__periodic="[true, false]", bodies="[{plane: {point: [0, 0], normal: [0, 1], boundary: sticky}}]",
-                   grains__contact__linear__stiffness="1e5", grains__settle__energy="1e-3", time__end="0.3 ms", output__every="0.3 ms", observe="[]", continuum__fill="null",
-                   grains__fill__0__region__box="{lower: [0, -0.7 mm], upper: [0.1, -0.7 mm]}",
+    bed = lab.sets(domain__upper="[0.1, 0.16]", domain__periodic="[true, false]",
+                   bodies="[{plane: {point: [0, 0], normal: [0, 1], boundary: sticky}}]",
+                   grains__contact__linear__stiffness="1e5", grains__settle__energy="1e-3", time__end="0.3 ms", output__every="0.3 ms",
+                   observe="[]", continuum__fill="null", grains__fill__0__region__box="{lower: [0, -0.7 mm], upper: [0.1, -0.7 mm]}",
                    grains__fill__1__region__box="{lower: [0, 0.001], upper: [0.1, 0.1]}")
     said = lab.run("column", here / "thin", *bed, "--set=continuum.material.mu_i.critical_density=1900")
     found = re.search(r"these grains have settled at (\d+), .* too little; quern calibrate measures it", said)
