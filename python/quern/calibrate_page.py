@@ -190,8 +190,8 @@ def about_bed(found: Found) -> str:
 
 def page(found: Found, command: str, drawn: list[str]) -> str:
     pictures_of = [f"![{name}]({name}.svg)" for name in drawn]
-    parts = [f"# Calibration of {found.name}", f"`{command}`", "± is the standard error over seeds.", "\n".join(constants_table(found)), *about_law(found), about_bed(found),
-             "\n".join(chutes_table(found)), *pictures_of, "For a scene:", f"```yaml\n{block(found, command)}```"]
+    parts = [f"# Calibration of {found.name}", f"`{command}`", "± is the standard error over seeds.", "\n".join(constants_table(found)),
+             *about_law(found), about_bed(found), "\n".join(chutes_table(found)), *pictures_of, "For a scene:", f"```yaml\n{block(found, command)}```"]
     return "\n\n".join(parts) + "\n"
 
 

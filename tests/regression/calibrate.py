@@ -16,7 +16,6 @@ import lab
 sys.path.insert(0, str(lab.SOURCE / "python"))
 try:
     from quern import calibrate, rheology
-    from quern.program import QuernError
 except ImportError as missing:
     print(f"{missing.name} is not there")
     sys.exit(77)
