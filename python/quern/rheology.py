@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .runs import Run
+from .runs import Frame, Run
 
 FLOOR_ROWS, TOP_ROWS = 5, 4  # of a layer, that feel its floor or its surface
 FITTED = 5  # rows over which the slope of the profile is taken
@@ -116,16 +116,21 @@ def rows_of(angle: float, y: np.ndarray, times: np.ndarray, density: np.ndarray,
     return Rows(angle, y, mean, u, pressure, friction, inertia, there & bulk_rows(y, mean, grains.diameter), haste)
 
 
-def chute(run: Run, angle: float, last: float, grains: Grains) -> Rows:
-    """Of the observer `profile` of a run, one row a diameter, over the last part of its time."""
+def profiles(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of the observer `profile` of a run, one row a diameter: heights of the rows, times, and at each time densities and velocities along x."""
     series, axis = run.series, run.scene["dimension"] - 1
     keys, = [item["profile"] for item in run.scene["observe"] if "profile" in item]
     box, n = keys["region"]["box"], keys["bins"]
-    high = (box["upper"][axis] - box["lower"][axis]) / n
-    y = box["lower"][axis] + (np.arange(n) + 0.5) * high
-    late = series["time"] > (1 - last) * series["time"][-1]
-    density, velocity = (np.array([series[f"profile.{name}_{k}"][late] for k in range(n)]).T for name in ("density", "x"))
-    return rows_of(angle, y, series["time"][late], density, velocity, grains)
+    y = box["lower"][axis] + (np.arange(n) + 0.5) * (box["upper"][axis] - box["lower"][axis]) / n
+    density, velocity = (np.array([series[f"profile.{name}_{k}"] for k in range(n)]).T for name in ("density", "x"))
+    return y, series["time"], density, velocity
+
+
+def chute(run: Run, angle: float, last: float, grains: Grains) -> Rows:
+    """Over the last part of its time."""
+    y, times, density, velocity = profiles(run)
+    late = times > (1 - last) * times[-1]
+    return rows_of(angle, y, times[late], density[late], velocity[late], grains)
 
 
 def fit_law(inertia: np.ndarray, friction: np.ndarray) -> Law:
@@ -176,28 +181,21 @@ def bulk_over_constrained(dimension: int, poisson: float = POISSON) -> float:
     return 1 / (1 + (1 if dimension == 2 else 4 / 3) * shear)
 
 
+def heights(frame: Frame, axis: int) -> np.ndarray:
+    """Of all grains, in the order of their numbers."""
+    return frame["grain.position"][np.argsort(frame["grain.id"]), axis]
+
+
 def bed(run: Run, heavier: float, grains: Grains) -> Bed:
-    """Of a run that shows settled grains, the same under `heavier` times gravity, and the same back under their own."""
-    frames, dimension = list(run.frames), run.scene["dimension"]
-    states = []
-    for frame in (frames[-3], frames[-2], frames[-1]):
-        moves = frame["grain.position"][:, dimension - 1] > 0
-        order = np.argsort(frame["grain.id"][moves])
-        states.append(frame["grain.position"][moves, dimension - 1][order])
-    level = chute(run, 0.0, 1.0, grains)
-    settled = first_row(run, level, grains)
-    height = settled.density.sum() * (settled.y[1] - settled.y[0]) / np.median(settled.density[settled.bulk])
-    weight = np.median(settled.density[settled.bulk]) * grains.gravity
-    y = states[0]
-    inside = (y > FLOOR_ROWS * grains.diameter) & (y < height - TOP_ROWS * grains.diameter)
-    loaded, unloaded = (modulus(y[inside], sign * (b - a)[inside], height, (heavier - 1) * weight)
-                        for sign, a, b in ((1, states[0], states[1]), (-1, states[1], states[2])))
+    """Of a run whose last three outputs are settled grains, the same under `heavier` times gravity, and the same back under their own."""
+    y, _, density, velocity = profiles(run)
+    settled = rows_of(0.0, y, np.zeros(1), density[-3:-2], 0 * velocity[-3:-2], grains)
+    dense, dimension = float(np.median(settled.density[settled.bulk])), run.scene["dimension"]
+    height = settled.density.sum() * (y[1] - y[0]) / dense
+    rest, pressed, relieved = (heights(frame, dimension - 1) for frame in run.frames[-3:])
+    inside = (rest > FLOOR_ROWS * grains.diameter) & (rest < height - TOP_ROWS * grains.diameter)
+    load = (heavier - 1) * dense * grains.gravity
+    loaded, unloaded = (modulus(rest[inside], way[inside], height, more) for way, more in ((pressed - rest, load), (relieved - pressed, -load)))
     bulk = loaded * bulk_over_constrained(dimension)
     free = settled.density[settled.bulk] * np.exp(-settled.pressure[settled.bulk] / bulk)
     return Bed(float(settled.density[settled.bulk].mean()), float(free.mean()), loaded, unloaded, bulk)
-
-
-def first_row(run: Run, like: Rows, grains: Grains) -> Rows:
-    """The bed as it is at the first output after the release."""
-    density = np.array([run.series[f"profile.density_{k}"][1] for k in range(len(like.y))])
-    return rows_of(0.0, like.y, np.zeros(1), density[None, :], np.zeros((1, len(like.y))), grains)
