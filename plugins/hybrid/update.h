@@ -97,6 +97,7 @@ quern_status quern_hybrid_distance(update *, const bool *source, const bool *thr
 /* ---- changes.c ---- */
 /* Takes back what would change beyond `most_changes`. */
 quern_status quern_hybrid_limit_changes(update *);
+
 /* ---- packing.c ---- */
 /* Of the first update, once there are zones: warns if settled grains have another density than the continuum. */
 void quern_hybrid_packing(const update *);
