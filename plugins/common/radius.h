@@ -1,12 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /* radius - the distribution of grain radii, by the number of the draw */
 #pragma once
+#include <quern/math.h>
 #include <quern/solver.h>
 
 /* kg of a sphere of that radius; in 2-D of a disc one metre deep. */
 QUERN_INLINE quern_real quern_radius_mass(quern_real radius, quern_real density, uint32_t dim) {
 	const quern_real area = 3.141592653589793 * radius * radius;
 	return density * (dim == 2 ? area : 4.0 / 3 * area * radius);
+}
+
+/* The radius of a grain that weighs so much. */
+QUERN_INLINE quern_real quern_radius_of_mass(quern_real mass, quern_real density, uint32_t dim) {
+	const quern_real volume = mass / density / 3.141592653589793;
+	return dim == 2 ? __builtin_sqrt(volume) : quern_cbrt(0.75 * volume);
 }
 
 /* Moment of inertia over mass times radius squared. */

@@ -430,7 +430,8 @@ quern_status quern_dem_list(const void *self, const quern_step *s) {
 quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 	listing l = { .d = self, .s = s, .search = &s->slot[SLOT_NEIGHBOURS][0] };
 	l.ops = l.search->ops;
-	const quern_real moved = s->use[NEAR_DISPLACEMENT].real[0][0];
+	quern_real *grown = s->use[NEAR_GROWN].real[0];
+	const quern_real moved = s->use[NEAR_DISPLACEMENT].real[0][0] + (grown ? *grown : 0);
 	if (moved < 0.5 * l.d->skin * 2 * l.d->material[0].radii.mean && !is_release(s)) return QUERN_OK;
 	quern_status status = keep_inside(&l);
 	if (status == QUERN_OK) status = sort_grains(&l);
@@ -442,6 +443,7 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 		memcpy(
 			s->use[NEAR_ANCHOR].real[k], s->use[NEAR_POSITION].real[k], (size_t)l.job.n * sizeof(quern_real));
 	s->use[NEAR_DISPLACEMENT].real[0][0] = 0;
+	if (grown) *grown = 0;
 	if (s->use[NEAR_SWEPT].real[0]) s->use[NEAR_SWEPT].real[0][0] = 0;
 	return QUERN_OK;
 }

@@ -34,8 +34,7 @@ static quern_real flow(const quern_step *s, uint32_t axis) {
 	const quern_column *u = s->use;
 	return book_total(u[A_POURED_MOMENTUM].real[axis], entries(s, "grain_source")) -
 		   book_total(u[A_GRAIN_LEFT_MOMENTUM].real[axis], outlet_faces(s)) -
-		   book_total(u[A_POINT_LEFT_MOMENTUM].real[axis], outlet_faces(s)) -
-		   (u[A_OWED_LEFT_MOMENTUM].real[0] ? u[A_OWED_LEFT_MOMENTUM].real[axis][0] : 0);
+		   book_total(u[A_POINT_LEFT_MOMENTUM].real[axis], outlet_faces(s));
 }
 
 /* Impulses that came from outside since the start: whatever body, face or fixed grain gave them, and what flows through
@@ -57,16 +56,14 @@ static bool take_sums(const quern_step *s, sums *out) {
 	if (!add_cloud(s, &grains, &u[A_GRAIN_VELOCITY], out) ||
 		!add_cloud(s, &points, &u[A_POINT_VELOCITY], out))
 		return false;
-	out->mass = out->carried + s->host->sum_set(s->run, "cell", u[A_GRAIN_OWED].real[0]) +
-				s->host->sum_set(s->run, "cell", u[A_POINT_OWED].real[0]);
+	out->mass = out->carried + s->host->sum_set(s->run, "cell", u[A_OWED].real[0]);
 	if (u[A_PASSED].real[0]) {
 		out->poured = book_total(u[A_POURED].real[0], entries(s, "grain_source"));
 		out->left = book_total(u[A_GRAIN_LEFT].real[0], outlet_faces(s)) +
-					book_total(u[A_POINT_LEFT].real[0], outlet_faces(s)) + u[A_OWED_LEFT].real[0][0];
+					book_total(u[A_POINT_LEFT].real[0], outlet_faces(s));
 	}
 	for (uint32_t k = 0; k < s->dim; k++)
-		out->owed_momentum[k] = s->host->sum_set(s->run, "cell", u[A_GRAIN_OWED_MOMENTUM].real[k]) +
-								s->host->sum_set(s->run, "cell", u[A_POINT_OWED_MOMENTUM].real[k]);
+		out->owed_momentum[k] = s->host->sum_set(s->run, "cell", u[A_OWED_MOMENTUM].real[k]);
 	return true;
 }
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* back - what the exchange has changed, from the nodes to the grains, through a transfer */
+#include "../common/calm.h"
 #include "../common/trips.h"
 #include "meet.h"
 #include "solve.h"
@@ -13,13 +14,16 @@ typedef struct {
 	residents at;
 	const quern_row *node, *mixture;
 	trips trips;
+	calm calm;
+	int32_t *coupled;     /* by block, from where its residents begin: those that are */
+	quern_real *then[3];  /* by grain that is coupled: its new velocity */
 	quern_real *farthest; /* by block */
 } back_work;
 
 typedef struct {
 	quern_row mass[QUERN_TILE_MOST], mixture[QUERN_TILE_MOST];
 	trip_memory trip;
-	_Alignas(64) quern_real velocity[3][STENCIL];
+	_Alignas(64) quern_real velocity[3][STENCIL], gradient[9][STENCIL];
 	quern_real rows[QUERN_MOST_USES][9][STENCIL];
 	int32_t grain[STENCIL];
 } back_memory;
@@ -53,7 +57,10 @@ QUERN_INLINE uint32_t find_coupled(
 QUERN_INLINE void load_coupled(const back_work *w, back_memory *m, uint32_t n, const int dim) {
 	for (uint32_t k = 0; k < n; k++) {
 		quern_row v[4];
-		stencil_gather(&m->trip.stencil, k, m->mixture, dim, false, v, (int32_t)w->g->span);
+		const bool slopes = w->h->rest > 0;
+		stencil_gather(&m->trip.stencil, k, m->mixture, dim, slopes, v, (int32_t)w->g->span);
+		for (int c = 0; c < dim && slopes; c++)
+			for (int a = 0; a < dim; a++) m->gradient[dim * c + a][k] = v[1 + a][1 + c];
 		trips_hear(&m->trip, k, &v[0], 1, dim);
 		for (int a = 0; a < dim; a++) m->velocity[a][k] = w->s->use[B_VELOCITY].real[a][m->grain[k]];
 	}
@@ -102,17 +109,29 @@ quern_real quern_hybrid_move(const hybrid *h, const quern_step *s, int32_t i, co
 	return way;
 }
 
-static void move_grains(const back_work *w, const back_memory *m, uint32_t b, uint32_t n) {
+static void keep_grains(const back_work *w, back_memory *m, uint32_t n, int32_t *coupled) {
+	for (uint32_t k = 0; k < n; k++) {
+		for (uint32_t a = 0; a < w->s->dim; a++) w->then[a][m->grain[k]] = m->velocity[a][k];
+		coupled[k] = m->grain[k];
+		if (w->calm.part)
+			calm_note(&w->calm, k, (uint32_t)m->grain[k], m->gradient, m->trip.pic, w->then, w->s->dim);
+	}
+}
+
+static void move_grains(const back_work *w, uint32_t b, const int32_t *coupled, uint32_t n) {
+	if (w->calm.part) calm_block(&w->calm, &w->grains, coupled, 0, n, w->then, w->s->dim);
 	for (uint32_t k = 0; k < n; k++) {
 		quern_real velocity[3] = { 0 };
-		for (uint32_t a = 0; a < w->s->dim; a++) velocity[a] = m->velocity[a][k];
-		const quern_real way = quern_hybrid_move(w->h, w->s, m->grain[k], velocity);
+		for (uint32_t a = 0; a < w->s->dim; a++) velocity[a] = w->then[a][coupled[k]];
+		const quern_real way = quern_hybrid_move(w->h, w->s, coupled[k], velocity);
 		w->farthest[b] = way > w->farthest[b] ? way : w->farthest[b];
 	}
 }
 
 QUERN_INLINE void back_block(const back_work *w, back_memory *m, uint32_t b, const int dim, const bool last) {
 	const uint32_t end = w->at.begin[b + 1];
+	int32_t *coupled = w->coupled + w->at.begin[b];
+	uint32_t n_coupled = 0;
 	if (!load_continuum(w->g, &w->at, w->node, b, m->mass)) return;
 	load_mixture(w, m, b, dim);
 	trips_begin_block(&w->trips, &m->trip, b, last);
@@ -122,10 +141,12 @@ QUERN_INLINE void back_block(const back_work *w, back_memory *m, uint32_t b, con
 		if (!n) continue;
 		load_coupled(w, m, n, dim);
 		call_transfer(w, m, n, last);
-		if (last) move_grains(w, m, b, n);
+		if (last) keep_grains(w, m, n, coupled + n_coupled);
+		n_coupled += n;
 		for (uint32_t k = 0; k < n && !last; k++)
 			trips_send(&w->trips, &m->trip, k, cloud_mass(&w->grains, (uint32_t)m->grain[k]), dim);
 	}
+	if (last) move_grains(w, b, coupled, n_coupled);
 	trips_end_block(&w->trips, &m->trip, b, last);
 }
 
@@ -155,7 +176,14 @@ quern_status quern_hybrid_back(const void *self, const quern_step *s) {
 	if (!s->host->set(s->run, "point").n) return QUERN_OK;
 	if (!quern_hybrid_residents(s, &u[B_POSITION], u[B_FIXED].index, &w.at)) return QUERN_E_MEMORY;
 	w.farthest = s->host->memory(s->run, ((size_t)w.g->n_blocks + 1) * sizeof(quern_real));
-	if (!w.farthest || trips_run(&w.trips, send_one, &w) != QUERN_OK) return QUERN_E_MEMORY;
+	w.coupled = s->host->memory(s->run, ((size_t)w.at.begin[w.g->n_blocks] + 1) * sizeof(int32_t));
+	/* grains whose cloud ends have nothing below them that holds them one by one: at rest they move as the grid does */
+	w.calm = (calm) { .rate = w.h->rest, .share = 1 };
+	const uint32_t n = s->host->set(s->run, "grain").n;
+	bool good = w.farthest && w.coupled && calm_init(&w.calm, s, n) == QUERN_OK;
+	for (uint32_t a = 0; a < s->dim && good; a++)
+		good = (w.then[a] = s->host->memory(s->run, ((size_t)n + 1) * sizeof(quern_real)));
+	if (!good || trips_run(&w.trips, send_one, &w) != QUERN_OK) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, back_one, &w);
 	quern_real *farthest = u[B_DISPLACEMENT].real[0];
 	for (uint32_t b = 0; b < w.g->n_blocks; b++) {

@@ -35,14 +35,12 @@ static void *take(update *d, size_t count, size_t size) {
 	return memory;
 }
 
-/* Blocks of whose cells something is owed to a cloud stay, wherever the material has gone. */
+/* Blocks of whose cells something is owed stay, wherever the material has gone. */
 static bool holds(const void *arg, uint32_t block) {
 	const quern_step *s = arg;
 	const quern_column *u = s->use;
 	for (uint32_t k = block * N; k < (block + 1) * N; k++)
-		if (quern_hybrid_is_owed(u[U_GRAIN_OWED].real[0], u[U_GRAIN_OWED_MOMENTUM].real, k, s->dim) ||
-			quern_hybrid_is_owed(u[U_POINT_OWED].real[0], u[U_POINT_OWED_MOMENTUM].real, k, s->dim))
-			return true;
+		if (quern_hybrid_is_owed(u, k, s->dim)) return true;
 	return false;
 }
 
@@ -71,6 +69,8 @@ quern_status quern_hybrid_sort(update *d) {
 	d->drop_point = take(d, d->n_points, sizeof(bool));
 	d->mass = take(d, d->n_cells, sizeof(quern_real));
 	d->spread = take(d, d->n_cells, sizeof(quern_real));
+	d->in_grains = take(d, d->n_cells, sizeof(quern_real));
+	d->in_points = take(d, d->n_cells, sizeof(quern_real));
 	d->wall = take(d, d->n_cells, sizeof(quern_real));
 	d->open = take(d, d->n_cells, sizeof(quern_real));
 	d->zone = take(d, d->n_cells, sizeof(int32_t));
@@ -258,29 +258,4 @@ quern_status quern_hybrid_normals(update *d) {
 	put_normals(d, d->s->host->set(d->s->run, "grain").n, &u[U_GRAIN_POSITION], &u[U_GRAIN_NORMAL], normal);
 	put_normals(d, d->s->host->set(d->s->run, "point").n, &u[U_POINT_POSITION], &u[U_POINT_NORMAL], normal);
 	return QUERN_OK;
-}
-
-/* `mass`: by cell, of all whose home it is; NULL: nobody asks. */
-static void put_homes(
-	const update *d, const cloud *of, const quern_column *x, int32_t *home, quern_real *mass) {
-	const uint32_t *order = d->s->host->parts(d->s->run, of->set)->entry;
-	quern_grid_cursor last = { .block = -1 };
-	for (uint32_t q = 0; q < of->n; q++) {
-		const uint32_t i = quern_nth(order, q);
-		const int32_t c = of->fixed && of->fixed[i] ? -1 : cell_of(d, x->real, i, &last);
-		int32_t cell[3];
-		home[i] = -1;
-		if (c < 0 || !quern_grid_cell_of(d->g, (uint32_t)c, cell)) continue;
-		home[i] = quern_grid_number(d->g, cell);
-		if (mass) mass[c] += cloud_mass(of, i);
-	}
-}
-
-void quern_hybrid_homes(update *d) {
-	const quern_column *u = d->u;
-	const cloud grains = moving_grains(d->s), points = all_points(d->s);
-	quern_real *mass = u[U_HOME_MASS].real[0];
-	if (mass) memset(mass, 0, d->n_cells * sizeof *mass);
-	put_homes(d, &grains, &u[U_GRAIN_POSITION], u[U_GRAIN_HOME].index, mass);
-	put_homes(d, &points, &u[U_POINT_POSITION], u[U_POINT_HOME].index, mass);
 }

@@ -18,7 +18,8 @@ typedef struct {
 	uint32_t first, wanted; /* numbers of its grains, in `numbers` */
 	new_grain *grain;
 	uint32_t n;
-	bool failed; /* memory ran out */
+	quern_real part; /* of its radius that a grain begins with */
+	bool failed;     /* memory ran out */
 } packed_cell;
 
 typedef struct enriching {
@@ -64,11 +65,17 @@ static bool take_number(enriching *e) {
 	return true;
 }
 
-/* Half a grain over would never be paid back: a cell gets the next grain while more than all of it is owed. */
+/* What grains carry less than their share of what the cell holds, as far as it has room for that. */
+static quern_real lacking(const update *d, uint32_t c) {
+	const quern_real all = cell_holds(d, c), room = d->full * (d->open[c] > 0.125 ? d->open[c] : 0.125);
+	return grain_share(d, c) * (all < room ? all : room) - d->in_grains[c];
+}
+
+/* Half a grain over would never be paid back: a cell gets the next grain while all of it is lacking. */
 static bool share_out(enriching *e, packed_cell *p) {
 	const update *d = e->d;
 	const quern_real share = grain_share(d, p->c);
-	quern_real rest = d->u[U_GRAIN_OWED].real[0][p->c];
+	quern_real rest = lacking(d, p->c);
 	p->first = e->n_numbers;
 	for (;; p->wanted++) {
 		const quern_real mass = share * mass_of(d->h, radius_of(d, next_number(e)));
@@ -109,7 +116,7 @@ static quern_status put_back(const enriching *e) {
 static quern_real job_radius(quern_pack_job *job) {
 	const packed_cell *p = job->scene;
 	const uint32_t k = p->n < p->wanted ? p->n : p->wanted - 1;
-	return radius_of(p->all->d, p->all->numbers[p->first + k]);
+	return p->part * radius_of(p->all->d, p->all->numbers[p->first + k]);
 }
 
 static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
@@ -137,34 +144,24 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	if (!p->grain) p->grain = malloc(p->wanted * sizeof(new_grain));
 	if (!p->grain) return p->failed = true, false;
 	new_grain *g = &p->grain[p->n++];
-	*g = (new_grain) { .radius = spot->radius, .weight = grain_share(d, p->c), .cell = (int32_t)p->c };
+	*g = (new_grain) { .radius = spot->radius,
+		.mass = mass_of(d->h, radius_of(d, p->all->numbers[p->first + p->n - 1])),
+		.weight = grain_share(d, p->c),
+		.cell = (int32_t)p->c };
 	memcpy(g->position, spot->x, sizeof g->position);
 	return p->n < p->wanted;
 }
 
 /* ---- one cell ---- */
 
-/* The packer's grains together get the momentum that was owed; what they draw is booked. */
+/* New grains move as what is around them does; what they carry is owed no longer. */
 static void settle(packed_cell *p) {
 	update *d = p->all->d;
-	const uint32_t dim = d->s->dim;
-	quern_real *owed = d->u[U_GRAIN_OWED].real[0];
-	quern_real mass = 0, momentum[3] = { 0 }, wanted[3] = { 0 };
-	quern_hybrid_owed_velocity(d, p->c, owed[p->c], d->u[U_GRAIN_OWED_MOMENTUM], wanted);
 	for (uint32_t i = 0; i < p->n; i++) {
-		const quern_real m = mass_of(d->h, p->grain[i].radius);
+		const quern_real m = p->grain[i].weight * p->grain[i].mass;
 		quern_hybrid_motion(d, &p->grain[i]);
-		mass += m;
-		for (uint32_t k = 0; k < dim; k++) momentum[k] += m * p->grain[i].velocity[k];
-	}
-	for (uint32_t i = 0; i < p->n; i++) {
-		new_grain *g = &p->grain[i];
-		const quern_real m = g->weight * mass_of(d->h, g->radius);
-		owed[p->c] -= m;
-		for (uint32_t k = 0; k < dim; k++) {
-			g->velocity[k] += wanted[k] - momentum[k] / mass;
-			d->u[U_GRAIN_OWED_MOMENTUM].real[k][p->c] -= m * g->velocity[k];
-		}
+		quern_hybrid_book(d, p->c, -m, p->grain[i].velocity);
+		d->in_grains[p->c] += m;
 	}
 }
 
@@ -208,7 +205,12 @@ static void enrich_cell(packed_cell *p) {
 	memcpy(job.lower, p->lower, sizeof job.lower);
 	memcpy(job.upper, p->upper, sizeof job.upper);
 	find_upstream(d, p->cell, job.upstream);
-	((const quern_packer_ops *)packer->ops)->pack[d->s->dim - 2](packer->self, &job);
+	for (uint32_t k = 0; k < 4 && p->n < p->wanted && (!k || d->h->growth > 0); k++) {
+		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
+		p->part = parts[k];
+		job.counter = ((uint64_t)d->u[U_UPDATES].index[0] << 32) + ((uint64_t)k << 24);
+		((const quern_packer_ops *)packer->ops)->pack[d->s->dim - 2](packer->self, &job);
+	}
 	free(seed);
 	settle(p);
 }
@@ -223,14 +225,13 @@ static void enrich_one(void *arg, uint32_t i, uint32_t worker) {
 
 static bool find_cells(enriching *e) {
 	const update *d = e->d;
-	const quern_real *owed = d->u[U_GRAIN_OWED].real[0];
 	size_t most = 0;
-	for (uint32_t c = 0; c < d->n_cells; c++) most += d->zone[c] == QUERN_HYBRID && owed[c] > 0;
+	for (uint32_t c = 0; c < d->n_cells; c++) most += d->zone[c] == QUERN_HYBRID && lacking(d, c) > 0;
 	e->cell = d->s->host->memory(d->s->run, (most + 1) * sizeof *e->cell);
 	if (!e->cell) return false;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		packed_cell p = { .all = e, .c = nth_cell(d, q) };
-		if (d->zone[p.c] != QUERN_HYBRID || !(owed[p.c] > 0) || !quern_grid_cell_of(d->g, p.c, p.cell))
+		if (d->zone[p.c] != QUERN_HYBRID || !(lacking(d, p.c) > 0) || !quern_grid_cell_of(d->g, p.c, p.cell))
 			continue;
 		for (uint32_t k = 0; k < d->s->dim; k++) {
 			p.lower[k] = d->g->lower[k] + p.cell[k] * d->g->cell;
@@ -377,7 +378,7 @@ quern_status quern_hybrid_apply_grains(update *d) {
 		for (uint32_t k = 0; u[U_GRAIN_SPIN].real[0] && k < (s->dim == 3 ? 3u : 1u); k++)
 			u[U_GRAIN_SPIN].real[k][to] = g->spin[k];
 		u[U_GRAIN_RADIUS].real[0][to] = g->radius;
-		u[U_GRAIN_MASS].real[0][to] = mass_of(d->h, g->radius);
+		u[U_GRAIN_MASS].real[0][to] = g->mass;
 		u[U_GRAIN_WEIGHT].real[0][to] = g->weight;
 	}
 	u[U_DISPLACEMENT].real[0][0] = INFINITY; /* the list names grains that are gone, and misses new ones */

@@ -15,12 +15,13 @@
 #include <quern/transfer.h>
 
 typedef struct hybrid {
-	int32_t substeps, update, samples, average; /* from the scene */
-	quern_real hysteresis, guard, gain;
+	int32_t substeps, update, samples, average, growth; /* from the scene */
+	quern_real hysteresis, gain;
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
 	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
+	quern_real rest;     /* 1/s: shear rate of what is at rest */
 	bool moving;         /* some bodies do */
 	int32_t weights;
 	bool ramped;             /* shares of hybrid cells are a field: cell.weight */
@@ -47,6 +48,7 @@ quern_status quern_hybrid_sample(const void *self, const quern_step *);
 quern_status quern_hybrid_raster(const void *self, const quern_step *);
 quern_status quern_hybrid_couple(const void *self, const quern_step *);
 quern_status quern_hybrid_back(const void *self, const quern_step *);
+quern_status quern_hybrid_grow(const void *self, const quern_step *);
 quern_status quern_hybrid_audit(const void *self, const quern_step *);
 /* Rows of the audit: J that grains and points have in their springs and in turning, an upper bound. */
 quern_real quern_hybrid_held(const quern_step *);

@@ -71,8 +71,15 @@ static uint32_t close_parts(
 	return n ? n : parts;
 }
 
-/* As many points as the mass is worth, a power of two if bodies leave the room, where the grains are. */
-static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]) {
+static void weigh_parts(const update *d, uint32_t c, const int32_t cell[3], quern_real held[8]) {
+	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++)
+		held[part_of(d, cell, d->u[U_GRAIN_POSITION].real, d->grain[q])] +=
+			d->u[U_GRAIN_MASS].real[0][d->grain[q]];
+}
+
+/* As many points as the mass is worth, a power of two if bodies leave the room, where the grains are; one in every part of a cell
+ * that has no grains, so that no part comes before another. */
+void quern_hybrid_create(update *d, uint32_t c, quern_real mass, const quern_real v[3]) {
 	const uint32_t parts = parts_of(d);
 	uint32_t count = 1;
 	int32_t cell[3];
@@ -83,11 +90,9 @@ static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]
 	const uint32_t open =
 		any ? close_parts(d, c, cell, d->u[U_GRAIN_POSITION].real, d->grain[d->grain_begin[c]], taken)
 			: parts;
-	while (count < parts && mass / d->nominal >= 1.5 * count) count *= 2;
-	count = count < open ? count : open;
-	for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++)
-		held[part_of(d, cell, d->u[U_GRAIN_POSITION].real, d->grain[q])] +=
-			d->u[U_GRAIN_MASS].real[0][d->grain[q]];
+	weigh_parts(d, c, cell, held);
+	while (any && count < parts && mass / d->nominal >= 1.5 * count) count *= 2;
+	count = any && count < open ? count : open;
 	for (uint32_t k = 0; k < count; k++) {
 		uint32_t best = parts;
 		for (uint32_t p = 0; p < parts; p++)
@@ -103,45 +108,6 @@ static void create(update *d, uint32_t c, quern_real mass, const quern_real v[3]
 	}
 }
 
-/* ---- giving and taking ---- */
-
-static void draw(const update *d, uint32_t c, quern_real mass, const quern_real v[3]) {
-	d->u[U_POINT_OWED].real[0][c] -= mass;
-	for (uint32_t k = 0; k < d->s->dim; k++) d->u[U_POINT_OWED_MOMENTUM].real[k][c] -= mass * v[k];
-}
-
-/* Mass and volume grow in proportion; stress and history stay. */
-static void grow(update *d, uint32_t c, quern_real mass, quern_real held, const quern_real v[3]) {
-	const quern_column *u = d->u;
-	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const int32_t i = d->point[q];
-		const quern_real m = u[U_POINT_MASS].real[0][i], more = mass * m / held;
-		for (uint32_t k = 0; k < d->s->dim; k++) {
-			quern_real *p = &u[U_POINT_VELOCITY].real[k][i];
-			*p = (m * *p + more * v[k]) / (m + more);
-		}
-		d->s->host->give(d->s->run, "point", (uint32_t)i, QUERN_NO_TARGET, -more / m, 0);
-		u[U_POINT_MASS].real[0][i] = m + more;
-		u[U_POINT_VOLUME].real[0][i] *= (m + more) / m;
-	}
-}
-
-static void shrink(update *d, uint32_t c, quern_real mass, quern_real held) {
-	const quern_column *u = d->u;
-	const quern_real wanted = 1 + mass / held, factor = wanted > 0.7 ? wanted : 0.7,
-					 weight = point_share(d, c);
-	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const int32_t i = d->point[q];
-		const quern_real old = u[U_POINT_MASS].real[0][i], new = factor *old;
-		quern_real v[3] = { 0 };
-		for (uint32_t k = 0; k < d->s->dim; k++) v[k] = u[U_POINT_VELOCITY].real[k][i];
-		d->s->host->give(d->s->run, "point", (uint32_t)i, QUERN_NO_TARGET, 1 - factor, 0);
-		u[U_POINT_MASS].real[0][i] = new;
-		u[U_POINT_VOLUME].real[0][i] *= factor;
-		draw(d, c, weight * (new - old), v);
-	}
-}
-
 static quern_real mass_held(const update *d, uint32_t c) {
 	quern_real sum = 0;
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
@@ -149,34 +115,42 @@ static quern_real mass_held(const update *d, uint32_t c) {
 	return sum;
 }
 
-/* What giving to a cell's points or taking from them would change, of the mass that they stand for. On a ramp little is
- * carried of much, and a debt may be many times what there is room for, or all that there is: points go no farther than
- * from half of what the cell holds to that or what fills it, and the rest waits until the material has moved on. */
-static quern_real within(const update *d, uint32_t c, quern_real mass, quern_real held) {
-	const quern_real all = d->mass[c], fills = 1.1 * d->full * (d->open[c] > 0.125 ? d->open[c] : 0.125);
-	const quern_real more = (fills > all ? fills : all) - held, less = 0.5 * all - held;
-	if (!d->h->ramped) return mass;
-	if (mass > 0) return more < 0 ? 0 : mass < more ? mass : more;
-	return less > 0 ? 0 : mass > less ? mass : less;
-}
-
-static void settle(update *d, uint32_t c) {
-	const quern_real held = mass_held(d, c), weight = point_share(d, c), all = d->u[U_POINT_OWED].real[0][c],
-					 mass = within(d, c, all / weight, held), owed = weight * mass;
-	quern_real v[3] = { 0 };
-	quern_hybrid_owed_velocity(d, c, all, d->u[U_POINT_OWED_MOMENTUM], v);
-	if (owed > 0 && held > 0) {
-		grow(d, c, mass, held, v);
-		draw(d, c, owed, v);
-	} else if (owed > 0 && mass >= 0.4 * d->nominal) {
-		create(d, c, mass, v);
-		draw(d, c, owed, v);
-	} else if (owed < 0 && held > 0) shrink(d, c, mass, held);
-}
-
 /* ---- few and many: what parts and joins keeps mass, momentum and volume, and with them the density: an open point
  * stays open. Stress is the mean by volume, so that the sum of V sigma stays. Whatever else a point remembers follows the rules of
  * its fields; of joined points the heavier one stays. ---- */
+
+/* From a part's middle to the nearest point of the cell, squared, in cells. */
+static quern_real loneliness(const update *d, uint32_t c, const int32_t cell[3], uint32_t part) {
+	const quern_images images = quern_grid_images(d->g);
+	quern_real to[3], least = INFINITY;
+	part_centre(d, cell, part, to);
+	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
+		quern_real d2 = 0;
+		for (uint32_t k = 0; k < d->s->dim; k++) {
+			const quern_real way = quern_image(d->u[U_POINT_POSITION].real[k][d->point[q]] - to[k],
+									   images.half[k], images.length[k]) /
+								   d->g->cell;
+			d2 += way * way;
+		}
+		least = fmin(least, d2);
+	}
+	return least;
+}
+
+/* The part that is farthest from all points, of those as far the one with most grains; `parts` if all are taken. */
+static uint32_t loneliest(const update *d, uint32_t c, const int32_t cell[3], const bool taken[8]) {
+	const uint32_t parts = parts_of(d);
+	quern_real held[8] = { 0 }, most = 0;
+	uint32_t best = parts;
+	weigh_parts(d, c, cell, held);
+	for (uint32_t p = 0; p < parts; p++) {
+		const quern_real far = taken[p] ? 0 : loneliness(d, c, cell, p);
+		const bool alike = best < parts && fabs(far - most) < 1e-9;
+		if (taken[p] || (alike ? held[p] <= held[best] : far <= most)) continue;
+		most = far, best = p;
+	}
+	return best;
+}
 
 /* An empty quadrant of a thinly populated cell gets a point that takes an equal share from each of the others. */
 static void split(update *d, uint32_t c) {
@@ -185,14 +159,12 @@ static void split(update *d, uint32_t c) {
 	const quern_real held = mass_held(d, c), share = 1.0 / (n + 1);
 	int32_t cell[3];
 	bool taken[8] = { false };
-	uint32_t free_part = parts;
 	if (!n || n >= parts || held * share < 0.25 * d->nominal) return;
 	quern_grid_cell_of(d->g, c, cell);
 	close_parts(d, c, cell, u[U_POINT_POSITION].real, d->point[d->point_begin[c]], taken);
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++)
 		taken[part_of(d, cell, u[U_POINT_POSITION].real, d->point[q])] = true;
-	for (uint32_t p = parts; p-- > 0;)
-		if (!taken[p]) free_part = p;
+	const uint32_t free_part = loneliest(d, c, cell, taken);
 	if (free_part == parts) return;
 	new_point point = { .weight = point_share(d, c), .cell = (int32_t)c, .parent = -1 };
 	part_centre(d, cell, free_part, point.position);
@@ -268,15 +240,16 @@ static void merge(update *d, uint32_t c) {
 	d->drop_point[light] = true;
 }
 
-void quern_hybrid_points(update *d) {
-	for (uint32_t q = 0; q < d->n_cells; q++) {
-		const uint32_t c = nth_cell(d, q);
-		if (d->zone[c] == QUERN_DISCRETE) continue;
-		const uint32_t before = d->n_new_points;
-		if (d->u[U_POINT_OWED].real[0][c] != 0) settle(d, c);
-		if (d->n_new_points == before) split(d, c);
+quern_status quern_hybrid_points(update *d) {
+	uint8_t *made = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1);
+	const quern_status status = made ? quern_hybrid_absorb(d, made) : QUERN_E_MEMORY;
+	for (uint32_t q = 0; q < d->n_cells && status == QUERN_OK; q++) {
+		const uint32_t c = nth_cell(d, q), before = d->n_new_points;
+		if (d->zone[c] == QUERN_DISCRETE || made[c]) continue;
+		split(d, c);
 		if (d->n_new_points == before) merge(d, c);
 	}
+	return status;
 }
 
 /* ---- the set itself ---- */

@@ -16,7 +16,6 @@
 	X(U_GRAIN_MASS, "grain.mass", "kg", QUERN_UPDATE, QUERN_SCALAR) \
 	X(U_GRAIN_WEIGHT, "grain.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN) \
 	X(U_GRAIN_FIXED, FIXED_USE) \
-	X(U_GRAIN_HOME, "grain.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update.") \
 	X(U_GRAIN_NORMAL, "grain.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Unit normal of the zone's level set.") \
 	X(U_POINT_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR, .rule = QUERN_KEEPS) \
@@ -26,7 +25,6 @@
 	X(U_POINT_STRESS, "point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, .rule = QUERN_KEEPS) \
 	X(U_POINT_WEIGHT, "point.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN, \
 		.rule = QUERN_KEEPS) \
-	X(U_POINT_HOME, "point.home", "1", QUERN_UPDATE, QUERN_INDEX, .initial = -1, .doc = "Cell at the last update.") \
 	X(U_POINT_NORMAL, "point.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Unit normal of the zone's level set.") \
 	X(U_ZONE, "cell.zone", "1", QUERN_UPDATE, QUERN_INDEX, .flags = QUERN_SHOWN, \
@@ -53,12 +51,13 @@
 		.doc = "Mean square of velocities less that of their mean, mean over the last updates.") \
 	X(U_MARKED, "cell.marked", "1", QUERN_UPDATE, QUERN_INDEX, .when = "marks", \
 		.doc = "Bit o: oracle o has marked the cell.") \
-	X(U_GRAIN_OWED, "cell.grain_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the grains.") \
-	X(U_POINT_OWED, "cell.point_owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass owed to the continuum.") \
-	X(U_GRAIN_OWED_MOMENTUM, "cell.grain_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
-		.doc = "Momentum owed to the grains.") \
-	X(U_POINT_OWED_MOMENTUM, "cell.point_owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
-		.doc = "Momentum owed to the continuum.") \
+	X(U_OWED, "cell.owed", "kg", QUERN_UPDATE, QUERN_SCALAR, .doc = "Mass that neither grains nor points carry.") \
+	X(U_OWED_MOMENTUM, "cell.owed_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "Momentum that neither grains nor points carry.") \
+	X(U_CROWDING, "cell.crowding", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "What a cell and those around it hold, over what fills them, mean over the last updates.") \
+	X(U_FULL, "total.full", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "The mean of that in the continuum, when there first was one.") \
 	X(U_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, \
 		.doc = "Sum of the contact stress over the samples since the last update.") \
 	X(U_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Samples of the contact stress.") \
@@ -73,16 +72,6 @@
 	X(U_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR) \
 	X(U_WEIGHT, "cell.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "ramped", \
 		.doc = "Share of the continuum: 0 where there are grains alone, 1 where there are none.") \
-	X(U_HOME_MASS, "cell.home_mass", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
-		.doc = "Carried at the last update by those whose home it is.") \
-	X(U_OWED_LEFT, "total.owed_left", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
-		.doc = "Of entries, taken along by what has left the domain.") \
-	X(U_OWED_LEFT_REST, "total.owed_left_rest", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
-		.doc = "What its last bit does not hold.") \
-	X(U_OWED_LEFT_MOMENTUM, "total.owed_left_momentum", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, .when = "passes", \
-		.doc = "Of entries, taken along by what has left the domain.") \
-	X(U_OWED_LEFT_MOMENTUM_REST, "total.owed_left_momentum_rest", "kg m/s", QUERN_UPDATE, QUERN_VECTOR, \
-		.when = "passes", .doc = "What its last bit does not hold.") \
 	X(U_PASSED, "total.passed", "kg", QUERN_READ, QUERN_SCALAR, .when = "passes") \
 	X(U_LEFT, "grain_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(U_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
@@ -148,6 +137,17 @@ QUERN_USE_ENUM(COUPLE_USES);
 	X(B_ENERGY, "total.exchanged", "J", QUERN_UPDATE, QUERN_SCALAR, .when = "solves", .flags = QUERN_OPTIONAL)
 QUERN_USE_ENUM(BACK_USES);
 
+#define GROW_USES(X) \
+	X(G_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(G_RADIUS, "grain.radius", "m", QUERN_UPDATE, QUERN_SCALAR) \
+	X(G_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(G_FIXED, FIXED_USE) \
+	X(G_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(G_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(G_GROWN, "total.grown", "m", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "By how much a radius has grown since the last list, at most.")
+QUERN_USE_ENUM(GROW_USES);
+
 #define AUDIT_USES(X) \
 	X(A_GRAIN_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
 	X(A_GRAIN_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
@@ -156,10 +156,8 @@ QUERN_USE_ENUM(BACK_USES);
 	X(A_POINT_VELOCITY, "point.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
 	X(A_POINT_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(A_POINT_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR) \
-	X(A_GRAIN_OWED, "cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR) \
-	X(A_POINT_OWED, "cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR) \
-	X(A_GRAIN_OWED_MOMENTUM, "cell.grain_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
-	X(A_POINT_OWED_MOMENTUM, "cell.point_owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
+	X(A_OWED, "cell.owed", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(A_OWED_MOMENTUM, "cell.owed_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
 	X(A_BODY, "body.impulse", "N s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_WANTED) \
 	X(A_BODY_WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .when = "moving") \
 	X(A_FACES, "total.faces", "N s", QUERN_READ, QUERN_VECTOR) \
@@ -197,8 +195,6 @@ QUERN_USE_ENUM(BACK_USES);
 	X(A_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(A_POURED_MOMENTUM, "grain_source.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
 	X(A_POURED_ENERGY, "grain_source.energy", "J", QUERN_READ, QUERN_SCALAR, .with = "grain_source.mass") \
-	X(A_OWED_LEFT, "total.owed_left", "kg", QUERN_READ, QUERN_SCALAR, .when = "passes") \
-	X(A_OWED_LEFT_MOMENTUM, "total.owed_left_momentum", "kg m/s", QUERN_READ, QUERN_VECTOR, .when = "passes") \
 	X(A_PULL, "total.outlet_pull", "kg s", QUERN_UPDATE, QUERN_SCALAR, .when = "passes") \
 	X(A_PASSED, "total.passed", "kg", QUERN_UPDATE, QUERN_SCALAR, .when = "passes", \
 		.doc = "Has left the domain, less what was poured.")

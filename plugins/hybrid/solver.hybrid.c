@@ -13,9 +13,10 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.max = 10000, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, hysteresis, "1", "Mean diameters by which a surface must move before a zone follows.",
 		.def = 0.75, .max = 100, .flags = QUERN_ADVANCED),
-	QUERN_PARAM(hybrid, guard, "1",
-		"A cell leaves the hybrid zone once it is owed less than this share of its half.", .def = 0.3,
-		.max = 10, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, growth, "1",
+		"Grain steps in which the radius of a grain that was put into a hole too small for it grows by the mean "
+		"radius; 0: none is put there.",
+		.def = 7000, .max = 1e9),
 	QUERN_PARAM(hybrid, gain, "1",
 		"Motion beyond twice what there was and gravity gave that ends the run, over what lifts all by a "
 		"diameter; 0: none does.",
@@ -53,6 +54,8 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.from = "grain.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, packed, "packed_density", "kg/m^3", "Density of the continuum without stress.",
 		.from = "continuum.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
+	QUERN_PARAM_AS(hybrid, rest, "continuum.rest", "1/s", "Shear rate of what is at rest.",
+		.from = "continuum.rest", .flags = QUERN_ADVANCED, .max = 1e300),
 	QUERN_PARAM(hybrid, moving, NULL, "Ask for the work of bodies; set by itself where one moves.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, passes, NULL,
@@ -109,6 +112,7 @@ static const quern_use sample_uses[] = QUERN_USE_ROWS(SAMPLE_USES);
 static const quern_use raster_uses[] = QUERN_USE_ROWS(RASTER_USES);
 static const quern_use couple_uses[] = QUERN_USE_ROWS(COUPLE_USES);
 static const quern_use back_uses[] = QUERN_USE_ROWS(BACK_USES);
+static const quern_use grow_uses[] = QUERN_USE_ROWS(GROW_USES);
 static const quern_use audit_uses[] = QUERN_USE_ROWS(AUDIT_USES);
 
 static const quern_stage stages[] = { { .name = "hybrid.update",
@@ -138,6 +142,11 @@ static const quern_stage stages[] = { { .name = "hybrid.update",
 		.phase = QUERN_EXCHANGE,
 		.uses = back_uses,
 		.run = quern_hybrid_back },
+	{ .name = "hybrid.grow",
+		.doc = "Grains in holes too small for them grow.",
+		.phase = QUERN_END,
+		.uses = grow_uses,
+		.run = quern_hybrid_grow },
 	{ .name = "hybrid.audit",
 		.doc = "Asserts the ledger's invariants.",
 		.phase = QUERN_END,
@@ -194,13 +203,13 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 
 static uint32_t substeps(const void *self) { return (uint32_t)((const hybrid *)self)->substeps; }
 
-enum { SUM_OWED, SUM_OWED_MOMENTUM, SUM_DEFECT = SUM_OWED_MOMENTUM + 3, SUM_LEFT };
+enum { SUM_OWED, SUM_OWED_MOMENTUM, SUM_DEFECT = SUM_OWED_MOMENTUM + 3 };
 static const quern_output sums[] = {
 	{ .name = "owed", .unit = "kg", .doc = "The ledger's sum over all cells." },
 	{ .name = "owed_momentum_x", .unit = "kg m/s" }, { .name = "owed_momentum_y", .unit = "kg m/s" },
 	{ .name = "owed_momentum_z", .unit = "kg m/s" },
 	{ .name = "defect", .unit = "1", .doc = "Of the ledger's invariants so far.", .combine = QUERN_MAX },
-	{ .name = "left", .unit = "kg", .doc = "Of entries, taken along by what left." }, { .name = NULL }
+	{ .name = NULL }
 };
 
 static const quern_output looks[] = {
@@ -210,13 +219,10 @@ static const quern_output looks[] = {
 static void account(const void *self, const quern_step *s, quern_real *out) {
 	const quern_column *u = s->use;
 	(void)self;
-	out[SUM_OWED] = s->host->sum_set(s->run, "cell", u[U_GRAIN_OWED].real[0]) +
-					s->host->sum_set(s->run, "cell", u[U_POINT_OWED].real[0]);
+	out[SUM_OWED] = s->host->sum_set(s->run, "cell", u[U_OWED].real[0]);
 	for (uint32_t k = 0; k < s->dim; k++)
-		out[SUM_OWED_MOMENTUM + k] = s->host->sum_set(s->run, "cell", u[U_GRAIN_OWED_MOMENTUM].real[k]) +
-									 s->host->sum_set(s->run, "cell", u[U_POINT_OWED_MOMENTUM].real[k]);
+		out[SUM_OWED_MOMENTUM + k] = s->host->sum_set(s->run, "cell", u[U_OWED_MOMENTUM].real[k]);
 	const quern_real mass = u[U_MASS_DEFECT].real[0][0], momentum = u[U_MOMENTUM_DEFECT].real[0][0];
-	if (u[U_OWED_LEFT].real[0]) out[SUM_LEFT] = u[U_OWED_LEFT].real[0][0];
 	out[SUM_DEFECT] = mass > momentum ? mass : momentum;
 }
 
@@ -226,7 +232,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "hybrid", .
 	.after = with, .sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready,
 	.substeps = substeps, .account = account, .looks = looks, .look = quern_hybrid_look };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.hybrid",
 	.brief = "Grains where they matter, continuum everywhere else.",

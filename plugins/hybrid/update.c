@@ -7,7 +7,6 @@
 
 /* Zones from the state as it is, then weights, then books, then material that comes and goes. */
 static quern_status reckon(update *d) {
-	quern_hybrid_move_entries(d);
 	quern_hybrid_averages(d);
 	d->pose = quern_body_poses_now(d->s, SLOT_BODIES);
 	if (!d->pose) return QUERN_E_MEMORY;
@@ -22,12 +21,11 @@ static quern_status reckon(update *d) {
 	if (status == QUERN_OK) status = quern_hybrid_shares(d);
 	if (status != QUERN_OK) return status;
 	quern_hybrid_weigh(d);
-	quern_hybrid_net(d);
+	quern_hybrid_crowding(d);
 	status = quern_hybrid_hand_over(d);
-	if (status != QUERN_OK) return status;
-	quern_hybrid_points(d);
-	if (d->failed) return QUERN_E_MEMORY;
-	return quern_hybrid_grains(d);
+	if (status == QUERN_OK) status = quern_hybrid_grains(d);
+	if (status == QUERN_OK) status = quern_hybrid_points(d);
+	return d->failed ? QUERN_E_MEMORY : status;
 }
 
 static quern_status apply(update *d) {
@@ -35,9 +33,7 @@ static quern_status apply(update *d) {
 	if (d->u[U_WEIGHT].real[0]) memcpy(d->u[U_WEIGHT].real[0], d->share, d->n_cells * sizeof(quern_real));
 	quern_status status = quern_hybrid_apply_grains(d);
 	if (status == QUERN_OK) status = quern_hybrid_apply_points(d);
-	if (status == QUERN_OK) status = quern_hybrid_normals(d);
-	if (status == QUERN_OK) quern_hybrid_homes(d);
-	return status;
+	return status == QUERN_OK ? quern_hybrid_normals(d) : status;
 }
 
 static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed) {
@@ -86,7 +82,7 @@ static void say(const quern_step *s, uint32_t changed) {
 	const quern_parts *cells = s->host->parts(s->run, "cell");
 	for (uint32_t q = 0; q < cells->n; q++) {
 		const uint32_t c = quern_nth(cells->entry, q);
-		entries += fabs(u[U_GRAIN_OWED].real[0][c]) + fabs(u[U_POINT_OWED].real[0][c]);
+		entries += fabs(u[U_OWED].real[0][c]);
 	}
 	s->host->log(s->run, -1,
 		"update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",

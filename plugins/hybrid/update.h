@@ -11,7 +11,7 @@ typedef struct new_point {
 } new_point;
 
 typedef struct new_grain {
-	quern_real position[3], velocity[3], spin[3], radius, weight;
+	quern_real position[3], velocity[3], spin[3], radius, mass, weight;
 	int32_t cell;
 } new_grain;
 
@@ -30,6 +30,7 @@ typedef struct update {
 		*point_order; /* of the sets' entries, by the places of their blocks; NULL: their own */
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
+	quern_real *in_grains, *in_points; /* kg by cell, that grains and points carry with their new weights */
 	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that is open */
 	const body_pose *pose;    /* by body */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
@@ -69,10 +70,8 @@ void quern_hybrid_fractions(update *);
 /* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is
  * none. */
 bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stress[6]);
-/* Normals of the zone at every particle, and where each is, for the next update. After the sets have their new
- * order. */
+/* Normals of the zone at every particle. After the sets have their new order. */
 quern_status quern_hybrid_normals(update *);
-void quern_hybrid_homes(update *);
 
 /* ---- rates.c ---- */
 quern_status quern_hybrid_rates(update *);
@@ -106,20 +105,35 @@ void quern_hybrid_packing(const update *);
 quern_status quern_hybrid_shares(update *);
 
 /* ---- ledger.c ---- */
-/* Whether a cloud is owed anything by a cell, mass or momentum, be it less than nothing. */
-bool quern_hybrid_is_owed(const quern_real *mass, quern_real *const *momentum, uint32_t cell, uint32_t dim);
-void quern_hybrid_move_entries(update *);
+/* Whether an entry holds anything, mass or momentum, be it less than nothing. */
+bool quern_hybrid_is_owed(const quern_column *, uint32_t cell, uint32_t dim);
+/* Adds to a cell's entry what is carried no longer, or takes from it what is carried now. */
+void quern_hybrid_book(const update *, uint32_t cell, quern_real mass, const quern_real v[3]);
+void quern_hybrid_pass(const update *, uint32_t from, uint32_t to);
 void quern_hybrid_weigh(update *);
-void quern_hybrid_net(update *);
 quern_status quern_hybrid_hand_over(update *);
-/* The velocity at which mass owed to a cell is given: P/M, or the cell's own where that would be noise. */
-void quern_hybrid_owed_velocity(
-	const update *, uint32_t cell, quern_real mass, const quern_column momentum, quern_real v[3]);
+/* All that a cell holds: carried by either, or owed. */
+QUERN_INLINE quern_real cell_holds(const update *d, uint32_t c) {
+	return d->in_grains[c] + d->in_points[c] + d->u[U_OWED].real[0][c];
+}
+/* kg that can be in a cell before it is full: a tenth more than the continuum without stress. */
+QUERN_INLINE quern_real cell_room(const update *d, uint32_t c) {
+	return 1.1 * d->full * (d->open[c] > 0.125 ? d->open[c] : 0.125);
+}
+
+/* ---- crowding.c ---- */
+void quern_hybrid_crowding(const update *);
 
 /* ---- points.c ---- */
-void quern_hybrid_points(update *);
+quern_status quern_hybrid_points(update *);
+/* As many points as the mass is worth, in a cell that has none. */
+void quern_hybrid_create(update *, uint32_t cell, quern_real mass, const quern_real v[3]);
 void quern_hybrid_assign(const update *, uint32_t begin, uint32_t n);
 quern_status quern_hybrid_apply_points(update *);
+
+/* ---- absorb.c ---- */
+/* `made`: by cell, all false; true afterwards where points are new. */
+quern_status quern_hybrid_absorb(update *, uint8_t *made);
 
 /* ---- surroundings.c ---- */
 /* Velocity and spin of a new grain: those of what moves around it. */

@@ -419,15 +419,6 @@ static quern_status wishes(update *d, const quern_bound *oracle, const wish_cell
 	return QUERN_OK;
 }
 
-/* Leaving the hybrid zone needs settled books: what is owed to the clouds that stay must be small. */
-static int32_t guarded(const update *d, uint32_t c, int32_t old, int32_t new) {
-	const quern_real share = old_share(d, (int32_t)c), guard = d->h->guard, mass = d->mass[c];
-	if (old != QUERN_HYBRID) return new;
-	if (new == QUERN_DISCRETE && d->u[U_GRAIN_OWED].real[0][c] > guard *(1 - share) * mass) return old;
-	if (new == QUERN_CONTINUUM && d->u[U_POINT_OWED].real[0][c] > guard *share *mass) return old;
-	return new;
-}
-
 quern_status quern_hybrid_zones(update *d) {
 	const quern_step *s = d->s;
 	const size_t n = (size_t)d->n_cells + 1;
@@ -454,10 +445,7 @@ quern_status quern_hybrid_zones(update *d) {
 		const int32_t old = d->u[U_ZONE].index[c];
 		int32_t new = old < w.low[c] ? w.low[c] : old > w.high[c] ? w.high[c] : old;
 		if (!(d->mass[c] > 0)) new = QUERN_DISCRETE;
-		else {
-			if (new - old == 2 || old - new == 2) new = QUERN_HYBRID;
-			new = guarded(d, c, old, new);
-		}
+		else if (new - old == 2 || old - new == 2) new = QUERN_HYBRID;
 		d->zone[c] = new;
 		d->changed += new != old;
 	}

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* gather - nodes to points, chunk by chunk: velocity, position, volume, stress */
+#include "../common/calm.h"
 #include "../common/cloud.h"
 #include "../common/trips.h"
 #include "mpm.h"
@@ -13,6 +14,9 @@ typedef struct {
 	cloud points;
 	const quern_row *motion;
 	trips trips;
+	calm calm;
+	bool relieves;        /* points of crowded cells */
+	quern_real full;      /* from there on a cell is crowded */
 	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
 } gather_work;
 
@@ -20,6 +24,7 @@ typedef struct {
 	quern_row tile[QUERN_TILE_MOST];
 	trip_memory trip;
 	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
+	_Alignas(64) quern_real kept[3][STENCIL];
 	fit_memory fit; /* where the transfer asks for it */
 } gather_memory;
 
@@ -77,6 +82,13 @@ static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin
 	trips_call(&w->trips, &m->trip, w->p->matrix ? &m->fit : NULL, velocity, own, n, last);
 }
 
+/* Of motion below the grid, at rest, over the shear rate of what is: all of it at once would take elastic waves along. */
+static const quern_real calm_rate = 400;
+/* Of the shear rate of what is at rest: where material flows for certain. */
+static const quern_real flowing = 30;
+/* What is full, over what was full at first: that varies by so much. */
+static const quern_real dead_band = 1.01;
+
 /* x += dt sum S v; V *= det(1 + dt L); true density m/V */
 QUERN_INLINE void move_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
@@ -112,6 +124,45 @@ QUERN_INLINE void move_chunk(
 		volume[i] *= det;
 		moved[i] = volume[i];
 		density[i] = mass[i] / volume[i];
+	}
+}
+
+/* Of the block's cells, the one that a point is in, or the nearest to it: between sorts a point may be beyond. */
+static uint32_t cell_in_block(const gather_work *w, uint32_t b, uint32_t i) {
+	uint32_t place = 0;
+	for (uint32_t k = w->s->dim; k-- > 0;) {
+		const quern_real x = (w->s->use[GATHER_POSITION].real[k][i] - w->g->lower[k]) / w->g->cell -
+							 w->g->at[b][k] * (int32_t)w->g->edge;
+		const quern_real most = w->g->edge - 1;
+		place = place * w->g->edge + (uint32_t)(x > 0 ? (x < most ? x : most) : 0);
+	}
+	return b * QUERN_BLOCK_CELLS + place;
+}
+
+/* Mass that came where there was no room has brought its volume along, and does not press: where the neighbourhood is too
+ * full and flows, there is a least pressure, and what the material's lacks goes to it as a compression beside that of the flow. At rest
+ * no mass arrives, and a bed is denser here than there. */
+static void relieve_chunk(const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
+	const mpm *p = w->p;
+	const uint32_t dim = w->s->dim;
+	const quern_real dt = w->s->dt, answer = fmin(1, p->answer * dt), still = flowing * p->rest_rate;
+	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0];
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real fast = calm_shear(m->gradient, i, dim) / (still * still),
+						 flows = fast * fast / (1 + fast * fast);
+		quern_real pressure = 0, trace = 0;
+		for (uint32_t k = 0; k < dim; k++) {
+			pressure -= w->s->use[GATHER_STRESS].real[k][begin + i] / dim;
+			trace += m->gradient[(dim + 1) * k][i];
+		}
+		pressure -= p->bulk * trace * dt; /* what the flow itself will make of it */
+		const quern_real over = crowding[cell_in_block(w, b, begin + i)] - w->full,
+						 least = p->relief * p->bulk * over;
+		const quern_real lack = least > 0 && least > pressure ? flows * answer * (least - pressure) : 0;
+		for (uint32_t k = 0; k < dim; k++) {
+			m->kept[k][i] = m->gradient[(dim + 1) * k][i];
+			m->gradient[(dim + 1) * k][i] -= lack / (p->bulk * dt * dim);
+		}
 	}
 }
 
@@ -181,10 +232,19 @@ QUERN_INLINE void gather_block(
 		for (uint32_t k = 0; k < n && !last; k++)
 			trips_send(&w->trips, &m->trip, k, cloud_mass(&w->points, i + k), dim);
 		if (!last) continue;
+		for (uint32_t k = 0; k < n && w->calm.part; k++)
+			calm_note(
+				&w->calm, k, i + k, m->gradient, m->trip.pic, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
 		move_chunk(w, m, b, i, n, dim);
+		if (w->relieves) relieve_chunk(w, m, b, i, n);
 		call_material(w, m, i, n);
+		for (int k = 0; k < dim && w->relieves; k++)
+			memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
 		finish_chunk(w, m, b, i, n);
 	}
+	if (last && w->calm.part)
+		calm_block(
+			&w->calm, &w->points, NULL, begin, end - begin, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
 	trips_end_block(&w->trips, &m->trip, b, last);
 }
 
@@ -233,7 +293,8 @@ static quern_status lost(const gather_work *w, int32_t i) {
 
 quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	const quern_set_view points = s->host->set(s->run, "point");
-	gather_work w = { .p = self,
+	const mpm *p = self;
+	gather_work w = { .p = p,
 		.s = s,
 		.g = s->host->grid(s->run),
 		.point = points.block,
@@ -246,7 +307,11 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	if (!points.n) return QUERN_OK;
 	w.bad = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.moved = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
-	if (!w.bad || !w.moved) return QUERN_E_MEMORY;
+	w.full = s->use[GATHER_FULL].real[0] ? dead_band * s->use[GATHER_FULL].real[0][0] : 0;
+	w.relieves = p->relief > 0 && p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
+	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
+	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };
+	if (!w.bad || !w.moved || calm_init(&w.calm, s, points.n) != QUERN_OK) return QUERN_E_MEMORY;
 	for (uint32_t b = 0; b < w.g->n_blocks; b++) w.bad[b] = -1;
 	if (trips_run(&w.trips, send_one, &w) != QUERN_OK) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, gather_one, &w);

@@ -22,7 +22,9 @@ typedef struct mpm {
 	bool affine;                                /* points send their gradient, hybrid or not */
 	bool matrix, moments;                       /* or what the transfer gives; whose moment can be kept */
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
-	quern_real share_wall, share_next;          /* of a wall's nodes */
+	quern_real relief, answer; /* of the pressure to cells that are too full: over the bulk modulus, 1/s */
+	quern_real rest, diameter, rest_rate; /* shear rate of what is at rest: over sqrt(g/D), 1/s */
+	quern_real share_wall, share_next;    /* of a wall's nodes */
 	uint32_t dim;
 	bool rough, still; /* whether a body is */
 	rough_law rubbing;

@@ -42,6 +42,17 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, sources, NULL, "Keep books of sources; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, relief, "1",
+		"In a hybrid, stiffness of the least pressure of a cell too full, over the bulk modulus; 0: there is none.",
+		.def = 0.3, .max = 1, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, answer, "1/s", "Rate at which the pressure rises to that.", .def = 300, .max = 1e9,
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, rest, "1",
+		"In a hybrid, shear rate over sqrt(g/D) below which material is at rest and motion below the grid is stopped, of "
+		"points and of the grains that meet them; 0: never.",
+		.def = 0.003, .max = 1e6, .flags = QUERN_ADVANCED),
+	QUERN_PARAM_AS(mpm, diameter, "grain.diameter", "m", "Mean diameter of the grains.",
+		.from = "grain.diameter", .flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
 		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rough, NULL,
@@ -230,6 +241,11 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			"a hybrid starts from its grains alone: give grains.from a run of grains");
 	p->outlets = p->outlets || outlets_any(setup->open);
 	/* in a hybrid there is none */
+	const bool hybrid =
+		setup->host->keeps(setup, "hybrid"); /* without one no mass comes to points but by flow */
+	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
+	p->rest_rate = hybrid && p->diameter > 0 ? p->rest * sqrt(gravity / p->diameter) : 0;
+	setup->host->publish(setup, "continuum.rest", "1/s", p->rest_rate);
 	p->sources = (p->sources || p->source.n) && !setup->host->keeps(setup, "hybrid");
 	p->stream = setup->stream;
 	if (quern_sources_check(&p->source, setup, err) != QUERN_OK) return QUERN_E_PARAM;
@@ -359,7 +375,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum"
 	.limit = limit, .account = account, .cell = cell, .accept = accept, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.mpm",
 	.brief = "The continuum: material points on a sparse grid.",

@@ -10,8 +10,7 @@ typedef struct {
 static const quern_param params[] = { QUERN_END_PARAMS };
 /* clang-format off */
 #define OWN_USES(X) \
-	X(GRAIN_OWED, "cell.grain_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
-	X(POINT_OWED, "cell.point_owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(OWED, "cell.owed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(MASS, "total.mass_initial", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
@@ -26,8 +25,7 @@ static const quern_output outputs[] = {
 		.unit = "1",
 		.doc = "Carried mass over that at the release, with what was poured and without what has left, minus "
 			   "1." },
-	{ .name = "grains_owed", .unit = "kg", .doc = "Owed to the grains." },
-	{ .name = "points_owed", .unit = "kg", .doc = "Owed to the continuum." },
+	{ .name = "owed", .unit = "kg", .doc = "Sum of all entries." },
 	{ .name = "mass_defect", .unit = "1", .doc = "Of the mass invariant: the worst so far." },
 	{ .name = "momentum_defect", .unit = "1", .doc = "Of the momentum invariant: the worst so far." },
 	{ .name = "exchange_defect",
@@ -40,21 +38,19 @@ static const quern_output outputs[] = {
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
-	const uint32_t n = u[GRAIN_OWED].real[0] ? b->count[GRAIN_OWED] : 0;
+	const uint32_t n = u[OWED].real[0] ? b->count[OWED] : 0;
 	quern_real *size = host->memory(run, ((size_t)n + 1) * sizeof(quern_real));
 	cloud_sums grains, points;
 	(void)self;
-	if (!u[GRAIN_OWED].real[0]) return QUERN_OK;
+	if (!u[OWED].real[0]) return QUERN_OK;
 	const quern_real mass = u[MASS].real[0][0] - (u[PASSED].real[0] ? u[PASSED].real[0][0] : 0);
 	if (!(mass > 0)) return QUERN_OK;
 	if (!size || !observe_clouds(b, host, run, &grains, &points)) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < n; i++)
-		size[i] = fabs(u[GRAIN_OWED].real[0][i]) + fabs(u[POINT_OWED].real[0][i]);
+	for (uint32_t i = 0; i < n; i++) size[i] = fabs(u[OWED].real[0][i]);
 	out[0] = host->sum_set(run, "cell", size) / mass;
 	out[1] = (cloud_total(&grains) + cloud_total(&points)) / mass - 1;
-	out[2] = host->sum_set(run, "cell", u[GRAIN_OWED].real[0]);
-	out[3] = host->sum_set(run, "cell", u[POINT_OWED].real[0]);
-	for (int k = 0; k < 3; k++) out[4 + k] = u[MASS_DEFECT + k].real[0][0];
+	out[2] = host->sum_set(run, "cell", u[OWED].real[0]);
+	for (int k = 0; k < 3; k++) out[3 + k] = u[MASS_DEFECT + k].real[0][0];
 	return QUERN_OK;
 }
 
@@ -62,7 +58,7 @@ static const quern_observer_ops ops = {
 	.size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.ledger",
 	.brief = "What grains and continuum owe each other.",

@@ -28,9 +28,9 @@ static quern_run *block(int dim, const char *size, const char *oracle, const cha
 	return harness_open(1,
 		"quern: 1\ndimension: %d\ngravity: %s\ndomain: {lower: %s, upper: %s}\ntime: %s\n"
 		"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
-		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
+		"  contact: {linear: {stiffness: 1e-12, restitution: 1, friction: 0}},\n"
 		"  fill: {region: {box: {lower: %s, upper: %s}}, velocity: %s}}\n"
-		"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-6, critical_density: 1900}}, transfer: "
+		"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-9, critical_density: 1900}}, transfer: "
 		"%s}\n"
 		"hybrid: {oracle: [{packing_fraction: %s}], substeps: 4, update: 8, coupling: %s, transfer: %s}\n",
 		dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
@@ -95,9 +95,9 @@ static void seams_leak_nothing(void **state) {
 			"quern: 1\ndimension: %d\ngravity: %s\ndomain: {lower: %s, upper: %s, periodic: %s}\n"
 			"time: {end: 0.02, step: 0.2 ms}\n"
 			"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
-			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
+			"  contact: {linear: {stiffness: 1e-12, restitution: 1, friction: 0}},\n"
 			"  fill: {region: {box: {lower: %s, upper: %s}}, velocity: %s}}\n"
-			"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-6, critical_density: 1900}}}\n"
+			"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-9, critical_density: 1900}}}\n"
 			"hybrid: {oracle: [{packing_fraction: {depth: 7 mm, half_width: 4 mm}}], substeps: 4, update: "
 			"16}\n",
 			dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",

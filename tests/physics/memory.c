@@ -67,7 +67,7 @@ static quern_run *stir(int dim, const char *coupling) {
 		"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
 		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
 		"  fill: {region: {box: {lower: %s, upper: %s}}}}\n"
-		"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-6, critical_density: 1900}}}\n"
+		"continuum: {cell: 4 mm, rest: 0, material: {mu_i: {bulk_modulus: 1e-6, critical_density: 1900}}}\n"
 		"hybrid: {oracle: [{packing_fraction: {depth: 7 mm, half_width: 4 mm}}], substeps: 2, update: 1000, "
 		"coupling: "
 		"%s}\n"

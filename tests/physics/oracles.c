@@ -37,7 +37,7 @@ static quern_run *box(const char *bodies, way_of solid, const char *oracle, cons
 		"grains: {material: {density: 2500, radius: {mean: 0.999 mm}}, file: %s,\n"
 		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}}\n"
 		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-		"hybrid: {oracle: [%s], substeps: 1, update: 1, guard: 10, weights: %s}\n",
+		"hybrid: {oracle: [%s], substeps: 1, update: 1, weights: %s}\n",
 		bodies, path, cell, oracle, weights);
 	unlink(path);
 	harness_steps(run, 4);

@@ -41,7 +41,7 @@ static quern_run *box(const char *oracle, const char *keys) {
 		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, file: %s, overlap: {most: 0},\n"
 		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}}\n"
 		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-		"hybrid: {oracle: [{strain_rate: {%s, depth: 9 mm, half_width: 4 mm}}], substeps: 1, update: 1, guard: 10, "
+		"hybrid: {oracle: [{strain_rate: {%s, depth: 9 mm, half_width: 4 mm}}], substeps: 1, update: 1, "
 		"gain: 0%s}\n",
 		gravity, path, cell, oracle, keys);
 	unlink(path);

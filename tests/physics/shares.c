@@ -21,9 +21,9 @@ static quern_run *block(int dim, const char *hybrid) {
 		"quern: 1\ndimension: %d\ngravity: %s\ndomain: {lower: %s, upper: %s}\ntime: {end: 0.1, step: 0.2 "
 		"ms}\n"
 		"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}},\n"
-		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}},\n"
+		"  contact: {linear: {stiffness: 1e-12, restitution: 1, friction: 0}},\n"
 		"  fill: {region: {box: {lower: %s, upper: %s}}, velocity: %s}}\n"
-		"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-6, critical_density: 1900}}}\n"
+		"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-9, critical_density: 1900}}}\n"
 		"hybrid: {%s, substeps: 4, update: 16}\n",
 		dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
 		dim == 2 ? "[0.2, 0.12]" : "[0.1, 0.06, 0.06]", dim == 2 ? "[0.02, 0.02]" : "[0.012, 0.012, 0.012]",

@@ -60,9 +60,9 @@ static void far_entries_find_a_cell(void **state) {
 	const int32_t far = cell_at(run, 159.984, 0.03);
 	assert_true(far >= 0);
 	assert_int_equal(harness_field(run, "cell.zone").index[far], QUERN_DISCRETE);
-	harness_field(run, "cell.grain_owed").real[0][far] = 1e-6;
+	harness_field(run, "cell.owed").real[0][far] = 1e-6;
 	update(run);
-	assert_true(harness_field(run, "cell.grain_owed").real[0][cell_at(run, 159.984, 0.03)] == 0);
+	assert_true(harness_field(run, "cell.owed").real[0][cell_at(run, 159.984, 0.03)] == 0);
 	harness_close(run);
 }
 

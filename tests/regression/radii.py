@@ -7,18 +7,19 @@ import h5py
 import lab
 import numpy
 
-MEAN, SPREAD, SEEDS = 1e-3, 0.3, 5
+MEAN, SPREAD, SEEDS, DENSITY = 1e-3, 0.3, 5, 2500
 
 
 def converted(name, seed, folder):
-    """Radii of all grains that came after the first frame."""
+    """Radii of all grains that came after the first frame, those they will have when they have grown: what goes with their mass."""
     lab.run(name, folder, *lab.SMALL[name], *lab.sets(
-        seed=seed, time__end="250 ms", hybrid__update=60, output__fields="[]",
+        seed=seed, time__end="250 ms", hybrid__update=60, output__fields="[grain.mass]",
         grains__material__radius=f"{{mean: {MEAN}, spread: {SPREAD}, law: uniform}}"))
     first, radii = None, {}
     for frame in lab.frames(folder):
         with h5py.File(frame) as file:
-            number, radius = file["grains/id"][()].ravel(), file["grains/radius"][()].ravel()
+            number, mass = file["grains/id"][()].ravel(), file["grains/mass"][()].ravel()
+        radius = (mass / (numpy.pi * DENSITY)) ** 0.5
         first = number.max() if first is None else first
         radii.update(zip(number[number > first].tolist(), radius[number > first].tolist()))
     return list(radii.values())

@@ -6,7 +6,7 @@ import subprocess
 
 import lab
 
-INDEX = {"contact.first", "contact.second", "touch.grain", "touch.body", "grain.fixed", "grain.home", "point.home",
+INDEX = {"contact.first", "contact.second", "touch.grain", "touch.body", "grain.fixed", 
          "cell.zone", "waiting.draw"}  # four bytes; all the rest has eight
 OF_GRAINS = {"contact", "neighbours", "integrator", "packer"}
 OF_CONTINUUM = {"material", "shape", "transfer"}
@@ -113,8 +113,8 @@ def continuum_alone():
 
 def hybrid():
     whole = Scene("column", *lab.SMALL["column"])
-    books = {field for field in whole.fields if "owed" in field or field.endswith((".weight", ".home", ".zone"))}
-    assert {"cell.grain_owed", "cell.point_owed", "grain.weight", "point.weight", "cell.zone"} <= books
+    books = {field for field in whole.fields if "owed" in field or field.endswith((".weight", ".zone"))}
+    assert {"cell.owed", "grain.weight", "point.weight", "cell.zone"} <= books
     plain = "--set=output.fields=[]"
     for model in ("grains", "continuum"):
         alone = Scene("column", *lab.SMALL["column"], plain, f"--set=model={model}")

@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/* crowding - how full the neighbourhood of a cell is, of both clouds and of what is owed. One cell's mass varies by a fifth
+ * with the grains that happen to lie in it, so cells around it and updates before count too. docs/theory/hybrid.md, section 5 */
+#include "update.h"
+#include <math.h>
+
+/* Of a mean, that the newest update makes. */
+static const quern_real newest = 0.1;
+
+static quern_real fullness(const update *d, const int32_t cell[3]) {
+	const quern_grid_view *g = d->g;
+	const int depth = g->dim == 3 ? 1 : 0;
+	quern_real holds = 0, room = 0;
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -1; y <= 1; y++)
+			for (int x = -1; x <= 1; x++) {
+				const int step[3] = { x, y, z };
+				int32_t at[3] = { 0 };
+				bool beyond = false;
+				for (uint32_t k = 0; k < g->dim; k++) {
+					at[k] = cell[k] + step[k];
+					beyond = beyond || (!g->periodic[k] && (at[k] < 0 || at[k] >= g->cells[k]));
+				}
+				const int32_t c = beyond ? -1 : quern_grid_entry_back(g, at);
+				if (!beyond) room += d->full * (c >= 0 ? d->open[c] : 1);
+				if (c >= 0) holds += cell_holds(d, (uint32_t)c);
+			}
+	return room > 0 ? holds / room : 0;
+}
+
+/* Grains settle more densely or more loosely than the scene's continuum: what they were like at first is what is full. */
+static void measure_full(const update *d) {
+	quern_real sum = 0;
+	uint32_t n = 0;
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
+		if (d->zone[c] != QUERN_CONTINUUM || !(d->mass[c] > 0) || d->open[c] < 1) continue;
+		sum += d->u[U_CROWDING].real[0][c];
+		n++;
+	}
+	if (n) d->u[U_FULL].real[0][0] = sum / n;
+}
+
+void quern_hybrid_crowding(const update *d) {
+	quern_real *crowding = d->u[U_CROWDING].real[0];
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		int32_t cell[3];
+		if (!quern_grid_cell_of(d->g, c, cell)) continue;
+		const quern_real now = fullness(d, cell);
+		crowding[c] += (crowding[c] > 0 ? newest : 1) * (now - crowding[c]);
+	}
+	if (!(d->u[U_FULL].real[0][0] > 0)) measure_full(d);
+}
