@@ -360,11 +360,7 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 	arena_reset(&run->arena);
 	if (status == QUERN_OK) status = run->status;
 	else quern_run_stop(run, status, status == QUERN_E_MEMORY ? "out of memory" : "failed");
-	if (*stage->swaps >= 0) {
-		for (const int *k = stage->swaps; *k >= 0; k++)
-			run->plan->store.fields[*k].now = !run->plan->store.fields[*k].now;
-		run->plan->store.version++;
-	}
+	quern_plan_swap(run->plan, stage->swaps);
 	run->stage = NULL;
 	stage->seconds += quern_wall() - begin;
 	return status;

@@ -450,6 +450,48 @@ void quern_plan_refresh(quern_plan *p) {
 	}
 }
 
+/* Adds the columns of some uses to `links`, or counts them where that is NULL. */
+static size_t link_uses(const quern_plan *p, int field, size_t first, size_t n, quern_column *column,
+	const quern_plan_stage *stage, quern_plan_link *links) {
+	size_t found = 0;
+	for (size_t k = 0; k < n && column; k++) {
+		if (p->uses[first + k].target != field) continue;
+		if (links) links[found] = (quern_plan_link) { column + k, first + k, stage };
+		found++;
+	}
+	return found;
+}
+
+static size_t link_field(const quern_plan *p, int field, quern_plan_link *links) {
+	size_t n = 0;
+	for (size_t i = 0; i < p->n_stages && p->store.fields[field].twice; i++) {
+		const quern_plan_stage *s = &p->stages[i];
+		n += link_uses(p, field, s->first_use, s->n_uses, s->column, s, links ? links + n : NULL);
+	}
+	for (size_t i = 0; i < p->n_bounds && p->store.fields[field].twice; i++) {
+		const quern_plan_bound *b = p->bounds[i];
+		n += link_uses(p, field, b->first_use, b->bound.n_uses, b->column, NULL, links ? links + n : NULL);
+		n += link_uses(p, field, b->first_again, b->bound.n_uses, b->again, NULL, links ? links + n : NULL);
+	}
+	return n;
+}
+
+static void link_columns(quern_plan *p) {
+	p->first_link = quern_take(p->store.n_fields + 1, sizeof(size_t));
+	for (size_t k = 0; k < p->store.n_fields; k++)
+		p->first_link[k + 1] = p->first_link[k] + link_field(p, (int)k, NULL);
+	p->links = quern_take(p->first_link[p->store.n_fields] + 1, sizeof(quern_plan_link));
+	for (size_t k = 0; k < p->store.n_fields; k++) link_field(p, (int)k, p->links + p->first_link[k]);
+}
+
+void quern_plan_swap(quern_plan *p, const int *fields) {
+	for (const int *k = fields; *k >= 0; k++) {
+		p->store.fields[*k].now = !p->store.fields[*k].now;
+		for (size_t i = p->first_link[*k]; i < p->first_link[*k + 1]; i++)
+			*p->links[i].column = column_of(p, &p->uses[p->links[i].use], p->links[i].stage);
+	}
+}
+
 /* ---- the whole ---- */
 
 quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
@@ -466,6 +508,7 @@ quern_plan *quern_plan_create(const quern_scene *scene, quern_pool *pool) {
 	quern_plan_order(p);
 	for (size_t i = 0; i < p->n_stages; i++)
 		p->stages[i].column = quern_take(p->stages[i].n_uses, sizeof(quern_column));
+	link_columns(p);
 	return p;
 }
 
@@ -495,6 +538,8 @@ void quern_plan_destroy(quern_plan *p) {
 	free(p->stages);
 	free(p->uses);
 	free(p->order);
+	free(p->links);
+	free(p->first_link);
 	quern_store_finish(&p->store);
 	free(p);
 }

@@ -38,6 +38,13 @@ typedef struct quern_plan_bound {
 	const void **variant, **refined;
 } quern_plan_bound;
 
+/* A column that shows one of the two copies of a field. */
+typedef struct quern_plan_link {
+	quern_column *column;
+	size_t use;                    /* in plan->uses */
+	const quern_plan_stage *stage; /* whose own it is; NULL: a plugin's in its slot */
+} quern_plan_link;
+
 typedef struct quern_plan {
 	const quern_scene *scene;
 	quern_store store;
@@ -52,6 +59,8 @@ typedef struct quern_plan {
 	uint32_t *n_slot[QUERN_MOST_SECTIONS];
 	quern_plan_bound **observers; /* by entry of scene->observe */
 	uint64_t fresh;               /* store version of the columns */
+	quern_plan_link *links;       /* by field: those of field k begin at first_link[k] */
+	size_t *first_link;
 } quern_plan;
 
 /* Faults go to the scene's report. Never NULL. */
@@ -60,6 +69,8 @@ void quern_plan_destroy(quern_plan *);
 
 /* Renews every column pointer if the store has changed. */
 void quern_plan_refresh(quern_plan *);
+/* Other copies of these fields are current from now on, -1 ends; columns that are fresh stay so. */
+void quern_plan_swap(quern_plan *, const int *fields);
 
 extern const char *const quern_phase_names[];
 /* Whether a use by a stage that settles changes its field then. */

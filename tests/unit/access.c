@@ -50,10 +50,7 @@ static void call(quern_run *run, int stage) {
 	quern_step step = quern_run_record(run, s->section);
 	step.use = s->column;
 	assert_int_equal(s->stage->run(s->section->solver->self, &step), QUERN_OK);
-	for (const int *k = s->swaps; *k >= 0; k++) {
-		run->plan->store.fields[*k].now = !run->plan->store.fields[*k].now;
-		run->plan->store.version++;
-	}
+	quern_plan_swap(run->plan, s->swaps);
 }
 
 static void look(quern_run *run) {

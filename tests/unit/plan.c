@@ -209,6 +209,33 @@ static void kept_twice(void **state) {
 	finish(b);
 }
 
+/* After each swap every column, the writer's as well, is what a plan that is made fresh from nothing has. */
+static void columns_follow_a_swap(void **state) {
+	static const quern_use rows[] = { U("grain.a", QUERN_READ, .flags = QUERN_OTHERS),
+		U("grain.a", QUERN_UPDATE, .flags = 0), QUERN_END_USES };
+	const quern_stage *const stages[] = { STAGES("one.step", QUERN_SUBSTEP, rows),
+		STAGES("set.up", QUERN_SETUP, writes), STAGES("two.read", QUERN_EXCHANGE, reads) };
+	bench *b = make(3, stages, 0);
+	quern_plan *p = b->plan;
+	(void)state;
+	assert_int_equal(quern_store_fill(&p->store, quern_store_set(&p->store, "grain"), 5), QUERN_OK);
+	quern_plan_refresh(p);
+	for (int turn = 0; turn < 3; turn++) {
+		quern_plan_swap(p, p->stages[0].swaps);
+		const quern_column then[] = { p->stages[0].column[0], p->stages[0].column[1],
+			p->stages[2].column[0] };
+		const quern_field *a = field(b, "grain.a");
+		assert_ptr_equal(then[0].real[0], a->data[a->now][0]);
+		assert_ptr_equal(then[1].real[0], a->data[!a->now][0]);
+		p->fresh = UINT64_MAX;
+		quern_plan_refresh(p);
+		assert_ptr_equal(p->stages[0].column[0].real[0], then[0].real[0]);
+		assert_ptr_equal(p->stages[0].column[1].real[0], then[1].real[0]);
+		assert_ptr_equal(p->stages[2].column[0].real[0], then[2].real[0]);
+	}
+	finish(b);
+}
+
 static void zeroed(void **state) {
 	const quern_stage *const stages[] = { STAGES("one.add", QUERN_DEPOSIT, adds),
 		STAGES("two.add", QUERN_DEPOSIT, adds), STAGES("three.read", QUERN_EXCHANGE, reads) };
@@ -244,6 +271,7 @@ static void lanes_are_the_owners(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(order), cmocka_unit_test(lanes_are_the_owners),
 		cmocka_unit_test(phases), cmocka_unit_test(before_changes), cmocka_unit_test(conflicts),
-		cmocka_unit_test(existence), cmocka_unit_test(kept_twice), cmocka_unit_test(zeroed) };
+		cmocka_unit_test(existence), cmocka_unit_test(kept_twice), cmocka_unit_test(columns_follow_a_swap),
+		cmocka_unit_test(zeroed) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
