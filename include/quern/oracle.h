@@ -58,12 +58,16 @@ typedef struct quern_oracle_ops {
 	/* [setup] ways that a surface with open space must look, bits as of `faces`, to count: 8, the upper face along y,
 	 * means tops alone. Walls look all ways. NULL: all */
 	uint32_t (*looks)(const void *self);
+	/* [setup] m: whatever is farther from the surface than this, `decide` answers as it does at an infinite distance; so that
+	 * the solver need not measure. NULL: it may ask for any */
+	quern_real (*reach)(const void *self);
 } quern_oracle_ops;
 
 QUERN_KIND(oracle, quern_oracle_ops, "Where grains are needed.", QUERN_ONE(quern_oracle_ops, mark),
 	QUERN_ONE(quern_oracle_ops, decide), QUERN_OPTIONALLY(quern_oracle_ops, surface),
 	QUERN_OPTIONALLY(quern_oracle_ops, wants), QUERN_OPTIONALLY(quern_oracle_ops, means),
-	QUERN_OPTIONALLY(quern_oracle_ops, faces), QUERN_OPTIONALLY(quern_oracle_ops, looks));
+	QUERN_OPTIONALLY(quern_oracle_ops, faces), QUERN_OPTIONALLY(quern_oracle_ops, looks),
+	QUERN_OPTIONALLY(quern_oracle_ops, reach));
 
 #ifdef __cplusplus
 }

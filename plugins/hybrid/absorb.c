@@ -120,11 +120,11 @@ static void put(const absorbing *a, uint32_t to, uint32_t from, quern_real part)
 static void pass_from(const absorbing *a, uint32_t c) {
 	const update *d = a->d;
 	quern_real part[6], from[3], there[3], sum = 0;
-	int32_t cell[3], other[3], to[6];
+	int32_t cell[3], to[6];
 	if (d->u[U_OWED].real[0][c] == 0 || d->zone[c] == QUERN_DISCRETE || !quern_grid_cell_of(d->g, c, cell))
 		return;
 	for (uint32_t k = 0; k < 2 * d->s->dim; k++) {
-		to[k] = quern_hybrid_beside(d, cell, k / 2, k % 2 ? 1 : -1, other);
+		to[k] = cell_beside(d, c, k / 2, k % 2 ? 1 : -1);
 		quern_hybrid_centre(d, cell, from);
 		quern_hybrid_centre(d, cell, there);
 		there[k / 2] += k % 2 ? d->g->cell : -d->g->cell;

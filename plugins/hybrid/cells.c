@@ -12,10 +12,27 @@ void quern_hybrid_centre(const update *d, const int32_t cell[3], quern_real x[3]
 	for (uint32_t a = 0; a < 3; a++) x[a] = a < d->g->dim ? d->g->lower[a] + (cell[a] + 0.5) * d->g->cell : 0;
 }
 
-int32_t quern_hybrid_beside(const update *d, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]) {
-	memcpy(out, cell, 3 * sizeof(int32_t));
-	out[axis] += step;
-	return quern_grid_entry_back(d->g, out);
+/* Within a block the next cell is a step away; from its edge it has to be looked for. */
+static int32_t find_next(const update *d, uint32_t c, const int32_t cell[3], uint32_t axis, int step) {
+	const int32_t edge = (int32_t)d->g->edge, place = cell[axis] % edge + step;
+	int32_t to[3], stride = 1;
+	memcpy(to, cell, sizeof to);
+	to[axis] += step;
+	for (uint32_t k = 0; k < axis; k++) stride *= edge;
+	if (place >= 0 && place < edge && to[axis] < d->g->cells[axis]) return (int32_t)c + step * stride;
+	return quern_grid_entry_back(d->g, to);
+}
+
+static void find_neighbours(void *arg, uint32_t b, uint32_t worker) {
+	const update *d = arg;
+	const uint32_t sides = 2 * d->s->dim;
+	(void)worker;
+	for (uint32_t c = b * N; c < (b + 1) * N; c++) {
+		int32_t cell[3];
+		const bool inside = quern_grid_cell_of(d->g, c, cell);
+		for (uint32_t k = 0; k < sides; k++)
+			d->beside[c * sides + k] = inside ? find_next(d, c, cell, k / 2, k % 2 ? 1 : -1) : -1;
+	}
 }
 
 /* ---- sorting ---- */
@@ -76,7 +93,9 @@ quern_status quern_hybrid_sort(update *d) {
 	d->zone = take(d, d->n_cells, sizeof(int32_t));
 	d->share = take(d, d->n_cells, sizeof(quern_real));
 	for (uint32_t k = 0; k < s->dim; k++) d->velocity[k] = take(d, d->n_cells, sizeof(quern_real));
+	d->beside = take(d, (size_t)d->n_cells * 2 * s->dim, sizeof(int32_t));
 	if (d->failed) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, d->g->n_blocks, find_neighbours, d);
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
 	quern_grid_cursor last = { .block = -1 };
 	for (uint32_t i = 0; i < d->n_grains; i++)
@@ -227,13 +246,12 @@ bool quern_hybrid_contact_stress(const update *d, uint32_t cell, quern_real stre
 
 /* The unit vector along which the continuum's share grows at a cell, zero where it does not. */
 static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
-	int32_t cell[3], other[3];
+	int32_t cell[3];
 	quern_real length = 0;
 	n[0] = n[1] = n[2] = 0;
 	if (!quern_grid_cell_of(d->g, c, cell)) return;
 	for (uint32_t k = 0; k < d->s->dim; k++) {
-		const int32_t up = quern_hybrid_beside(d, cell, k, 1, other),
-					  down = quern_hybrid_beside(d, cell, k, -1, other);
+		const int32_t up = cell_beside(d, c, k, 1), down = cell_beside(d, c, k, -1);
 		n[k] = old_share(d, up < 0 ? (int32_t)c : up) - old_share(d, down < 0 ? (int32_t)c : down);
 		length += n[k] * n[k];
 	}

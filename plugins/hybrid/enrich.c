@@ -166,12 +166,11 @@ static void settle(packed_cell *p) {
 }
 
 /* Unit vector towards the neighbours that are pure continuum; zero if there are none, or all around. */
-static void find_upstream(const update *d, const int32_t cell[3], quern_real upstream[3]) {
+static void find_upstream(const update *d, uint32_t cell, quern_real upstream[3]) {
 	quern_real length = 0;
-	int32_t other[3];
 	for (uint32_t k = 0; k < d->s->dim; k++) {
 		for (int step = -1; step <= 1; step += 2) {
-			const int32_t c = quern_hybrid_beside(d, cell, k, step, other);
+			const int32_t c = cell_beside(d, cell, k, step);
 			if (c >= 0 && d->zone[c] == QUERN_CONTINUUM) upstream[k] += step;
 		}
 		length += upstream[k] * upstream[k];
@@ -204,7 +203,7 @@ static void enrich_cell(packed_cell *p) {
 		.scene = p };
 	memcpy(job.lower, p->lower, sizeof job.lower);
 	memcpy(job.upper, p->upper, sizeof job.upper);
-	find_upstream(d, p->cell, job.upstream);
+	find_upstream(d, p->c, job.upstream);
 	for (uint32_t k = 0; k < 4 && p->n < p->wanted && (!k || d->h->growth > 0); k++) {
 		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
 		p->part = parts[k];

@@ -22,10 +22,9 @@ static quern_real pressure_of(const update *d, uint32_t c) {
 
 /* Gradient of what cells have along one axis; one-sided where one of the neighbours is empty. */
 static quern_real slope(const update *d, const int32_t cell[3], uint32_t axis, const quern_real *of) {
-	int32_t other[3];
-	const int32_t up = quern_hybrid_beside(d, cell, axis, 1, other),
-				  down = quern_hybrid_beside(d, cell, axis, -1, other);
 	const int32_t here = quern_grid_entry(d->g, cell);
+	const int32_t up = cell_beside(d, (uint32_t)here, axis, 1),
+				  down = cell_beside(d, (uint32_t)here, axis, -1);
 	const int32_t high = up >= 0 && d->mass[up] > 0 ? up : here,
 				  low = down >= 0 && d->mass[down] > 0 ? down : here;
 	const quern_real way = ((high != here) + (low != here)) * d->g->cell;

@@ -31,6 +31,7 @@ typedef struct update {
 	int32_t *grain_cell, *point_cell;        /* by particle: its cell, -1 for none and for fixed grains */
 	quern_real *mass, *velocity[3], *spread; /* by cell: of both clouds, with the weights from before */
 	quern_real *in_grains, *in_points; /* kg by cell, that grains and points carry with their new weights */
+	int32_t *beside;                   /* by cell, down and up each axis: the next one */
 	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that is open */
 	const body_pose *pose;    /* by body */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
@@ -59,8 +60,10 @@ QUERN_INLINE quern_real old_share(const update *d, int32_t c) {
 }
 
 void quern_hybrid_centre(const update *, const int32_t cell[3], quern_real x[3]);
-/* The entry of the neighbour one step along an axis, -1 where there is none. */
-int32_t quern_hybrid_beside(const update *, const int32_t cell[3], uint32_t axis, int step, int32_t out[3]);
+/* The entry of the cell one step along an axis, -1 where there is none. */
+QUERN_INLINE int32_t cell_beside(const update *d, uint32_t c, uint32_t axis, int step) {
+	return d->beside[(size_t)c * 2 * d->s->dim + 2 * axis + (step > 0)];
+}
 
 /* ---- cells.c ---- */
 quern_status quern_hybrid_sort(update *);

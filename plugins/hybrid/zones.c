@@ -23,6 +23,7 @@ typedef struct {
 	int32_t (*way)[3];    /* by cell: to its source, in cells */
 	uint32_t *place;      /* by block, in the order of places; NULL: as they come */
 	bool boxes;           /* the source is a whole cell, not its centre */
+	quern_real most;      /* m: what is farther away nobody asks for */
 	bool failed;
 } spreading;
 
@@ -81,7 +82,10 @@ static void spread(spreading *p, const bool *open) {
 	const int depth = p->d->g->dim == 3 ? 1 : 0;
 	while (p->n && !p->failed) {
 		const heap_entry e = pop(p);
+		quern_grid_cursor home = { .block = (int32_t)(e.cell / N) };
 		int32_t cell[3];
+		memcpy(home.at, p->d->g->at[home.block], sizeof home.at);
+		if (e.distance > p->most) break;
 		if (e.distance > p->distance[e.cell] || !quern_grid_cell_of(p->d->g, e.cell, cell)) continue;
 		for (int z = -depth; z <= depth; z++)
 			for (int y = -1; y <= 1; y++)
@@ -93,14 +97,16 @@ static void spread(spreading *p, const bool *open) {
 						to[k] = cell[k] + step[k];
 						way[k] = p->way[e.cell][k] - step[k];
 					}
-					const int32_t c = quern_grid_entry_back(p->d->g, to);
+					quern_grid_cursor near = home;
+					if (!quern_grid_bring_back(p->d->g, to)) continue;
+					const int32_t c = quern_grid_entry_near(p->d->g, &near, to);
 					if (c >= 0 && (!open || open[c])) offer(p, (uint32_t)c, way);
 				}
 	}
 }
 
 static bool spreading_init(spreading *p, update *d, bool boxes, quern_real *distance) {
-	*p = (spreading) { .d = d, .distance = distance, .boxes = boxes };
+	*p = (spreading) { .d = d, .distance = distance, .boxes = boxes, .most = INFINITY };
 	p->way = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof *p->way);
 	if (d->g->by_place) p->place = d->s->host->memory(d->s->run, d->g->n_blocks * sizeof(uint32_t));
 	if (!p->way || !distance || !p->place != !d->g->by_place) return false;
@@ -146,8 +152,16 @@ typedef struct {
 	const quern_real *gap;          /* by cell: to these, NULL if nobody wants to know */
 	bool *outside, *solid, *inside; /* by cell */
 	uint32_t *queue;
-	bool found; /* there is any */
+	quern_real most; /* m: beyond, the oracle's answer is the same at any distance */
+	bool found;      /* there is any */
 } surface;
+
+/* Where changes are limited the farthest cells come last: all distances are asked for. */
+static quern_real reach_of(const update *d, const quern_bound *oracle) {
+	const quern_oracle_ops *ops = oracle->ops;
+	if (!ops->reach || d->h->most_changes < 1) return INFINITY;
+	return ops->reach(oracle->self) + 0.5 * d->h->hysteresis * d->h->diameter;
+}
 
 /* What lies one step from a cell: another one, open space, a closed face of the domain, or a wall, which may stand
  * between two cells: one that counts as surface where walls do, or another. */
@@ -155,16 +169,16 @@ enum { BESIDE_CELL, BESIDE_OPEN, BESIDE_WALL, BESIDE_NOTHING };
 
 static int beside(const update *d, const surface *f, uint32_t c, const int32_t cell[3], uint32_t axis,
 	int step, int32_t *entry) {
-	int32_t other[3];
+	const int32_t other = cell[axis] + step;
 	quern_real from[3], to[3];
-	*entry = quern_hybrid_beside(d, cell, axis, step, other);
+	*entry = cell_beside(d, c, axis, step);
 	quern_hybrid_centre(d, cell, from);
 	quern_hybrid_centre(d, cell, to);
 	to[axis] += step * d->g->cell;
 	if (quern_hybrid_walled(d, NULL, c, from, to))
 		return !f->meant || quern_hybrid_walled(d, f->meant, c, from, to) ? BESIDE_WALL : BESIDE_NOTHING;
 	if (*entry >= 0) return BESIDE_CELL;
-	const bool beyond = other[axis] < 0 || other[axis] >= d->g->cells[axis];
+	const bool beyond = !d->g->periodic[axis] && (other < 0 || other >= d->g->cells[axis]);
 	return !beyond || f->faces >> (2 * axis + (step > 0)) & 1 ? BESIDE_OPEN : BESIDE_NOTHING;
 }
 
@@ -246,6 +260,7 @@ static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern
 	*f = (surface) { .flags = ops->surface ? ops->surface(oracle->self) : 0,
 		.faces = ops->faces ? ops->faces(oracle->self) : ~0u,
 		.looks = ops->looks ? ops->looks(oracle->self) : ~0u,
+		.most = reach_of(d, oracle),
 		.meant = meant,
 		.outside = s->host->memory(s->run, d->n_cells + 1u),
 		.solid = s->host->memory(s->run, d->n_cells + 1u),
@@ -260,16 +275,17 @@ static bool surface_init(surface *f, update *d, const quern_bound *oracle, quern
 	return !f->meant || quern_hybrid_gaps(d, f->meant, gap) == QUERN_OK;
 }
 
-/* Distance of a cell's centre to the nearest cell outside. */
+/* Distance of a cell's centre to the nearest cell outside, infinite where it is more than an oracle can ask for. */
 static quern_status surface_distance(update *d, surface *f, const quern_real *level, quern_real *distance) {
 	spreading p;
 	if (!spreading_init(&p, d, true, distance)) return QUERN_E_MEMORY;
+	p.most = f->most;
 	find_sides(d, f, level);
 	begin_at_surface(&p, f);
 	f->found = p.n;
 	spread(&p, f->inside);
 	for (uint32_t c = 0; c < d->n_cells; c++)
-		if (!f->inside[c]) distance[c] = 0;
+		distance[c] = !f->inside[c] ? 0 : distance[c] > f->most ? INFINITY : distance[c];
 	free(p.heap);
 	return p.failed ? QUERN_E_MEMORY : QUERN_OK;
 }

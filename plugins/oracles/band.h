@@ -27,6 +27,9 @@ static inline quern_status band_check(
 		"must be less than the depth, %.4g m: grains must be left %s", z->depth, where);
 }
 
+/* All below is continuum. */
+static inline quern_real band_reach(const oracle_band *z) { return z->depth + z->half_width; }
+
 static inline void band_decide(const oracle_band *z, const quern_cell_batch *b) {
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_real d = b->distance[i] - z->depth;

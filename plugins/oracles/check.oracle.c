@@ -87,9 +87,30 @@ static void look(const quern_check_kernel *k, quern_check_tally *level, quern_ch
 			"%u-D: a wish is %d, no zone", k->dim, w[i]);
 }
 
+/* Cells beyond its reach are asked again, as if there were no surface at all. */
+static void look_beyond(quern_check_kernel *k, quern_check_tally *tally) {
+	const quern_oracle_ops *ops = k->ops;
+	int32_t *found = k->host->column(k, k->at[WISH])->found, *then = malloc(k->n * sizeof *then);
+	quern_real *distance = quern_check_given(k, DISTANCE, 0);
+	const quern_real reach = ops->reach(k->self);
+	for (uint32_t i = 0; i < k->n && then; i++) {
+		then[i] = found[i];
+		if (distance[i] > reach) distance[i] = INFINITY;
+	}
+	k->host->run(k, 64, false);
+	found = k->host->column(k, k->at[WISH])->found;
+	for (uint32_t i = 0; i < k->n && then; i++)
+		if (isinf(distance[i]))
+			k->host->expect(tally, found[i] == then[i],
+				"%u-D: beyond its reach of %g m a wish is %d, and %d infinitely far away", k->dim, reach,
+				then[i], found[i]);
+	free(then);
+}
+
 static void law(const quern_check *c) {
 	quern_check_tally level = { .name = "levels are numbers" }, wish = { .name = "wishes are zones" },
-					  weight = { .name = "shares are shares" };
+					  weight = { .name = "shares are shares" },
+					  far = { .name = "nothing changes beyond its reach" };
 	quern_check_kernel *k;
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (uint64_t setting = 0; setting < c->host->settings(c) + 20; setting++) {
@@ -99,6 +120,7 @@ static void law(const quern_check *c) {
 				look(k, &level, &wish);
 				if (quern_check_has(k, WEIGHT))
 					look_at_weights(k, c->host->column(k, k->at[WISH])->found, &weight);
+				if (variant == DECIDES && ((const quern_oracle_ops *)k->ops)->reach) look_beyond(k, &far);
 				c->host->kernel_destroy(k);
 			}
 			c->host->instance_destroy(it);
@@ -106,6 +128,7 @@ static void law(const quern_check *c) {
 	c->host->tell(c, &level, NULL);
 	c->host->tell(c, &wish, NULL);
 	if (weight.tried) c->host->tell(c, &weight, NULL);
+	if (far.tried) c->host->tell(c, &far, NULL);
 }
 
 static const quern_param params[] = { QUERN_END_PARAMS };

@@ -69,9 +69,15 @@ static bool means(const void *self, uint32_t b) { return named_means(&((const la
 
 static uint32_t looks(const void *self) { return ((const layered *)self)->looks; }
 
-static const quern_oracle_ops ops = {
-	.size = sizeof ops, .mark = mark, .decide = decide, .surface = flags, .means = means, .looks = looks
-};
+static quern_real reach(const void *self) { return band_reach(&((const layered *)self)->band); }
+
+static const quern_oracle_ops ops = { .size = sizeof ops,
+	.mark = mark,
+	.decide = decide,
+	.surface = flags,
+	.means = means,
+	.looks = looks,
+	.reach = reach };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -52,9 +52,15 @@ static bool means(const void *self, uint32_t b) { return named_means(&((const su
 
 static uint32_t open_faces(const void *self) { return ~open_bits(&((const surface *)self)->closed); }
 
-static const quern_oracle_ops ops = {
-	.size = sizeof ops, .mark = mark, .decide = decide, .surface = flags, .means = means, .faces = open_faces
-};
+static quern_real reach(const void *self) { return band_reach(&((const surface *)self)->band); }
+
+static const quern_oracle_ops ops = { .size = sizeof ops,
+	.mark = mark,
+	.decide = decide,
+	.surface = flags,
+	.means = means,
+	.faces = open_faces,
+	.reach = reach };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

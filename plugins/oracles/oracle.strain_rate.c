@@ -101,7 +101,11 @@ static uint32_t wants(const void *self) {
 	return QUERN_ORACLE_MARKED;
 }
 
-static const quern_oracle_ops ops = { .size = sizeof ops, .mark = mark, .decide = decide, .wants = wants };
+static quern_real reach(const void *self) { return band_reach(&((const shear *)self)->band); }
+
+static const quern_oracle_ops ops = {
+	.size = sizeof ops, .mark = mark, .decide = decide, .wants = wants, .reach = reach
+};
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,

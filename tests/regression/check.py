@@ -183,6 +183,8 @@ BROKEN = [
     ("marks the end of numbers", "oracle", [("height - up[i];", "(height - up[i]) / (up[i] > 0.5 ? 0 : 1);")],
      "levels are numbers"),
     ("wishes for more", "oracle", [(": QUERN_CONTINUUM;", ": 7;")], "wishes are zones"),
+    ("asks beyond its reach", "oracle", [("((const layer *)self)->depth;", "0.5 * ((const layer *)self)->depth;")],
+     "nothing changes beyond its reach"),
     ("shares more than there is", "oracles/oracle.fixed.c", [
         ("at.zone == QUERN_CONTINUUM && at.to_discrete < p->ramp;", "true;"), ("->ramp > 0 ? QUERN_ORACLE_WEIGHT : 0", "->ramp >= 0"
          " ? QUERN_ORACLE_WEIGHT : 0"), ("0.5 - 0.5 * quern_cos", "1.5 + 0 * quern_cos")], "shares are shares"),
