@@ -70,6 +70,7 @@ quern_status quern_hybrid_sort(update *d) {
 		.arg = s };
 	const quern_status status = quern_cover_sort(s, &c);
 	if (status != QUERN_OK) return status;
+	s->use[U_UNSORTED].index[0] = 0;
 	d->g = s->host->grid(s->run);
 	d->u = s->use;
 	d->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);

@@ -294,6 +294,6 @@ quern_status quern_hybrid_apply_points(update *d) {
 		if (p->parent < 0) quern_hybrid_assign(d, to, 1);
 		else take_part(d, p, to, now);
 	}
-	u[U_UNSORTED].index[0] = 1;
+	if (r.first != d->n_points || d->n_new_points) u[U_UNSORTED].index[0] = 1;
 	return QUERN_OK;
 }
