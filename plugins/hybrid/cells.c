@@ -46,6 +46,29 @@ static int32_t cell_of(const update *d, quern_real *const x[3], uint32_t i, quer
 	return quern_grid_entry_near(d->g, last, cell);
 }
 
+enum { CHUNK = 4096 };
+
+typedef struct {
+	const update *d;
+	quern_real *const *x;
+	const int32_t *fixed; /* NULL: none is */
+	int32_t *cell;        /* by entry */
+	uint32_t n;
+} finding;
+
+static void find_chunk(void *arg, uint32_t chunk, uint32_t worker) {
+	const finding *f = arg;
+	const uint32_t begin = chunk * CHUNK, end = begin + CHUNK < f->n ? begin + CHUNK : f->n;
+	quern_grid_cursor last = { .block = -1 };
+	(void)worker;
+	for (uint32_t i = begin; i < end; i++)
+		f->cell[i] = f->fixed && f->fixed[i] ? -1 : cell_of(f->d, f->x, i, &last);
+}
+
+static void find_cells(finding f) {
+	f.d->s->host->parallel(f.d->s->run, (f.n + CHUNK - 1) / CHUNK, find_chunk, &f);
+}
+
 static void *take(update *d, size_t count, size_t size) {
 	void *memory = d->s->host->memory(d->s->run, (count + 2) * size);
 	d->failed = d->failed || !memory;
@@ -97,12 +120,9 @@ quern_status quern_hybrid_sort(update *d) {
 	d->beside = take(d, (size_t)d->n_cells * 2 * s->dim, sizeof(int32_t));
 	if (d->failed) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, d->g->n_blocks, find_neighbours, d);
-	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
-	quern_grid_cursor last = { .block = -1 };
-	for (uint32_t i = 0; i < d->n_grains; i++)
-		d->grain_cell[i] = fixed && fixed[i] ? -1 : cell_of(d, d->u[U_GRAIN_POSITION].real, i, &last);
-	for (uint32_t i = 0; i < d->n_points; i++)
-		d->point_cell[i] = cell_of(d, d->u[U_POINT_POSITION].real, i, &last);
+	find_cells(
+		(finding) { d, d->u[U_GRAIN_POSITION].real, d->u[U_GRAIN_FIXED].index, d->grain_cell, d->n_grains });
+	find_cells((finding) { d, d->u[U_POINT_POSITION].real, NULL, d->point_cell, d->n_points });
 	d->moving_grains = moving_grains(s);
 	d->all_points = all_points(s);
 	d->grain_order = s->host->parts(s->run, "grain")->entry;
@@ -125,11 +145,12 @@ static void add_particle(
 	*second += m * v2;
 }
 
-/* Mass, mean velocity and its spread of both clouds together, with the weights as they are. */
-void quern_hybrid_averages(update *d) {
+static void average_block(void *arg, uint32_t b, uint32_t worker) {
+	update *d = arg;
 	const quern_column *u = d->u;
 	const cloud grains = moving_grains(d->s), points = all_points(d->s);
-	for (uint32_t c = 0; c < d->n_cells; c++) {
+	(void)worker;
+	for (uint32_t c = b * N; c < (b + 1) * N; c++) {
 		quern_real second = 0, square = 0;
 		d->mass[c] = d->spread[c] = 0;
 		for (uint32_t k = 0; k < d->s->dim; k++) d->velocity[k][c] = 0;
@@ -150,6 +171,9 @@ void quern_hybrid_averages(update *d) {
 		d->spread[c] = variance > 0 ? sqrt(variance) : 0;
 	}
 }
+
+/* Mass, mean velocity and its spread of both clouds together, with the weights as they are. */
+void quern_hybrid_averages(update *d) { d->s->host->parallel(d->s->run, d->g->n_blocks, average_block, d); }
 
 /* A grain counts as the square or cube of its volume: sums are exact, and a cell of a diameter or more hardly sees the
  * difference. */
