@@ -126,6 +126,8 @@ static json_t *whole(quern_run *run) {
 	json_object_set_new(root, "step_limit", number(e.hard));
 	json_object_set_new(root, "step_limit_set_by", json_string(e.hard_reason));
 	json_object_set_new(root, "substeps", json_integer((json_int_t)e.substeps));
+	if (e.most_substeps > 0)
+		json_object_set_new(root, "most_substeps", json_integer((json_int_t)e.most_substeps));
 	json_object_set_new(root, "steps", number(e.steps));
 	json_object_set_new(root, "settling_steps", number(e.settle_steps));
 	json_object_set_new(root, "estimated_core_seconds", number(e.running));
@@ -192,6 +194,17 @@ static void print_scene_stages(json_t *list) {
 	}
 }
 
+/* Fewer substeps than there is room for cost more long steps than needed; more make the short ones shorter than needed. */
+static void print_substeps(const json_t *root) {
+	const double n = number_of(root, "substeps"), most = number_of(root, "most_substeps");
+	if (most > 0 && n != most)
+		printf(
+			n < most
+				? "%.0f substeps would fit into a step\n"
+				: "no more than %.0f substeps fit into a step, so that these are shorter than they need to be\n",
+			most);
+}
+
 static void print(json_t *root) {
 	const char *name;
 	size_t i;
@@ -219,6 +232,7 @@ static void print(json_t *root) {
 		printf("settling: some %.2g steps, %s on one core\n", number_of(root, "settling_steps"), settling);
 	printf("%.0f steps of %.0f substeps, %s on one core\n", number_of(root, "steps"),
 		number_of(root, "substeps"), running);
+	print_substeps(root);
 }
 
 static quern_status check_step(quern_run *run) {

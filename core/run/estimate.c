@@ -26,6 +26,7 @@ quern_estimate quern_estimate_of(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	const double substep = price(run, true), step = price(run, false);
 	quern_estimate e = { .substeps = quern_wish_substeps(run->plan->scene) };
+	e.most_substeps = quern_run_most_substeps(run);
 	const double limit = quern_run_limit(run, &e.hard, e.reason, e.hard_reason);
 	e.step = g->step > 0 ? g->step : limit;
 	if (g->step > 0) snprintf(e.reason, sizeof e.reason, "the scene's time.step");

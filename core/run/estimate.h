@@ -6,6 +6,7 @@
 typedef struct quern_estimate {
 	double step, hard;                  /* s: the long step, and what is unstable */
 	double steps, substeps;             /* that are left */
+	double most_substeps;               /* that a long step has room for; 0: nobody asks */
 	double settle_step, settle_steps;   /* s; 0 steps: nothing to settle */
 	double settling, running;           /* s on one core */
 	char reason[200], hard_reason[200]; /* what sets step and hard */

@@ -270,6 +270,21 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 	return least;
 }
 
+uint32_t quern_run_most_substeps(quern_run *run) {
+	double short_step = INFINITY, long_step = INFINITY;
+	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
+		const quern_section *s = &run->plan->scene->sections[i];
+		if (!s->ops->limit) continue;
+		quern_step step = quern_run_record(run, s);
+		step.settling = false;
+		char why[160] = "";
+		double beyond = INFINITY, *least = quern_section_takes_substeps(s) ? &short_step : &long_step;
+		*least = fmin(*least, limit_of(s, &step, &beyond, why));
+	}
+	const double n = short_step > 0 && isfinite(long_step) ? floor(long_step / short_step * (1 + 1e-9)) : 0;
+	return n < 1 ? n >= 0 && isfinite(long_step) && isfinite(short_step) : n < 1e9 ? (uint32_t)n : 1000000000;
+}
+
 quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_reason, double recommended) {
 	const quern_general *g = &run->plan->scene->general;
 	if (g->force || !(g->step > hard)) return QUERN_OK;

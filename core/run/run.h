@@ -118,6 +118,9 @@ bool quern_run_accept(quern_run *, quern_text *why);
 quern_status quern_run_check_account(quern_run *);
 /* The smallest recommended long step, the smallest hard limit and what sets the first. */
 double quern_run_limit(quern_run *, double *hard, char reason[200], char hard_reason[200]);
+/* The most substeps of their own recommended length that fit into a long step of those who take none, at least 1; 0: there are
+ * not both. */
+uint32_t quern_run_most_substeps(quern_run *);
 bool quern_section_takes_substeps(const quern_section *);
 /* Ends the run: keeps the first message. */
 quern_status quern_run_stop(quern_run *, quern_status, const char *fmt, ...)

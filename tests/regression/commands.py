@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The command line: every command reads its options alike, says how it is used, and says so when it could not print."""
+import json
 import os
 import pathlib
 import stat
@@ -8,6 +9,7 @@ import tempfile
 
 QUERN, SOURCE = os.environ["QUERN"], pathlib.Path(os.environ["QUERN_SOURCE"])
 SCENE = str(SOURCE / "configs/two_grains.yaml")
+HYBRID = str(SOURCE / "configs/column.yaml")
 COMMANDS = {"run": [SCENE], "plan": [SCENE], "list": [], "describe": ["contact.linear"], "schema": [],
             "new": ["oracle", "mine"], "check": ["x.so"], "render": ["x"]}
 
@@ -72,6 +74,21 @@ def check_forms():
     print("options have one meaning in every form")
 
 
+def check_substeps():
+    """As many substeps as the plan has room for leave the step to the grains; with one more the continuum sets it."""
+    def plan(n):
+        return json.loads(quern("plan", "--json", HYBRID, "--set", f"hybrid.substeps={n}").stdout)
+    most = plan(10)["most_substeps"]
+    assert 20 < most < 100 and plan(most)["most_substeps"] == most
+    assert plan(most)["step_set_by"].startswith(f"{most} times contact.linear"), plan(most)["step_set_by"]
+    assert "stress waves of material.mu_i" in plan(most + 1)["step_set_by"]
+    said = {n: quern("plan", HYBRID, "--set", f"hybrid.substeps={n}").stdout for n in (10, most, most + 1)}
+    assert f"\n{most} substeps would fit into a step\n" in said[10] and " fit into a step" not in said[most]
+    assert f"\nno more than {most} substeps fit into a step, so that these are shorter" in said[most + 1]
+    assert not any("most_substeps" in quern("plan", "--json", HYBRID, f"--set=model={m}").stdout for m in ("grains", "continuum"))
+    print(f"of a column: {most} substeps fit into a step")
+
+
 def check_numbers():
     wrong = [" 2", "2 ", "+2", "-2", "-0", "02", "2.0", "2e0", "0x2", "two", "", "0", "257", "99999999999999999999"]
     for text in wrong:
@@ -110,7 +127,7 @@ def check_files(folder):
 
 
 if __name__ == "__main__":
-    for test in (check_help, check_unknown, check_words, check_forms, check_numbers, check_full):
+    for test in (check_help, check_unknown, check_words, check_forms, check_substeps, check_numbers, check_full):
         test()
     with tempfile.TemporaryDirectory() as name:
         check_files(pathlib.Path(name))
