@@ -49,7 +49,7 @@ QUERN_INLINE uint32_t find_coupled(
 		if (company_of(&m->trip.stencil, k, m->mass, dim, (int32_t)w->g->span, 0).any &&
 			w->grains.weight[grain[k]] > 0)
 			m->grain[kept++] = grain[k];
-	stencil_make(w->g, shape, b, x, 0, m->grain, kept, &m->trip.stencil);
+	if (kept < n) stencil_make(w->g, shape, b, x, 0, m->grain, kept, &m->trip.stencil);
 	return kept;
 }
 

@@ -59,28 +59,54 @@ static void gaps_of_block(const update *d, const bool *meant, uint32_t b, places
 	for (uint32_t i = 0; i < N; i++) gap[i] = p->least[i];
 }
 
-quern_status quern_hybrid_gaps(const update *d, const bool *meant, quern_real *gap) {
-	places *p = d->s->host->scratch(d->s->run, 0, sizeof *p);
-	if (!p) return QUERN_E_MEMORY;
-	for (uint32_t b = 0; b < d->g->n_blocks; b++) gaps_of_block(d, meant, b, p, gap + (size_t)b * N);
+typedef struct {
+	const update *d;
+	const bool *meant;
+	quern_real *gap;
+	bool *failed; /* by block */
+} measuring;
+
+static void measure_block(void *arg, uint32_t b, uint32_t worker) {
+	const measuring *w = arg;
+	places *p = w->d->s->host->scratch(w->d->s->run, worker, sizeof *p);
+	w->failed[b] = !p;
+	if (p) gaps_of_block(w->d, w->meant, b, p, w->gap + (size_t)b * N);
+}
+
+static void open_block(void *arg, uint32_t b, uint32_t worker) {
+	const measuring *w = arg;
+	const update *d = w->d;
+	const quern_real reach = 0.5 * sqrt(d->s->dim) * d->g->cell, *gap = w->gap + (size_t)b * N;
+	places *p = d->s->host->scratch(d->s->run, worker, sizeof *p);
+	quern_real *open = d->open + (size_t)b * N;
+	int32_t cell[3];
+	w->failed[b] = !p;
+	for (uint32_t i = 0; i < N && p; i++) {
+		open[i] = gap[i] > 0 ? 1 : 0;
+		if (fabs(gap[i]) < reach && quern_grid_cell_of(d->g, b * N + i, cell))
+			open[i] = open_share(d, cell, p);
+	}
+}
+
+static quern_status each_block(const measuring *w, void (*task)(void *, uint32_t, uint32_t)) {
+	const quern_step *s = w->d->s;
+	measuring own = *w;
+	own.failed = s->host->memory(s->run, (size_t)own.d->g->n_blocks + 1);
+	if (!own.failed) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, own.d->g->n_blocks, task, &own);
+	for (uint32_t b = 0; b < own.d->g->n_blocks; b++)
+		if (own.failed[b]) return QUERN_E_MEMORY;
 	return QUERN_OK;
 }
 
+quern_status quern_hybrid_gaps(const update *d, const bool *meant, quern_real *gap) {
+	return each_block(&(measuring) { .d = d, .meant = meant, .gap = gap }, measure_block);
+}
+
 quern_status quern_hybrid_walls(update *d) {
-	const quern_real reach = 0.5 * sqrt(d->s->dim) * d->g->cell;
-	places *p = d->s->host->scratch(d->s->run, 0, sizeof *p);
-	if (!p) return QUERN_E_MEMORY;
-	for (uint32_t b = 0; b < d->g->n_blocks; b++) {
-		quern_real *gap = d->wall + (size_t)b * N, *open = d->open + (size_t)b * N;
-		int32_t cell[3];
-		gaps_of_block(d, NULL, b, p, gap);
-		for (uint32_t i = 0; i < N; i++) {
-			open[i] = gap[i] > 0 ? 1 : 0;
-			if (fabs(gap[i]) < reach && quern_grid_cell_of(d->g, b * N + i, cell))
-				open[i] = open_share(d, cell, p);
-		}
-	}
-	return QUERN_OK;
+	const measuring w = { .d = d, .gap = d->wall };
+	const quern_status status = each_block(&w, measure_block);
+	return status == QUERN_OK ? each_block(&w, open_block) : status;
 }
 
 /* Gap of a place to the nearest body that is meant and there now. */
