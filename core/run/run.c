@@ -281,8 +281,8 @@ uint32_t quern_run_most_substeps(quern_run *run) {
 		double beyond = INFINITY, *least = quern_section_takes_substeps(s) ? &short_step : &long_step;
 		*least = fmin(*least, limit_of(s, &step, &beyond, why));
 	}
-	const double n = short_step > 0 && isfinite(long_step) ? floor(long_step / short_step * (1 + 1e-9)) : 0;
-	return n < 1 ? n >= 0 && isfinite(long_step) && isfinite(short_step) : n < 1e9 ? (uint32_t)n : 1000000000;
+	if (!isfinite(short_step) || !isfinite(long_step) || !(short_step > 0)) return 0;
+	return (uint32_t)fmin(fmax(floor(long_step / short_step * (1 + 1e-9)), 1), 1e9);
 }
 
 quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_reason, double recommended) {

@@ -31,7 +31,7 @@ static void find_neighbours(void *arg, uint32_t b, uint32_t worker) {
 		int32_t cell[3];
 		const bool inside = quern_grid_cell_of(d->g, c, cell);
 		for (uint32_t k = 0; k < sides; k++)
-			d->beside[c * sides + k] = inside ? find_next(d, c, cell, k / 2, k % 2 ? 1 : -1) : -1;
+			d->beside[(size_t)c * sides + k] = inside ? find_next(d, c, cell, k / 2, k % 2 ? 1 : -1) : -1;
 	}
 }
 
