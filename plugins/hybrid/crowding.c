@@ -3,14 +3,17 @@
  * with the grains that happen to lie in it, so cells around it and updates before count too. docs/theory/hybrid.md, section 5 */
 #include "update.h"
 #include <math.h>
+#include <string.h>
 
 /* Of a mean, that the newest update makes. */
 static const quern_real newest = 0.1;
 
-static quern_real fullness(const update *d, const int32_t cell[3]) {
+static quern_real fullness(const update *d, uint32_t block, const int32_t cell[3]) {
 	const quern_grid_view *g = d->g;
+	quern_grid_cursor home = { .block = (int32_t)block };
 	const int depth = g->dim == 3 ? 1 : 0;
 	quern_real holds = 0, room = 0;
+	memcpy(home.at, g->at[block], sizeof home.at);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
@@ -21,7 +24,9 @@ static quern_real fullness(const update *d, const int32_t cell[3]) {
 					at[k] = cell[k] + step[k];
 					beyond = beyond || (!g->periodic[k] && (at[k] < 0 || at[k] >= g->cells[k]));
 				}
-				const int32_t c = beyond ? -1 : quern_grid_entry_back(g, at);
+				quern_grid_cursor near = home;
+				const int32_t c =
+					beyond || !quern_grid_bring_back(g, at) ? -1 : quern_grid_entry_near(g, &near, at);
 				if (!beyond) room += d->full * (c >= 0 ? d->open[c] : 1);
 				if (c >= 0) holds += cell_holds(d, (uint32_t)c);
 			}
@@ -46,7 +51,7 @@ void quern_hybrid_crowding(const update *d) {
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
-		const quern_real now = fullness(d, cell);
+		const quern_real now = fullness(d, c / QUERN_BLOCK_CELLS, cell);
 		crowding[c] += (crowding[c] > 0 ? newest : 1) * (now - crowding[c]);
 	}
 	if (!(d->u[U_FULL].real[0][0] > 0)) measure_full(d);
