@@ -8,11 +8,12 @@ By `kind`, the size of a difference d from a reference R is
 - rms: the root of the mean square of d, of one number its amount;
 - relative: that over the same of R;
 - share: the sum of |d| over the sum of |R|;
+- worst: the largest |d| over the mean of |R|;
 - distance: the largest |d|, which between distribution functions is Kolmogorov and Smirnov's."""
 import numpy as np
 
-KINDS = ("rms", "relative", "share", "distance")
-SHARES = ("relative", "share")  # of the reference
+KINDS = ("rms", "relative", "share", "worst", "distance")
+SHARES = ("relative", "share", "worst")  # of the reference
 RESAMPLES = 1000
 AT_ONCE = 200_000  # numbers of resamples that are held together, few enough to stay in a processor's cache
 
@@ -21,16 +22,26 @@ def size(x: np.ndarray, kind: str) -> np.ndarray:
     """Of each row."""
     if kind == "share":
         return np.sum(np.abs(x), axis=-1)
-    return np.maximum(np.max(x, axis=-1), -np.min(x, axis=-1)) if kind == "distance" else np.sqrt(np.mean(x ** 2, axis=-1))
+    return np.maximum(np.max(x, axis=-1), -np.min(x, axis=-1)) if kind in ("worst", "distance") else np.sqrt(np.mean(x ** 2, axis=-1))
 
 
 def slope(x: np.ndarray, kind: str) -> np.ndarray:
     """How fast the size of a row grows with each of its numbers."""
     if kind == "share":
         return np.sign(x)
-    if kind == "distance":
+    if kind in ("worst", "distance"):
         return np.where(np.arange(len(x)) == np.argmax(np.abs(x)), np.sign(x), 0)
     return x / (len(x) * size(x, kind))
+
+
+def whole_of(reference: np.ndarray, kind: str) -> np.ndarray:
+    """What the size of a difference is a share of, of each row."""
+    return np.mean(np.abs(reference), axis=-1) if kind == "worst" else size(reference, kind)
+
+
+def whole_slope(reference: np.ndarray, kind: str) -> np.ndarray:
+    """How fast that grows with each of a row's numbers."""
+    return np.sign(reference) / len(reference) if kind == "worst" else slope(reference, kind)
 
 
 def norm(difference: np.ndarray, reference: np.ndarray, kind: str) -> np.ndarray:
@@ -38,7 +49,7 @@ def norm(difference: np.ndarray, reference: np.ndarray, kind: str) -> np.ndarray
     if kind not in SHARES:
         return size(difference, kind)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = size(difference, kind) / size(reference, kind)
+        found = size(difference, kind) / whole_of(reference, kind)
     return np.where(np.isfinite(found), found, np.nan)
 
 
@@ -58,10 +69,10 @@ def standard_error(runs: np.ndarray, twins: np.ndarray, kind: str = "rms") -> fl
     moved = np.sum((pairs - mean) * slope(mean, kind), axis=-1)
     if kind in SHARES:
         reference = np.mean(twins, axis=0)
-        whole = size(reference, kind)
+        whole = whole_of(reference, kind)
         if whole == 0:
             return float("nan")
-        moved = (moved - size(mean, kind) / whole * np.sum((twins - reference) * slope(reference, kind), axis=-1)) / whole
+        moved = (moved - size(mean, kind) / whole * np.sum((twins - reference) * whole_slope(reference, kind), axis=-1)) / whole
     return float(np.std(moved, ddof=1) / np.sqrt(n))
 
 

@@ -12,7 +12,7 @@ from .runs import Run
 
 AT = ("last", "first", "mean", "min", "max", "every")
 OF = ("mean", "deviation", "min", "max", "sum", "count", "all")
-NORMS = ("rms", "share")
+NORMS = ("rms", "share", "worst")
 SOURCES = {"series": "a column of series.csv", "summary": "a path in summary.json", "frame": "a field of a frame",
            "cost": "a path in summary.json that a clock gave"}
 # Columns that every table has.
@@ -106,7 +106,7 @@ def check_words(reader: Reader, found: dict, measure: Measure) -> None:
     if "norm" in found and (measure.single or measure.distribution):
         refuse("norm", "of a distribution it is Kolmogorov and Smirnov's distance; leave 'norm' out" if measure.distribution else
                "one number has no norm; write 'relative: yes' for a share of the reference")
-    if "relative" in found and (measure.distribution or measure.norm == "share"):
+    if "relative" in found and (measure.distribution or measure.norm != "rms"):
         refuse("relative", "this error is a share already; leave 'relative' out")
     if measure.source == "cost":
         for key in ("norm", "relative"):

@@ -48,10 +48,11 @@ def check_norms():
     """Every kind by hand: differences of 1, -2, 0 and 3 from a reference of 2, -4, 1 and 1."""
     twins = np.array([[2, -4, 1, 1.0]] * 3)
     runs = twins + [1, -2, 0, 3.0]
-    for kind, wanted in (("rms", math.sqrt(14 / 4)), ("relative", math.sqrt(14 / 22)), ("share", 6 / 8), ("distance", 3)):
+    for kind, wanted in (("rms", math.sqrt(14 / 4)), ("relative", math.sqrt(14 / 22)), ("share", 6 / 8), ("worst", 3 / 2), ("distance", 3)):
         near(errors.error(runs, twins, kind), wanted, 1e-15, f"{kind} of 1, -2, 0, 3 from 2, -4, 1, 1")
     spread = np.array([[1, 0, 0.0], [2, 0, 0], [3, 3, 0]])  # means 2, 1, 0; deviations 1, sqrt 3, 0
-    for kind, wanted in (("rms", math.sqrt(4 / 3)), ("relative", math.sqrt(4 / 5)), ("share", (1 + math.sqrt(3)) / 3), ("distance", math.sqrt(3))):
+    for kind, wanted in (("rms", math.sqrt(4 / 3)), ("relative", math.sqrt(4 / 5)), ("share", (1 + math.sqrt(3)) / 3), ("worst", math.sqrt(3)),
+                         ("distance", math.sqrt(3))):
         near(errors.scatter(spread, kind), wanted, 1e-15, f"scatter by {kind}")
     near(errors.error(np.array([[3.0]]), np.array([[-2.0]]), "relative"), 2.5, 1e-15, "3 from -2, relative")
     for kind in errors.SHARES:
@@ -71,8 +72,10 @@ def check_norms_of_many():
             found.append(errors.error(runs, twins, kind))
             said.append(errors.standard_error(runs, twins, kind))
         slope, whole = {"rms": (off / (4 * errors.size(off, "rms")), 1), "share": (np.sign(off), 16), "distance": (np.array([0, 0, 0, 1]), 1),
+                        "worst": (np.array([0, 0, 0, 1]), 4),
                         "relative": (off / (4 * errors.size(off, "rms")), errors.size(reference, "rms"))}[kind]
-        back = {"share": np.sign(reference), "relative": reference / (4 * errors.size(reference, "rms"))}.get(kind, np.zeros(4))
+        back = {"share": np.sign(reference), "worst": np.sign(reference) / 4,
+                "relative": reference / (4 * errors.size(reference, "rms"))}.get(kind, np.zeros(4))
         back = back * errors.size(off, kind) / whole
         # runs less twins hold -0.5 of what is common, the reference all of it; each number has its own chance
         by_hand = math.sqrt(np.sum((0.4 * (-0.5 * slope - back)) ** 2 + (0.2 * (slope + back)) ** 2 + (0.3 * slope) ** 2) / 8) / whole
