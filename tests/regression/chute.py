@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""A layer that flows down a rough slope, 20 grains long and for a second: the hybrid keeps its mass at every output, and its height, its density and
+its speed are near those of grains alone that began as the same settled bed. docs/validation/chute.md has the whole of it."""
+import pathlib
+
+import lab
+
+NARROW = ["--set=domain.upper=[40 mm, 120 mm]", "--set=grains.fill.0.region.box.upper=[40 mm, -0.7 mm]",
+          "--set=grains.fill.1.region.box.upper=[40 mm, 73 mm]", "--set=observe.5.profile.region.box.upper=[40 mm, 64 mm]",
+          "--set=continuum.fill.region.box.upper=[40 mm, 72 mm]", "--set=time.end=1 s", "--set=output={every: 0.1 s, fields: []}"]
+
+
+def rows(out, *options):
+    lab.run("chute", out, *NARROW, *options)
+    header, lines = lab.series(out)
+    return [dict(zip((name.split(" ")[0] for name in header), line)) for line in lines]
+
+
+def mean(found, column):
+    """Over the second half of the run."""
+    last = found[len(found) // 2:]
+    return sum(row[column] for row in last) / len(last)
+
+
+def near(what, found, wanted, tolerance):
+    print(f"{what}: {found:.5g}, of grains {wanted:.5g}: {found / wanted - 1:+.1%}, asked {tolerance:.0%}")
+    assert abs(found / wanted - 1) < tolerance, what
+
+
+if __name__ == "__main__":
+    with lab.workplace() as name:
+        both, grains = rows(pathlib.Path(name) / "both"), rows(pathlib.Path(name) / "grains", "--set=model=grains")
+    carried = [row["ledger.carried"] for row in both]
+    print(f"carried mass, over that at first, less one: from {min(carried):.2e} to {max(carried):.2e}; share of grains {mean(both, 'discrete_share.share'):.3f}")
+    assert max(map(abs, carried)) < 0.01 and mean(both, "discrete_share.share") < 0.4
+    near("height below which half of the mass lies, m", mean(both, "half.height"), mean(grains, "half.height"), 0.03)
+    near("height of the top, m", mean(both, "top.height"), mean(grains, "top.height"), 0.03)
+    near("speed at the end, m/s", both[-1]["layer.x_0"], grains[-1]["layer.x_0"], 0.2)
+    for k in range(8):
+        near(f"density from {8 * k} to {8 * k + 8} mm, kg/m^3", mean(both, f"row.density_{k}"), mean(grains, f"row.density_{k}"), 0.12)
