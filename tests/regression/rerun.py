@@ -8,7 +8,8 @@ import subprocess
 
 import lab
 
-SHORT = {"two_grains": lab.sets(time__end="5 ms"), "mixture": lab.sets(time__end="20 ms", output__every="5 ms"),
+LAYER = lab.sets(time__end="20 ms", output__every="5 ms")
+SHORT = {"bed": LAYER, "chute": LAYER, "strip": LAYER, "shear": LAYER, "two_grains": lab.sets(time__end="5 ms"), "mixture": lab.sets(time__end="20 ms", output__every="5 ms"),
          "incline": lab.sets(time__end="50 ms"),
          "elastic_bar": lab.sets(time__end="2"),
          "column": [*lab.SMALL["column"], *lab.sets(time__end="20 ms")],
