@@ -39,7 +39,8 @@ def look(out, what):
     share, carried = ([row[name] for row in rows] for name in ("discrete_share.share", "ledger.carried"))
     floor = -sum(row["wall_force.y"] for row in rows) / len(rows) / weight
     print(f"{what}: {summary['substeps']} grain steps; sinks by {made:+.4f} D as zones are made and {early - late:+.4f} D later, in the "
-          f"second half by {rate:+.1e} D a step; kinetic energy over mgD {kinetic[0] + kinetic[2]:.1e} in the second half, {kinetic[1] + kinetic[3]:.1e} at last; "
+          f"second half by {rate:+.1e} D a step; kinetic energy over mgD {kinetic[0] + kinetic[2]:.1e} in the second half, "
+          f"{kinetic[1] + kinetic[3]:.1e} at last; "
           f"share of grains from {min(share):.4f} to {max(share):.4f}; carried mass off by {max(map(abs, carried)):.1e}; "
           f"on the floor {floor:.4f} of the weight", flush=True)
     return made, early - late, kinetic[0] + kinetic[2], max(map(abs, carried)), floor
