@@ -443,7 +443,7 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 		memcpy(
 			s->use[NEAR_ANCHOR].real[k], s->use[NEAR_POSITION].real[k], (size_t)l.job.n * sizeof(quern_real));
 	s->use[NEAR_DISPLACEMENT].real[0][0] = 0;
-	if (grown) *grown = 0;
+	if (grown && !s->settling) *grown = 0;
 	if (s->use[NEAR_SWEPT].real[0]) s->use[NEAR_SWEPT].real[0][0] = 0;
 	return QUERN_OK;
 }

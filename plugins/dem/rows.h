@@ -95,7 +95,7 @@ QUERN_USE_ENUM(POUR_USES);
 	X(NEAR_MATERIAL, MATERIAL_USE(QUERN_READ, .flags = QUERN_OTHERS)) \
 	X(NEAR_DISPLACEMENT, DISPLACEMENT_USE) \
 	X(NEAR_SWEPT, SWEPT_USE(QUERN_WRITE)) \
-	X(NEAR_GROWN, "total.grown", "m", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(NEAR_GROWN, "total.grown", "m", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED) \
 	X(NEAR_ANCHOR, "grain.anchor", "m", QUERN_WRITE, QUERN_VECTOR, .doc = "Position when the list was made.") \
 	X(NEAR_FIRST, "contact.first", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", \
 		.doc = "The grain of lower id.") \
