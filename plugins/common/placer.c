@@ -171,8 +171,9 @@ int32_t quern_placer_worst(const placer *p, const quern_spot *s, quern_real shar
 	return worst;
 }
 
-uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const quern_real upper[3],
-	quern_real reach, quern_spot *out, uint32_t cap) {
+/* `number`, if any: of each spot, as it was added. */
+static uint32_t find_near(const placer *p, const quern_real lower[3], const quern_real upper[3],
+	quern_real reach, quern_spot *out, int32_t *number, uint32_t cap) {
 	uint32_t n = 0;
 	int32_t count[3] = { 1, 1, 1 }, first[3] = { 0 };
 	for (uint32_t k = 0; k < p->dim; k++) {
@@ -197,10 +198,16 @@ uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const que
 					}
 					if (!near) continue;
 					if (n < cap) out[n] = s;
+					if (n < cap && number) number[n] = i;
 					n++;
 				}
 			}
 	return n;
+}
+
+uint32_t quern_placer_near(const placer *p, const quern_real lower[3], const quern_real upper[3],
+	quern_real reach, quern_spot *out, uint32_t cap) {
+	return find_near(p, lower, upper, reach, out, NULL, cap);
 }
 
 quern_spot *quern_placer_seeds(
@@ -209,4 +216,30 @@ quern_spot *quern_placer_seeds(
 	quern_spot *seed = malloc(((size_t)*n + 1) * sizeof *seed);
 	if (seed) quern_placer_near(p, lower, upper, reach, seed, *n);
 	return seed;
+}
+
+typedef struct {
+	quern_spot spot;
+	int32_t number;
+} numbered;
+
+static int by_number(const void *a, const void *b) {
+	const int32_t one = ((const numbered *)a)->number, other = ((const numbered *)b)->number;
+	return (one > other) - (one < other);
+}
+
+quern_spot *quern_placer_seeds_in_order(
+	const placer *p, const quern_real lower[3], const quern_real upper[3], quern_real reach, uint32_t *n) {
+	quern_spot *seed = quern_placer_seeds(p, lower, upper, reach, n);
+	int32_t *number = malloc(((size_t)*n + 1) * sizeof *number);
+	numbered *all = malloc(((size_t)*n + 1) * sizeof *all);
+	const bool good = seed && number && all;
+	if (good) find_near(p, lower, upper, reach, seed, number, *n);
+	for (uint32_t i = 0; i < *n && good; i++) all[i] = (numbered) { seed[i], number[i] };
+	if (good) qsort(all, *n, sizeof *all, by_number);
+	for (uint32_t i = 0; i < *n && good; i++) seed[i] = all[i].spot;
+	free(number);
+	free(all);
+	if (!good) free(seed);
+	return good ? seed : NULL;
 }

@@ -47,3 +47,7 @@ uint32_t quern_placer_near(const placer *, const quern_real lower[3], const quer
 /* All of them, n, to free(); NULL if memory is gone. */
 quern_spot *quern_placer_seeds(
 	const placer *, const quern_real lower[3], const quern_real upper[3], quern_real reach, uint32_t *n);
+/* The same in the order in which they were added: whoever adds them in an order of its own gets the same seeds wherever the places
+ * beside a cell's face round to. */
+quern_spot *quern_placer_seeds_in_order(
+	const placer *, const quern_real lower[3], const quern_real upper[3], quern_real reach, uint32_t *n);

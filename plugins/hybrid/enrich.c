@@ -71,7 +71,8 @@ static quern_real lacking(const update *d, uint32_t c) {
 	return grain_share(d, c) * (all < room ? all : room) - d->in_grains[c];
 }
 
-/* Half a grain over would never be paid back: a cell gets the next grain while all of it is lacking. */
+/* Half a grain over would never be paid back: a cell gets the next grain while all of it is lacking. Sums round, and where all grains
+ * are alike a debt may be just one of them. */
 static bool share_out(enriching *e, packed_cell *p) {
 	const update *d = e->d;
 	const quern_real share = grain_share(d, p->c);
@@ -79,7 +80,7 @@ static bool share_out(enriching *e, packed_cell *p) {
 	p->first = e->n_numbers;
 	for (;; p->wanted++) {
 		const quern_real mass = share * mass_of(d->h, radius_of(d, next_number(e)));
-		if (!(rest > mass)) return true;
+		if (!(rest > (1 - 1e-9) * mass)) return true;
 		rest -= mass;
 		if (!take_number(e)) return false;
 	}
@@ -184,7 +185,7 @@ static void enrich_cell(packed_cell *p) {
 	const quern_bound *packer = &d->s->slot[SLOT_PACKER][0];
 	uint32_t n = 0;
 	quern_spot *seed =
-		quern_placer_seeds(&e->placer, p->lower, p->upper, 2 * quern_radius_most(&d->h->radii), &n);
+		quern_placer_seeds_in_order(&e->placer, p->lower, p->upper, 2 * quern_radius_most(&d->h->radii), &n);
 	if (!seed) {
 		p->failed = true;
 		return;
@@ -278,17 +279,32 @@ static bool colour_cells(enriching *e) {
 	return true;
 }
 
+/* In the order of their numbers: two runs that differ in the last bits store grains in another order at times, and packers begin
+ * with the first seed. */
+static int32_t *obstacles_in_order(const update *d) {
+	const quern_step *s = d->s;
+	int32_t *order = s->host->memory(s->run, ((size_t)d->n_grains + 1) * sizeof *order);
+	void *work = s->host->memory(s->run, quern_sort_bytes(d->n_grains));
+	uint64_t *id = s->host->memory(s->run, ((size_t)d->n_grains + 1) * sizeof *id);
+	if (!order || !work || !id) return NULL;
+	for (uint32_t i = 0; i < d->n_grains; i++) id[i] = (uint64_t)d->u[U_GRAIN_ID].id[i];
+	quern_sort_order(d->n_grains, id, NULL, order, work);
+	return order;
+}
+
 static bool place_obstacles(enriching *e) {
 	const update *d = e->d;
 	const quern_step *s = d->s;
+	const int32_t *order = obstacles_in_order(d);
 	quern_real most = quern_radius_most(&d->h->radii);
 	for (uint32_t i = 0; i < d->n_grains; i++)
 		most = d->u[U_GRAIN_RADIUS].real[0][i] > most ? d->u[U_GRAIN_RADIUS].real[0][i] : most;
-	if (quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
+	if (!order ||
+		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
 		!quern_placer_bodies(&e->placer, s, SLOT_BODIES, false))
 		return false;
 	for (uint32_t q = 0; q < d->n_grains; q++) {
-		const uint32_t i = quern_nth(d->grain_order, q);
+		const int32_t i = order[q];
 		quern_spot spot = { .radius = d->u[U_GRAIN_RADIUS].real[0][i] };
 		if (d->drop_grain[i]) continue;
 		for (uint32_t k = 0; k < s->dim; k++) spot.x[k] = d->u[U_GRAIN_POSITION].real[k][i];

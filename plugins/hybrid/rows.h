@@ -16,6 +16,7 @@
 	X(U_GRAIN_MASS, "grain.mass", "kg", QUERN_UPDATE, QUERN_SCALAR) \
 	X(U_GRAIN_WEIGHT, "grain.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN) \
 	X(U_GRAIN_FIXED, FIXED_USE) \
+	X(U_GRAIN_ID, "grain.id", "1", QUERN_READ, QUERN_ID) \
 	X(U_GRAIN_NORMAL, "grain.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Unit normal of the zone's level set.") \
 	X(U_POINT_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR, .rule = QUERN_KEEPS) \
