@@ -271,8 +271,12 @@ typedef struct {
 } fill;
 
 static fill fills[] = { { .id = "packer.random", .dim = 2, .cells = 50, .least = 0.42, .boxed = 0.4 },
+	{ .id = "packer.grid", .dim = 2, .cells = 50, .least = 0.66, .boxed = 0.61 },
+	{ .id = "packer.circle_sweep", .dim = 2, .cells = 50, .least = 0.7, .boxed = 0.64 },
 	{ .id = "packer.two_point_tangent", .dim = 2, .cells = 50, .least = 0.76, .boxed = 0.71 },
 	{ .id = "packer.random", .dim = 3, .cells = 16, .least = 0.25, .boxed = 0.22 },
+	{ .id = "packer.grid", .dim = 3, .cells = 16, .least = 0.46, .boxed = 0.43 },
+	{ .id = "packer.circle_sweep", .dim = 3, .cells = 16, .least = 0.44, .boxed = 0.4 },
 	{ .id = "packer.two_point_tangent", .dim = 3, .cells = 16, .least = 0.54, .boxed = 0.515 } };
 enum { N_FILLS = sizeof fills / sizeof *fills };
 

@@ -22,6 +22,8 @@ CHANGES = [
      "oracle.packing_fraction"),
     ("oracle, of the top alone", ["hybrid.oracle=[{layered: {%s}}]" % DEEP], "oracle.layered", "oracle.packing_fraction"),
     ("packer", ["hybrid.packer=random"], "packer.random", None),
+    ("packer, by a grid", ["hybrid.packer=grid"], "packer.grid", None),
+    ("packer, by circles", ["hybrid.packer=circle_sweep"], "packer.circle_sweep", None),
     ("packer, of the first grains too", ["hybrid.packer=random", "grains.fill.0.packer=random",
                                          "grains.fill.1.packer=random"], "packer.random", "packer.two_point_tangent"),
     ("coupling", ["hybrid.coupling=lumped"], "coupling.lumped", "coupling.affine"),
