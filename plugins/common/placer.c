@@ -57,6 +57,11 @@ void quern_placer_finish(placer *p) {
 	*p = (placer) { 0 };
 }
 
+void quern_placer_empty(placer *p) {
+	p->n = 0;
+	memset(p->head, 0xff, p->n_heads * sizeof(int32_t));
+}
+
 /* Cell of a place, and a cell brought back through a periodic face. Neighbours are counted in cells: a place that is a
  * cell's width away may round into the cell beyond. */
 static int32_t cell_at(const placer *p, uint32_t k, quern_real x) {

@@ -28,6 +28,8 @@ typedef struct placer {
 quern_status quern_placer_init(placer *, uint32_t dim, const quern_real lower[3], const quern_real upper[3],
 	const bool periodic[3], quern_real most);
 void quern_placer_finish(placer *);
+/* Without grains, and with its bodies. */
+void quern_placer_empty(placer *);
 /* [stage] What must not be touched: bodies of a slot that are there now, where they are now, and of these with `nodes` only those
  * that act on the continuum. Until the stage returns; false if memory is gone. */
 bool quern_placer_bodies(placer *, const quern_step *, uint32_t slot, bool nodes);

@@ -14,6 +14,7 @@ typedef struct {
 	placer placer;
 	const body_pose *pose; /* by body */
 	dem_place *grain;
+	quern_real *full; /* m, by grain: the radius that it shall have */
 	uint32_t n, cap;
 	uint32_t before; /* grains of another run's state, the first of them */
 	uint64_t draws;
@@ -43,7 +44,14 @@ static void add(filling *f, const dem_place *grain) {
 			return;
 		}
 		f->grain = grown;
+		quern_real *full = realloc(f->full, f->cap * sizeof *full);
+		if (!full) {
+			f->failed = true;
+			return;
+		}
+		f->full = full;
 	}
+	f->full[f->n] = grain->radius;
 	f->grain[f->n++] = *grain;
 	quern_spot spot = { .radius = grain->radius };
 	for (uint32_t k = 0; k < f->d->dim; k++) spot.x[k] = grain->position[k];
@@ -80,11 +88,19 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	dem_place grain = { .radius = spot->radius, .fixed = f->item->fixed, .kind = f->kind };
 	for (uint32_t k = 0; k < f->d->dim; k++)
 		grain.position[k] = spot->x[k], grain.velocity[k] = f->item->velocity[k];
+	const quern_real full = job_radius(job);
 	add(f, &grain);
+	if (!f->failed) f->full[f->n - 1] = full;
+	grain.radius = full;
 	f->placed[f->kind] += mass_of(f->d, &grain);
 	f->draws++;
 	choose_material(f);
 	return !f->failed && !f->placer.failed;
+}
+
+/* Fixed grains are walls: they stay where they are put. */
+static bool relaxes(const filling *f, const quern_bound *packer) {
+	return ((const quern_packer_ops *)packer->ops)->relax && !f->item->fixed;
 }
 
 static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
@@ -108,6 +124,7 @@ static void fill_cell(filling *f, const quern_bound *packer, uint64_t key) {
 	memcpy(job.lower, f->lower, sizeof job.lower);
 	memcpy(job.upper, f->upper, sizeof job.upper);
 	const quern_packer_ops *ops = packer->ops;
+	if (relaxes(f, packer)) job.growth = QUERN_GROWS_TOGETHER;
 	ops->pack[f->d->dim - 2](packer->self, &job);
 	free(seed);
 }
@@ -327,6 +344,68 @@ static void add_before(filling *f) {
 	}
 }
 
+/* ---- grains of a fill that grow together ---- */
+
+static bool relax_inside(const quern_relax_job *job, const quern_real x[3]) {
+	const filling *f = job->scene;
+	for (uint32_t k = 0; k < f->d->dim; k++)
+		if (!(x[k] >= f->item->lower[k] && x[k] <= f->item->upper[k])) return false;
+	return quern_region_holds(&f->region, x);
+}
+
+static quern_real relax_gap(
+	const quern_relax_job *job, uint32_t body, const quern_spot *spot, quern_real normal[3]) {
+	const filling *f = job->scene;
+	return quern_body_gap(&f->placer.body[body], &f->pose[body], job->dim, spot->x, spot->radius, normal);
+}
+
+static void take_over(filling *f, uint32_t from, const quern_spot *spot, uint32_t n) {
+	const uint32_t before = f->n;
+	f->n = from;
+	for (uint32_t i = 0; i < n; i++) {
+		dem_place grain = f->grain[from + i];
+		if (!(spot[i].radius > 0)) continue;
+		memcpy(grain.position, spot[i].x, sizeof grain.position);
+		grain.radius = spot[i].radius;
+		f->full[f->n] = grain.radius;
+		f->grain[f->n++] = grain;
+	}
+	quern_placer_empty(&f->placer);
+	for (uint32_t i = 0; i < f->n; i++) {
+		quern_spot one = { .radius = f->grain[i].radius };
+		memcpy(one.x, f->grain[i].position, f->d->dim * sizeof one.x[0]);
+		quern_placer_add(&f->placer, &one);
+	}
+	if (before > f->n)
+		f->step->host->log(
+			f->step->run, 1, "%u grains found no room to grow and are left out", before - f->n);
+}
+
+/* The item's grains are those from `from` on. */
+static quern_status relax(filling *f, const quern_bound *packer, uint32_t from) {
+	const quern_step *s = f->step;
+	quern_relax_job job = { .dim = f->d->dim,
+		.n = f->n - from,
+		.full = f->full + from,
+		.n_bodies = f->placer.n_bodies,
+		.inside = relax_inside,
+		.gap = relax_gap,
+		.scene = f };
+	if (!relaxes(f, packer) || !job.n) return QUERN_OK;
+	memcpy(job.lower, s->lower, sizeof job.lower);
+	memcpy(job.upper, s->upper, sizeof job.upper);
+	memcpy(job.periodic, s->periodic, sizeof job.periodic);
+	quern_spot *spot = s->host->memory(s->run, (size_t)f->n * sizeof *spot);
+	if (!spot) return QUERN_E_MEMORY;
+	memcpy(spot, f->placer.spot, (size_t)f->n * sizeof *spot);
+	job.spot = spot + from;
+	job.around = spot;
+	job.n_around = from;
+	const quern_status status = ((const quern_packer_ops *)packer->ops)->relax(packer->self, &job);
+	if (status == QUERN_OK) take_over(f, from, job.spot, job.n);
+	return status;
+}
+
 /* Where others stand in the way an item may bring nothing; where there is no place for it, it cannot be meant. */
 static quern_status fill_item(filling *f, uint32_t i) {
 	const quern_step *s = f->step;
@@ -334,6 +413,8 @@ static quern_status fill_item(filling *f, uint32_t i) {
 	const uint32_t before = f->n, held = fill_region(f, i);
 	char param[40];
 	if (f->failed || f->placer.failed) return QUERN_E_MEMORY;
+	const quern_status status = relax(f, &s->slot[SLOT_PACKER][i], before);
+	if (status != QUERN_OK) return status;
 	snprintf(param, sizeof param, "fill.%u.%s", i, held ? "above" : "region");
 	if (!held)
 		return s->host->stop(s->run, QUERN_E_PARAM, param, -1, "no place of the domain lies in the region");
@@ -409,6 +490,7 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	quern_placer_finish(&f.placer);
 	quern_grain_table_finish(&table);
 	free(f.grain);
+	free(f.full);
 	return status;
 }
 

@@ -205,11 +205,14 @@ static void enrich_cell(packed_cell *p) {
 	memcpy(job.lower, p->lower, sizeof job.lower);
 	memcpy(job.upper, p->upper, sizeof job.upper);
 	find_upstream(d, p->c, job.upstream);
-	for (uint32_t k = 0; k < 4 && p->n < p->wanted && (!k || d->h->growth > 0); k++) {
+	const quern_packer_ops *ops = packer->ops;
+	const bool grows = d->h->growth > 0;
+	if (grows && ops->shrinks) job.growth = QUERN_GROWS_ALONE;
+	for (uint32_t k = 0; k < 4 && p->n < p->wanted && (!k || (grows && !ops->shrinks)); k++) {
 		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
 		p->part = parts[k];
 		job.counter = ((uint64_t)d->u[U_UPDATES].index[0] << 32) + ((uint64_t)k << 24);
-		((const quern_packer_ops *)packer->ops)->pack[d->s->dim - 2](packer->self, &job);
+		ops->pack[d->s->dim - 2](packer->self, &job);
 	}
 	free(seed);
 	settle(p);
@@ -299,8 +302,7 @@ static bool place_obstacles(enriching *e) {
 	quern_real most = quern_radius_most(&d->h->radii);
 	for (uint32_t i = 0; i < d->n_grains; i++)
 		most = d->u[U_GRAIN_RADIUS].real[0][i] > most ? d->u[U_GRAIN_RADIUS].real[0][i] : most;
-	if (!order ||
-		quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
+	if (!order || quern_placer_init(&e->placer, s->dim, s->lower, s->upper, s->periodic, most) != QUERN_OK ||
 		!quern_placer_bodies(&e->placer, s, SLOT_BODIES, false))
 		return false;
 	for (uint32_t q = 0; q < d->n_grains; q++) {

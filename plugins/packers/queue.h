@@ -18,7 +18,8 @@ typedef struct {
 typedef struct {
 	quern_pack_job *job;
 	int32_t trials, angles; /* darts for a first grain; places around one that has too few neighbours */
-	quern_real radius;      /* m, of the grain that waits */
+	quern_real part;        /* of its radius that a grain is placed with */
+	quern_real radius;      /* m, of the grain that waits, times that */
 	bool stopped, walled;   /* walled: a wall or body refused a place beside the seed */
 	grain seed;
 	uint32_t n_placed, n_near;
@@ -108,7 +109,7 @@ static inline bool offer(packing *p, quern_vec at) {
 	if (probe(p, at) != OPEN) return false;
 	p->placed[p->n_placed++] = (grain) { at, p->radius };
 	p->stopped = !job->place(job, &spot) || p->n_placed == PLACED;
-	if (!p->stopped) p->radius = job->radius(job);
+	if (!p->stopped) p->radius = p->part * job->radius(job);
 	return true;
 }
 
@@ -147,6 +148,7 @@ static inline void begin(packing *p, quern_pack_job *job, int32_t trials, int32_
 	p->job = job;
 	p->trials = trials;
 	p->angles = angles;
+	p->part = 1;
 	p->radius = job->radius(job);
 	p->stopped = p->walled = false;
 	p->n_placed = p->n_near = 0;

@@ -24,6 +24,7 @@ CHANGES = [
     ("packer", ["hybrid.packer=random"], "packer.random", None),
     ("packer, by a grid", ["hybrid.packer=grid"], "packer.grid", None),
     ("packer, by circles", ["hybrid.packer=circle_sweep"], "packer.circle_sweep", None),
+    ("packer, of grains that grow", ["hybrid.packer=expand", "grains.fill.1.packer=expand"], "packer.expand", None),
     ("packer, of the first grains too", ["hybrid.packer=random", "grains.fill.0.packer=random",
                                          "grains.fill.1.packer=random"], "packer.random", "packer.two_point_tangent"),
     ("coupling", ["hybrid.coupling=lumped"], "coupling.lumped", "coupling.affine"),
