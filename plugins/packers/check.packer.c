@@ -14,6 +14,7 @@ typedef struct {
 	const quern_check_host *host;
 	uint32_t shape, n, limit;
 	quern_spot spot[MOST];
+	quern_real full[MOST]; /* m: what each shall grow to */
 	uint32_t overlaps, outside, other_radius, after_end, off_plane;
 } packing;
 
@@ -50,7 +51,9 @@ static bool place(quern_pack_job *job, const quern_spot *s) {
 	if (p->n >= p->limit) return p->after_end++, false;
 	p->overlaps += !is_free(job, s);
 	p->outside += !inside(job, s->x);
-	p->other_radius += s->radius != drawn(p);
+	const double waits = drawn(p);
+	p->other_radius += job->growth ? !(s->radius > 0 && s->radius <= waits) : s->radius != waits;
+	p->full[p->n] = waits;
 	p->off_plane += job->dim == 2 && s->x[2] != 0;
 	p->spot[p->n++] = *s;
 	return p->n < p->limit;
@@ -93,7 +96,7 @@ static void pack(const quern_check *c, const quern_check_instance *it, packing *
 }
 
 typedef struct {
-	quern_check_tally overlap, inside, radius, end, again, grains, self;
+	quern_check_tally overlap, inside, radius, end, again, grains, self, smaller, relaxes;
 } tallies;
 
 static void look(const packing *p, tallies *t) {
@@ -132,6 +135,92 @@ static void try_dimension(const quern_check *c, const quern_check_instance *it, 
 	free(before);
 }
 
+/* ==== grains that grow ==== */
+
+/* Holes may get smaller grains than the one that waits, and no larger ones. */
+static void try_smaller(const quern_check *c, const quern_check_instance *it, packing *p, tallies *t) {
+	for (uint32_t shape = 0; shape < REGIONS; shape++) {
+		begin(c, it->dim, shape, 6, MOST - 8, p);
+		p->job.growth = QUERN_GROWS_ALONE;
+		pack(c, it, p);
+		c->host->expect(&t->smaller, !p->other_radius && !p->overlaps && !p->outside,
+			"%u-D: of %u grains that grow alone %u are larger than the one that waits, %u overlap others, and %u lie "
+			"outside",
+			it->dim, p->n - p->job.n_seed, p->other_radius, p->overlaps, p->outside);
+	}
+}
+
+static bool inside_relaxed(const quern_relax_job *job, const quern_real x[3]) {
+	return inside(&((const packing *)job->scene)->job, x);
+}
+
+/* The floor of a walled region. */
+static quern_real gap(const quern_relax_job *job, uint32_t body, const quern_spot *s, quern_real normal[3]) {
+	(void)body;
+	for (uint32_t k = 0; k < 3; k++) normal[k] = k + 1 == job->dim ? 1 : 0;
+	return s->x[job->dim - 1] - s->radius;
+}
+
+static quern_real most_overlap(const packing *p) {
+	quern_real most = 0;
+	for (uint32_t i = 0; i < p->n; i++)
+		for (uint32_t j = 0; j < i; j++) {
+			const quern_spot *a = &p->spot[i], *b = &p->spot[j];
+			double d2 = 0;
+			if (i < p->job.n_seed || !(a->radius > 0 && b->radius > 0)) continue;
+			for (uint32_t k = 0; k < p->job.dim; k++) d2 += pow(a->x[k] - b->x[k], 2);
+			most = fmax(most, (a->radius + b->radius - sqrt(d2)) / fmin(a->radius, b->radius));
+		}
+	for (uint32_t i = p->job.n_seed; i < p->n && p->shape == WALLED; i++)
+		most = fmax(most, 1 - p->spot[i].x[p->job.dim - 1] / p->spot[i].radius);
+	return most;
+}
+
+static void relax(const quern_check *c, const quern_check_instance *it, packing *p) {
+	const quern_packer_ops *ops = c->ops;
+	const uint32_t seeds = p->job.n_seed;
+	quern_spot seed[3];
+	memcpy(seed, p->spot, sizeof seed);
+	quern_relax_job job = { .dim = it->dim,
+		.n = p->n - seeds,
+		.n_around = seeds,
+		.n_bodies = p->shape == WALLED,
+		.spot = p->spot + seeds,
+		.full = p->full + seeds,
+		.around = seed,
+		.inside = inside_relaxed,
+		.gap = gap,
+		.scene = p };
+	for (uint32_t k = 0; k < 3; k++) job.lower[k] = -side, job.upper[k] = 2 * side;
+	c->host->place(c, "relax, %u-D, in region %u", it->dim, p->shape);
+	if (ops->relax(it->self, &job) != QUERN_OK) p->n = seeds;
+}
+
+static void try_relaxing(const quern_check *c, const quern_check_instance *it, packing p[2], tallies *t) {
+	for (uint32_t shape = 0; shape < REGIONS; shape++) {
+		uint32_t others = 0, gone = 0, outside = 0;
+		for (int i = 0; i < 2; i++) {
+			begin(c, it->dim, shape, 7, MOST - 8, &p[i]);
+			p[i].job.growth = QUERN_GROWS_TOGETHER;
+			pack(c, it, &p[i]);
+			relax(c, it, &p[i]);
+		}
+		for (uint32_t g = p->job.n_seed; g < p->n; g++) {
+			const quern_spot *s = &p->spot[g];
+			gone += s->radius == 0;
+			others += s->radius != 0 && s->radius != p->full[g];
+			outside += !inside(&p->job, s->x);
+		}
+		const quern_real overlap = most_overlap(p);
+		c->host->expect(&t->relaxes,
+			!others && !outside && overlap <= 0.01 && 2 * gone < p->n - p->job.n_seed && same(&p[0], &p[1]),
+			"%u-D: of %u grains %u have not their full radius, %u are taken away, %u lie outside; they overlap by "
+			"%g of a radius at most; and a second call gives %s",
+			it->dim, p->n - p->job.n_seed, others, gone, outside, overlap,
+			same(&p[0], &p[1]) ? "the same" : "other places");
+	}
+}
+
 static bool sane(const quern_check *c, const quern_check_instance *it, const char **why) {
 	packing *p = c->host->memory(1, sizeof *p);
 	begin(c, it->dim, EMPTY, 5, 20, p);
@@ -145,11 +234,14 @@ static bool sane(const quern_check *c, const quern_check_instance *it, const cha
 static void law(const quern_check *c) {
 	tallies t = { { .name = "no overlap" }, { .name = "inside the region" },
 		{ .name = "the radius that waits" }, { .name = "enough is enough" }, { .name = "the same again" },
-		{ .name = "places grains" }, { .name = "self" } };
+		{ .name = "places grains" }, { .name = "self" }, { .name = "smaller ones" }, { .name = "relaxes" } };
+	const quern_packer_ops *ops = c->ops;
 	packing *p = c->host->memory(2, sizeof *p);
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it) try_dimension(c, it, p, &t);
+		if (it && ops->shrinks) try_smaller(c, it, p, &t);
+		if (it && ops->relax) try_relaxing(c, it, p, &t);
 		c->host->instance_destroy(it);
 	}
 	free(p);
@@ -160,6 +252,8 @@ static void law(const quern_check *c) {
 	c->host->tell(c, &t.end, NULL);
 	c->host->tell(c, &t.again, NULL);
 	c->host->tell(c, &t.self, "self is left alone");
+	if (ops->shrinks) c->host->tell(c, &t.smaller, "none larger than the grain that waits");
+	if (ops->relax) c->host->tell(c, &t.relaxes, "full radii, no overlap above 1 %% of a radius");
 }
 
 static const quern_param params[] = { QUERN_END_PARAMS };

@@ -144,6 +144,15 @@ BROKEN = [
     ("goes on", "packers/packer.random.c", [("&& job->place(job, &spot))",
                                                   "&& (job->place(job, &spot) || job->place(job, &spot)))")],
      "enough is enough"),
+    ("makes holes' grains large", "packers/packer.random.c", [
+        ("*spot = (quern_spot) { .radius = job->radius(job) };",
+         "*spot = (quern_spot) { .radius = (job->growth ? 1.1 : 1) * job->radius(job) };"),
+        ("static const quern_packer_ops ops = { .size", "static const quern_packer_ops ops = { .shrinks = 1, .size")], "smaller ones"),
+    ("lets grains meet", "packers/packer.random.c", [
+        ("static const quern_packer_ops ops = { .size", "static quern_status relax(const void *self, quern_relax_job *job) {\n"
+         "\t(void)self;\n\tif (job->n > 1) job->spot[1].x[0] = job->spot[0].x[0] + 0.98 * (job->full[0] + job->full[1]), "
+         "job->spot[1].x[1] = job->spot[0].x[1], job->spot[1].x[2] = job->spot[0].x[2];\n\treturn QUERN_OK;\n}\n"
+         "static const quern_packer_ops ops = { .relax = relax, .size")], "relaxes"),
     ("misses pairs", "dem/neighbours.cells.c", [("if (c + 1 < count) out[n++] = c + 1;", "")],
      "the same pairs as by brute force"),
     ("bends normals", "bodies/body.plane.c", [("/ length;", "/ (1.001 * length);")], "unit normals"),
