@@ -16,7 +16,7 @@ static const quern_param params[] = {
 		.def = 0.98, .min = 0.5, .max = 1),
 	QUERN_PARAM(expand, least, "1",
 		"Least share of its radius that a grain of a hybrid begins with where no full one has room.",
-		.def = 0.3, .min = 0.1, .max = 1),
+		.def = 0.5, .min = 0.1, .max = 1),
 	QUERN_PARAM(expand, sweeps, "1", "Steps in which the grains of a fill grow.", .def = 200, .min = 1,
 		.max = 1000000),
 	QUERN_PARAM(expand, overlap, "1",
