@@ -15,10 +15,11 @@ typedef struct {
 	quern_neighbour_job job;
 	const int32_t *fixed, *material;
 	const int64_t *id;
-	uint32_t cap;     /* of each block's buffer, in pairs per grain */
-	quern_pair *pair; /* buffers of all blocks, one after the other */
-	uint32_t *found;  /* by block */
-	uint32_t *start;  /* by block: of the final list */
+	quern_pair **pair; /* by block: its buffer */
+	uint32_t *room;    /* by block: of the buffer, in pairs */
+	uint32_t *found;   /* by block */
+	uint32_t *again;   /* blocks that found more than they had room for */
+	uint32_t *start;   /* by block: of the final list */
 	quern_pair *list;
 	int32_t *list_from, *list_feature;
 	const uint32_t *bucket; /* by grain: its old entries in `entry` */
@@ -154,11 +155,9 @@ static bool sort_pairs(const listing *l, quern_pair *pair, uint32_t n, uint32_t 
 
 static void find_pairs(void *arg, uint32_t b, uint32_t worker) {
 	listing *l = arg;
-	const uint32_t begin = l->job.block[b], end = l->job.block[b + 1];
-	const uint32_t cap = (end - begin) * l->cap;
-	quern_pair *out = l->pair + (size_t)begin * l->cap;
-	const uint32_t n = l->ops->pairs(l->search->self, &l->job, b, cap, out);
-	if (n > cap) {
+	quern_pair *out = l->pair[b];
+	const uint32_t n = l->ops->pairs(l->search->self, &l->job, b, l->room[b], out);
+	if (n > l->room[b]) {
 		l->found[b] = n;
 		return;
 	}
@@ -193,7 +192,7 @@ static int32_t old_entry(const listing *l, int32_t first, int32_t second, int32_
 static void gather_pairs(void *arg, uint32_t b, uint32_t worker) {
 	listing *l = arg;
 	(void)worker;
-	const quern_pair *in = l->pair + (size_t)l->job.block[b] * l->cap;
+	const quern_pair *in = l->pair[b];
 	for (uint32_t i = 0; i < l->found[b]; i++) {
 		const uint32_t to = l->start[b] + i;
 		l->list[to] = in[i];
@@ -201,24 +200,49 @@ static void gather_pairs(void *arg, uint32_t b, uint32_t worker) {
 	}
 }
 
-/* Every block has room for `cap` pairs per grain; if one needs more, all get twice as much. */
+static void find_again(void *arg, uint32_t k, uint32_t worker) {
+	const listing *l = arg;
+	find_pairs(arg, l->again[k], worker);
+}
+
+/* Buffers of the blocks in `again`, or of all if that is NULL, one after the other; `cap` pairs per grain, or as many as were found. */
+static bool give_room(listing *l, const uint32_t *again, uint32_t n, uint32_t cap) {
+	size_t sum = 0;
+	for (uint32_t k = 0; k < n; k++) {
+		const uint32_t b = again ? again[k] : k;
+		l->room[b] = again ? l->found[b] : (l->job.block[b + 1] - l->job.block[b]) * cap;
+		sum += l->room[b];
+	}
+	quern_pair *pair = l->s->host->memory(l->s->run, (sum + 1) * sizeof *pair);
+	for (uint32_t k = 0; k < n && pair; k++) {
+		const uint32_t b = again ? again[k] : k;
+		l->pair[b] = pair;
+		pair += l->room[b];
+	}
+	return pair;
+}
+
+/* Every block has room for a usual number of pairs per grain; one with a large grain among small ones may need many times that, and
+ * is searched again. */
 static quern_status search_pairs(listing *l) {
 	const quern_step *s = l->s;
-	l->found = s->host->memory(s->run, ((size_t)l->job.n_blocks + 1) * sizeof(uint32_t));
-	l->start = s->host->memory(s->run, ((size_t)l->job.n_blocks + 1) * sizeof(uint32_t));
-	if (!l->found || !l->start) return QUERN_E_MEMORY;
-	for (l->cap = s->dim == 2 ? 8 : 12;; l->cap *= 2) {
-		bool enough = true;
-		l->pair = s->host->memory(s->run, ((size_t)l->job.n * l->cap + 1) * sizeof(quern_pair));
-		if (!l->pair) return QUERN_E_MEMORY;
-		s->host->parallel(s->run, l->job.n_blocks, find_pairs, l);
-		for (uint32_t b = 0; b < l->job.n_blocks; b++)
-			if (l->found[b] == UINT32_MAX) return QUERN_E_MEMORY;
-		for (uint32_t b = 0; b < l->job.n_blocks; b++)
-			enough = enough && l->found[b] <= (l->job.block[b + 1] - l->job.block[b]) * l->cap;
-		if (enough) break;
-	}
-	for (uint32_t b = 0; b < l->job.n_blocks; b++) l->start[b + 1] = l->start[b] + l->found[b];
+	const uint32_t n_blocks = l->job.n_blocks;
+	uint32_t n = 0;
+	l->found = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
+	l->start = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
+	l->room = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
+	l->again = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
+	l->pair = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(quern_pair *));
+	if (!l->found || !l->start || !l->room || !l->again || !l->pair) return QUERN_E_MEMORY;
+	if (!give_room(l, NULL, n_blocks, s->dim == 2 ? 8 : 12)) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, n_blocks, find_pairs, l);
+	for (uint32_t b = 0; b < n_blocks; b++)
+		if (l->found[b] != UINT32_MAX && l->found[b] > l->room[b]) l->again[n++] = b;
+	if (n && !give_room(l, l->again, n, 0)) return QUERN_E_MEMORY;
+	if (n) s->host->parallel(s->run, n, find_again, l);
+	for (uint32_t b = 0; b < n_blocks; b++)
+		if (l->found[b] == UINT32_MAX) return QUERN_E_MEMORY;
+	for (uint32_t b = 0; b < n_blocks; b++) l->start[b + 1] = l->start[b] + l->found[b];
 	return QUERN_OK;
 }
 

@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: MIT */
+/* neighbours.hgrid - a hierarchical grid: every size of grains has cells of its own width. After Ogarko & Luding 2012.
+ * docs/theory/grains.md, section 4 */
+#include "levels.h"
+#include <math.h>
+#include <quern/neighbours.h>
+#include <quern/space.h>
+
+typedef struct {
+	int32_t unused;
+} hgrid;
+static const quern_param params[] = { QUERN_END_PARAMS };
+static const quern_use uses[] = { QUERN_END_USES };
+
+/* The cells of a level cover the grains' bounding box, or the whole length of a periodic axis. */
+typedef struct {
+	uint32_t count[3];
+	uint32_t first;                             /* its first cell, in the row of all levels' cells */
+	quern_real lower[3], inverse[3], length[3]; /* m, 1/m, m; length: of a cell */
+} grid;
+
+typedef struct {
+	level_set levels;
+	grid level[MOST_LEVELS];
+	uint32_t n_cells; /* of all levels */
+	uint32_t edge;    /* of a block, in cells of the level with most grains */
+} layout;
+
+/* ---- levels and cells ---- */
+
+typedef struct {
+	quern_real lower[3], length[3];
+} extent;
+
+static extent extent_of(const quern_neighbour_job *job) {
+	extent e = { .lower = { 0 } };
+	for (uint32_t a = 0; a < job->dim; a++) {
+		const quern_real *x = job->position[a];
+		quern_real low = x[0], high = x[0];
+		for (uint32_t i = 1; i < job->n; i++) {
+			low = x[i] < low ? x[i] : low;
+			high = x[i] > high ? x[i] : high;
+		}
+		e.lower[a] = job->periodic[a] ? job->lower[a] : low;
+		e.length[a] = job->periodic[a] ? job->upper[a] - job->lower[a] : high - low;
+	}
+	return e;
+}
+
+/* What is as wide as the widest pair, rounding included. */
+static quern_real widened(quern_real width) { return width * (1 + 1e-9); }
+
+/* A few small grains in much room must not ask for more cells than they fill: theirs are wider then. */
+static grid grid_of(const quern_neighbour_job *job, const extent *e, quern_real width, uint32_t n_grains) {
+	grid g = { .count = { 1, 1, 1 } };
+	for (;; width *= 1.5) {
+		quern_real total = 1;
+		for (uint32_t a = 0; a < job->dim; a++) total *= floor(e->length[a] / width) + 1;
+		if (total <= 16.0 * n_grains + 4096) break;
+	}
+	for (uint32_t a = 0; a < job->dim; a++) {
+		const quern_real fit = floor(e->length[a] / width);
+		g.count[a] = job->periodic[a] ? (fit < 1 ? 1 : (uint32_t)fit) : (uint32_t)fit + 1;
+		g.lower[a] = e->lower[a];
+		g.length[a] = job->periodic[a] ? e->length[a] / g.count[a] : width;
+		g.inverse[a] = 1 / g.length[a];
+	}
+	return g;
+}
+
+static layout layout_of(const quern_neighbour_job *job) {
+	layout l = { .levels = levels_of(job->n, job->radius, job->reach, job->dim),
+		.edge = job->dim == 2 ? 16 : 8 };
+	const extent e = extent_of(job);
+	for (uint32_t h = 0; h < l.levels.n; h++) {
+		grid *g = &l.level[h];
+		*g = grid_of(job, &e, widened(2 * l.levels.most[h] + job->reach), l.levels.count[h]);
+		g->first = l.n_cells;
+		l.n_cells += g->count[0] * g->count[1] * g->count[2];
+	}
+	return l;
+}
+
+static uint32_t cell_along(const grid *g, const quern_neighbour_job *job, uint32_t a, uint32_t i) {
+	const int32_t c = quern_cell_along(job->position[a][i], g->lower[a], g->inverse[a]);
+	return (uint32_t)quern_cell_held(c, (int32_t)g->count[a]);
+}
+
+/* ---- the index: grains by level and cell, with copies of what the search reads of them ---- */
+
+typedef struct {
+	const layout *l;
+	uint32_t *start; /* [n_cells + 2] of each cell's grains */
+	uint32_t *cell, *grain;
+	quern_real *x[3], *radius;
+} hindex;
+
+static size_t bytes_of(const layout *l, const quern_neighbour_job *job) {
+	return sizeof *l + ((size_t)job->dim + 1) * job->n * sizeof(quern_real) +
+		   ((size_t)l->n_cells + 2 + 2 * (size_t)job->n) * sizeof(uint32_t);
+}
+
+static hindex index_at(void *memory, const quern_neighbour_job *job) {
+	hindex at = { .l = memory };
+	quern_real *real = (quern_real *)(void *)((layout *)memory + 1);
+	for (uint32_t a = 0; a < job->dim; a++, real += job->n) at.x[a] = real;
+	at.radius = real;
+	at.start = (uint32_t *)(void *)(real + job->n);
+	at.cell = at.start + at.l->n_cells + 2;
+	at.grain = at.cell + job->n;
+	return at;
+}
+
+static size_t keys(const void *self, const quern_neighbour_job *job, uint64_t *key) {
+	(void)self;
+	if (!job->n) return 0;
+	const layout l = layout_of(job);
+	const grid *g = &l.level[l.levels.crowded];
+	const uint32_t bx = (g->count[0] + l.edge - 1) / l.edge, by = (g->count[1] + l.edge - 1) / l.edge;
+	for (uint32_t i = 0; i < job->n; i++) {
+		uint32_t c[3] = { 0 };
+		for (uint32_t a = 0; a < job->dim; a++) c[a] = cell_along(g, job, a, i);
+		const uint64_t block = ((uint64_t)(c[2] / l.edge) * by + c[1] / l.edge) * bx + c[0] / l.edge;
+		const uint32_t place = ((c[2] % l.edge) * l.edge + c[1] % l.edge) * l.edge + c[0] % l.edge;
+		key[i] = block << 32 | place;
+	}
+	return bytes_of(&l, job);
+}
+
+/* A counting sort by cell. */
+static void index_levels(const void *self, const quern_neighbour_job *job) {
+	(void)self;
+	if (!job->n) return;
+	*(layout *)job->memory = layout_of(job);
+	const hindex at = index_at(job->memory, job);
+	for (uint32_t i = 0; i < job->n; i++) {
+		const grid *g = &at.l->level[level_of(&at.l->levels, job->radius[i])];
+		uint32_t c[3] = { 0 };
+		for (uint32_t a = 0; a < job->dim; a++) c[a] = cell_along(g, job, a, i);
+		at.cell[i] = g->first + (c[2] * g->count[1] + c[1]) * g->count[0] + c[0];
+		at.start[at.cell[i] + 2]++;
+	}
+	for (uint32_t c = 0; c < at.l->n_cells; c++) at.start[c + 2] += at.start[c + 1];
+	for (uint32_t i = 0; i < job->n; i++) {
+		const uint32_t q = at.start[at.cell[i] + 1]++;
+		at.grain[q] = i;
+		at.radius[q] = job->radius[i];
+		for (uint32_t a = 0; a < job->dim; a++) at.x[a][q] = job->position[a][i];
+	}
+}
+
+/* ---- the search ---- */
+
+/* Of two grains of one block the smaller one's level finds the larger, and of two of one level that of lower number. */
+typedef enum { SAME, LARGER, SMALLER } whose;
+
+typedef struct {
+	const quern_neighbour_job *job;
+	hindex at;
+	quern_images images;
+	uint32_t begin, end, n, cap;
+	quern_pair *out;
+} hunt;
+
+/* Cells along an axis from `low` on, counted on beyond the last one of a ring. */
+typedef struct {
+	int32_t low, n, count;
+} span;
+
+static span span_of(const grid *g, bool periodic, uint32_t a, quern_real x, quern_real width) {
+	const int32_t count = (int32_t)g->count[a];
+	int32_t low = quern_cell_along(x - width, g->lower[a], g->inverse[a]),
+			high = quern_cell_along(x + width, g->lower[a], g->inverse[a]);
+	if (!periodic) low = quern_cell_held(low, count), high = quern_cell_held(high, count);
+	else if (high - low >= count) low = 0, high = count - 1;
+	return (span) { low, high - low + 1, count };
+}
+
+static uint32_t cell_at(const span *s, int32_t t) {
+	const int32_t c = s->low + t;
+	return (uint32_t)(c < 0 ? c + s->count : c >= s->count ? c - s->count : c);
+}
+
+/* Whether no image of any grain in these cells is nearer than the grain itself. */
+static bool is_plain(const span *s, quern_real length, quern_real half) {
+	return s->low >= 0 && s->low + s->n <= s->count && (s->n + 1) * length < half;
+}
+
+QUERN_INLINE bool is_wanted(const hunt *s, uint32_t i, uint32_t k, const whose of) {
+	const bool inside = k - s->begin < s->end - s->begin;
+	return of == SAME ? !inside || k > i : of == LARGER || !inside;
+}
+
+/* Entries from .. to - 1 of the index. */
+QUERN_INLINE void look_along(
+	hunt *s, uint32_t i, uint32_t from, uint32_t to, const int dim, const bool plain, const whose of) {
+	const quern_neighbour_job *job = s->job;
+	for (uint32_t q = from; q < to; q++) {
+		quern_real d2 = 0;
+		for (int a = 0; a < dim; a++) {
+			const quern_real d = job->position[a][i] - s->at.x[a][q];
+			const quern_real near = plain ? d : quern_image(d, s->images.half[a], s->images.length[a]);
+			d2 += near * near;
+		}
+		const quern_real reach = job->radius[i] + s->at.radius[q] + job->reach;
+		if (!(d2 < reach * reach)) continue;
+		const uint32_t k = s->at.grain[q];
+		if (!is_wanted(s, i, k, of)) continue;
+		if (s->n < s->cap) s->out[s->n] = (quern_pair) { (int32_t)i, (int32_t)k };
+		s->n++;
+	}
+}
+
+/* A row of cells is one stretch of the index, or two where it goes through the seam. */
+QUERN_INLINE void look_at(
+	hunt *s, const grid *g, const span *along, uint32_t i, const int dim, const bool plain, const whose of) {
+	const span *x = &along[0];
+	const int32_t deep = dim == 3 ? along[2].n : 1;
+	for (int32_t tz = 0; tz < deep; tz++)
+		for (int32_t ty = 0; ty < along[1].n; ty++) {
+			const uint32_t z = dim == 3 ? cell_at(&along[2], tz) : 0;
+			const uint32_t *start =
+				s->at.start + g->first + (z * g->count[1] + cell_at(&along[1], ty)) * g->count[0];
+			const uint32_t begin = cell_at(x, 0), end = begin + (uint32_t)x->n;
+			const uint32_t over = end > g->count[0] ? end - g->count[0] : 0;
+			look_along(s, i, start[begin], start[end - over], dim, plain, of);
+			if (over) look_along(s, i, start[0], start[over], dim, plain, of);
+		}
+}
+
+QUERN_INLINE void look(hunt *s, uint32_t level, uint32_t i, const int dim, const whose of) {
+	const quern_neighbour_job *job = s->job;
+	const grid *g = &s->at.l->level[level];
+	const quern_real width = widened(job->radius[i] + s->at.l->levels.most[level] + job->reach);
+	span along[3];
+	bool plain = true;
+	for (uint32_t a = 0; a < (uint32_t)dim; a++) {
+		along[a] = span_of(g, job->periodic[a], a, job->position[a][i], width);
+		plain = plain && is_plain(&along[a], g->length[a], s->images.half[a]);
+	}
+	if (plain) look_at(s, g, along, i, dim, true, of);
+	else look_at(s, g, along, i, dim, false, of);
+}
+
+QUERN_INLINE void search(hunt *s, const int dim) {
+	const level_set *levels = &s->at.l->levels;
+	for (uint32_t i = s->begin; i < s->end; i++) {
+		const uint32_t own = level_of(levels, s->job->radius[i]);
+		for (uint32_t h = 0; h < own; h++) look(s, h, i, dim, SMALLER);
+		look(s, own, i, dim, SAME);
+		for (uint32_t h = own + 1; h < levels->n; h++) look(s, h, i, dim, LARGER);
+	}
+}
+
+static uint32_t pairs(
+	const void *self, const quern_neighbour_job *job, uint32_t b, uint32_t cap, quern_pair *out) {
+	hunt s = { .job = job,
+		.at = index_at(job->memory, job),
+		.images = quern_images_of(job->dim, job->lower, job->upper, job->periodic),
+		.begin = job->block[b],
+		.end = job->block[b + 1],
+		.cap = cap,
+		.out = out };
+	(void)self;
+	if (job->dim == 2) search(&s, 2);
+	else search(&s, 3);
+	return s.n;
+}
+
+static const quern_neighbour_ops ops = {
+	.size = sizeof ops, .keys = keys, .index = index_levels, .pairs = pairs
+};
+static const quern_plugin plugin = { .size = sizeof plugin,
+	.revision = 1,
+	.dims = QUERN_2D | QUERN_3D,
+	.id = "neighbours.hgrid",
+	.brief = "A hierarchical grid, for grains of very different sizes.",
+	.doc =
+		"Levels of cells follow from the sizes that are there; grains of one size have one level. Finds the pairs that "
+		"cells finds.",
+	.cite = "Ogarko & Luding 2012",
+	.instance_size = sizeof(hgrid),
+	.params = params,
+	.uses = uses,
+	.ops = &ops };
+QUERN_LIBRARY(plugin, "0.1.0", "MIT");
