@@ -13,6 +13,8 @@ typedef struct level_set {
 	uint32_t crowded; /* the level with most grains; of several the lowest */
 	uint32_t count[MOST_LEVELS];
 	quern_real most[MOST_LEVELS]; /* m, rising */
+	quern_real
+		room; /* that a grain takes in the mean, over that of one as large as any of the crowded level */
 } level_set;
 
 QUERN_INLINE uint32_t level_of(const level_set *levels, quern_real radius) {
@@ -40,9 +42,13 @@ static inline uint64_t bin_of(quern_real radius) {
 
 static inline quern_real power(quern_real x, uint32_t dim) { return dim == 2 ? x * x : x * x * x; }
 
+/* m^dim, in a packing. */
+static inline quern_real room_of(quern_real radius, uint32_t dim) {
+	return (dim == 2 ? 3.141592653589793 / 0.82 : 4.1887902047863905 / 0.6) * power(radius, dim);
+}
+
 /* Grains smaller than a 65 000th of the largest one share the first bin. */
 static inline void count_radii(uint32_t n, const quern_real *radius, radius_bins *b) {
-	const quern_real ball = b->dim == 2 ? 3.141592653589793 / 0.82 : 4.1887902047863905 / 0.6;
 	uint32_t number[BINS] = { 0 };
 	quern_real largest = 0, most[BINS] = { 0 };
 	for (uint32_t i = 0; i < n; i++) largest = radius[i] > largest ? radius[i] : largest;
@@ -56,22 +62,22 @@ static inline void count_radii(uint32_t n, const quern_real *radius, radius_bins
 		if (!number[k]) continue;
 		b->most[b->n] = most[k];
 		b->below[b->n + 1] = b->below[b->n] + number[k];
-		b->room += number[k] * ball * power(most[k], b->dim);
+		b->room += number[k] * room_of(most[k], b->dim);
 		b->n++;
 	}
 }
 
-/* In units of one distance test: a level of the grains in bins from .. to - 1 of its own, and searches between it and all that is smaller.
- * Rows of cells along an axis are one stretch of memory, hence ROW for each of them. */
+/* In units of one distance test: grains in bins from .. to - 1 as a level, which look at each other, and looks between them and all that are
+ * smaller. To begin with a level takes LOOK, with a row of its cells ROW, as timed by tests/bench/searches.c. */
 static inline quern_real cost_of_level(const radius_bins *b, uint32_t from, uint32_t to) {
-	const quern_real ROW = 3, width = 2 * b->most[to - 1] + b->reach;
+	const quern_real LOOK = 40, ROW = 5;
 	const quern_real own = b->below[to] - b->below[from], smaller = b->below[from];
-	const quern_real dense =
-		power(width, b->dim) / b->room; /* of a cell, over all room: grains in it, for each that there is */
-	const quern_real look = own * (power(3, b->dim - 1) * ROW + power(3, b->dim) * own * dense);
+	/* of one grain, how many lie in a cell's room */
+	const quern_real dense = power(2 * b->most[to - 1] + b->reach, b->dim) / b->room;
+	const quern_real look = own * (LOOK + power(3, b->dim - 1) * ROW + power(3, b->dim) * own * dense);
 	if (!(smaller > 0)) return look;
-	const quern_real up = smaller * (power(2.5, b->dim - 1) * ROW + power(2.5, b->dim) * own * dense);
-	const quern_real down = own * (power(1.5, b->dim) * smaller * dense * (1 + ROW));
+	const quern_real up = smaller * (LOOK + power(2.5, b->dim - 1) * ROW + power(2.5, b->dim) * own * dense);
+	const quern_real down = own * (LOOK + power(1.5, b->dim) * smaller * dense * (1 + ROW));
 	return look + up + down;
 }
 
@@ -106,5 +112,6 @@ static inline level_set levels_of(uint32_t n, const quern_real *radius, quern_re
 		if (levels.count[h] > levels.count[levels.crowded]) levels.crowded = h;
 		from = to;
 	}
+	levels.room = b.room / (n * room_of(levels.most[levels.crowded], dim));
 	return levels;
 }

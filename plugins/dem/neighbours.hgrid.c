@@ -68,10 +68,20 @@ static grid grid_of(const quern_neighbour_job *job, const extent *e, quern_real 
 	return g;
 }
 
+/* Cells along a block that would hold about as many grains as those of `cells` do of equal ones. */
+static uint32_t edge_of(const level_set *levels, uint32_t dim) {
+	const uint32_t least = dim == 2 ? 16 : 8, most = 64;
+	uint32_t edge = least;
+	while (edge < most && power(edge + 1, dim) < power(least, dim) * levels->room) edge++;
+	return edge;
+}
+
 static layout layout_of(const quern_neighbour_job *job) {
-	layout l = { .levels = levels_of(job->n, job->radius, job->reach, job->dim),
-		.edge = job->dim == 2 ? 16 : 8 };
+	layout l = {
+		.levels = levels_of(job->n, job->radius, job->reach, job->dim),
+	};
 	const extent e = extent_of(job);
+	l.edge = edge_of(&l.levels, job->dim);
 	for (uint32_t h = 0; h < l.levels.n; h++) {
 		grid *g = &l.level[h];
 		*g = grid_of(job, &e, widened(2 * l.levels.most[h] + job->reach), l.levels.count[h]);
