@@ -33,7 +33,7 @@ typedef struct quern_contact_batch {
 	quern_real *dashpot[3]; /* N on first, ADDed: the part of `force` that damps or clamps */
 	quern_real *stored;     /* J, ADDed: in the normal spring */
 	quern_real *sheared;    /* J, ADDed: in the tangential spring */
-	quern_real *rubbed;     /* J, ADDed: lost to sliding in this step */
+	quern_real *rubbed;     /* J, ADDed: lost in this step other than by `dashpot`: to sliding, to yielding */
 	quern_real
 		*drag_couple[3]; /* N m on first, ADDed: the part of `couple` that damps; NULL without couples too */
 } quern_contact_batch;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* energy - what dashpots and sliding take in every step, and what there is when somebody looks.
- * docs/theory/contacts.md, section 6. Forces of dashpots are added up beside all forces, since a dashpot's work is
+ * docs/theory/contacts.md, section 8. Forces of dashpots are added up beside all forces, since a dashpot's work is
  * its force times the mean velocity of the kick, which is known only after the sum. What sliding takes goes to the
  * first grain of a pair, in a lane of its row. */
 #include "forces.h"

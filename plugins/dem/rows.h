@@ -153,7 +153,7 @@ QUERN_USE_ENUM(LOOK_USES);
 	X(FORCE_SUPPORT, "total.support", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, \
 		.doc = "Impulse that fixed grains have given to moving ones.") \
 	X(FORCE_DAMPED, ENERGY_USE("damped", QUERN_UPDATE, "Lost in dashpots so far.")) \
-	X(FORCE_RUBBED, ENERGY_USE("rubbed", QUERN_UPDATE, "Lost to sliding so far.")) \
+	X(FORCE_RUBBED, ENERGY_USE("rubbed", QUERN_UPDATE, "Lost to sliding so far, and to yielding and to new bridges of liquid where a law has these.")) \
 	X(FORCE_TREMBLING, "total.trembling", "1", QUERN_UPDATE, QUERN_INDEX, \
 		.doc = "Steps that turned the grains' velocities back, less those that did not; never below 0.") \
 	X(FORCE_DEEP_FIRST, "total.deep_first", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", .initial = -1, \

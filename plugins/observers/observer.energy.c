@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* observer.energy - energy by kind: what grains and points have, and what was lost. docs/theory/contacts.md, section
- * 6 */
+ * 8 */
 #include "../common/books.h"
 #include "../common/radius.h"
 #include "observers.h"
@@ -60,7 +60,9 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 	{ .name = "sheared", .unit = "J", .doc = "In tangential springs of contacts." },
 	{ .name = "elastic", .unit = "J", .doc = "In points." },
 	{ .name = "damped", .unit = "J", .doc = "Lost in dashpots so far." },
-	{ .name = "rubbed", .unit = "J", .doc = "Lost to sliding contacts so far." },
+	{ .name = "rubbed",
+		.unit = "J",
+		.doc = "Lost to sliding contacts so far, and to those that yield or whose liquid forms a bridge." },
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
 	{ .name = "driven", .unit = "J", .doc = "Done by bodies that move so far, with a minus." },
 	{ .name = "passed",

@@ -13,6 +13,9 @@ DEEP = "depth: 8 mm, half_width: 4 mm"
 CHANGES = [
     ("contact law", ["grains.contact={hertz: {young: 1e7 Pa, friction: 0.4}}"], "contact.hertz",
      "contact.linear"),
+    ("a contact law that yields", ["grains.contact={plastic: {stiffness: 1e6 N/m, friction: 0.4}}"], "contact.plastic", "contact.linear"),
+    ("contact laws of wet grains", ["grains.contact=[{linear: {stiffness: 1e6 N/m}}, {cohesive: {surface_tension: 0.07 N/m}}]"],
+     "contact.cohesive", None),
     ("contact law's friction", ["grains.contact.linear.friction=0"], "contact.linear", None),
     ("material", ["continuum.material=drucker_prager"], "material.drucker_prager", "material.mu_i"),
     ("transfer", ["continuum.transfer=mixed"], "transfer.mixed", None),
