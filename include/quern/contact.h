@@ -11,8 +11,9 @@ extern "C" {
 
 /* The first of a pair is the grain of lower id, for ever; against a body it is the grain. Open pairs may be in a
  * batch (overlap <= 0): a law without reach gives them exactly zero force and sets its history to `initial`, by
- * select. Weights, levers and torques b x f are the solver's; hence a law is homogeneous of degree 1 in
- * (stiffness, mass). */
+ * select. A law with reach does so from there on, and keeps its history while a pair is apart by less; solvers forget
+ * pairs that are beyond the reach of all laws. Weights, levers and torques b x f are the solver's; hence a law is
+ * homogeneous of degree 1 in (stiffness, mass). */
 typedef struct quern_contact_batch {
 	uint32_t n, cap;
 	quern_real dt;
