@@ -46,66 +46,74 @@ QUERN_INLINE uint32_t row_of(int32_t grain, uint32_t begin, uint32_t end) {
 	return i < end - begin ? i : end - begin;
 }
 
+/* Numbers of a contact, times a factor each, join half a row. A whole row is wider than what most processors hold in one
+ * register: put together from single numbers, it would go through memory and wait there. */
+QUERN_INLINE void add_half(quern_real *row, const lanes4 *factor, const lanes4 *given) {
+	*(lanes4 *)(void *)row += *factor * *given;
+}
+
+/* With books what dashpots give has the lanes behind, and what sliding takes, which has its weight already. */
 QUERN_INLINE void add_2d(const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin,
-	const bool weighted, const bool paired) {
+	const bool weighted, const bool paired, const bool books) {
+	static const lanes4 lever = { 0, 0, 1, 0 }, plain = { 1, 1, 0, 1 }, lever_on = { 0, 1, 0, 0 },
+						plain_on = { 1, 0, 0, 0 }, own = { 0, 0, 1, 0 };
 	for (uint32_t q = 0; q < n; q++) {
 		quern_real *i = w->row[row_of(w->first[q], begin, end)],
 				   *j = w->row[row_of(w->second[q], begin, end)];
 		const quern_real share = weighted ? w->weight[q] : 1;
-		const quern_real x = share * w->force[0][q], y = share * w->force[1][q],
-						 t = spin ? share * w->torque[0][q] : 0;
-		i[0] += x, i[1] += y;
-		if (spin) i[2] += w->arm[0][q] * t;
+		const lanes4 f = share * (lanes4) { w->force[0][q], w->force[1][q], spin ? w->torque[0][q] : 0,
+			books ? w->dashpot[0][q] : 0 };
+		const lanes4 to_first = plain + w->arm[0][q] * lever;
+		add_half(i, &to_first, &f);
+		if (paired) {
+			const lanes4 to_second = w->arm[1][q] * lever - plain;
+			add_half(j, &to_second, &f);
+		}
+		if (!books) continue;
+		const lanes4 all = share * (plain_on + lever_on) + own;
+		const lanes4 d =
+			all * (lanes4) { w->dashpot[1][q], spin ? w->drag_torque[0][q] : 0, w->rubbed[q], 0 };
+		const lanes4 drag_first = plain_on + own + w->arm[0][q] * lever_on;
+		add_half(i + 4, &drag_first, &d);
 		if (!paired) continue;
-		j[0] -= x, j[1] -= y;
-		if (spin) j[2] += w->arm[1][q] * t;
-	}
-}
-
-/* The same, with what dashpots give in the lanes behind, and what sliding takes, which has its weight already. */
-QUERN_INLINE void add_books_2d(const forces_work *w, uint32_t begin, uint32_t end, uint32_t n,
-	const bool spin, const bool weighted, const bool paired) {
-	static const lanes8 lever = { 0, 0, 1, 0, 0, 1, 0, 0 }, plain = { 1, 1, 0, 1, 1, 0, 1, 0 },
-						against = { -1, -1, 0, -1, -1, 0, 0, 0 }, all = { 1, 1, 1, 1, 1, 1, 0, 0 },
-						own = { 0, 0, 0, 0, 0, 0, 1, 0 };
-	for (uint32_t q = 0; q < n; q++) {
-		quern_real *i = w->row[row_of(w->first[q], begin, end)],
-				   *j = w->row[row_of(w->second[q], begin, end)];
-		const lanes8 f = { w->force[0][q], w->force[1][q], spin ? w->torque[0][q] : 0, w->dashpot[0][q],
-			w->dashpot[1][q], spin ? w->drag_torque[0][q] : 0, w->rubbed[q], 0 };
-		const lanes8 given = weighted ? (w->weight[q] * all + own) * f : f;
-		*(lanes8 *)(void *)i += (plain + w->arm[0][q] * lever) * given;
-		if (paired) *(lanes8 *)(void *)j += (against + w->arm[1][q] * lever) * given;
+		const lanes4 drag_second = w->arm[1][q] * lever_on - plain_on;
+		add_half(j + 4, &drag_second, &d);
 	}
 }
 
 QUERN_INLINE void add_3d(const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin,
 	const bool weighted, const bool paired, const bool books) {
-	static const lanes8 lever = { 0, 0, 0, 1, 1, 1, 0, 0 }, plain = { 1, 1, 1, 0, 0, 0, 0, 0 },
-						own = { 0, 0, 0, 0, 0, 0, 1, 0 };
+	static const lanes4 lever = { 0, 0, 0, 1 }, plain = { 1, 1, 1, 0 }, lever_on = { 1, 1, 0, 0 },
+						own = { 0, 0, 1, 0 };
 	for (uint32_t q = 0; q < n; q++) {
 		const uint32_t i = row_of(w->first[q], begin, end), j = row_of(w->second[q], begin, end);
-		const quern_real share = weighted ? w->weight[q] : 1;
-		const lanes8 to_first = share * (plain + w->arm[0][q] * lever),
-					 to_second = share * (w->arm[1][q] * lever - plain);
-		const lanes8 f = { w->force[0][q], w->force[1][q], w->force[2][q], spin ? w->torque[0][q] : 0,
-			spin ? w->torque[1][q] : 0, spin ? w->torque[2][q] : 0, 0, 0 };
-		*(lanes8 *)(void *)w->row[i] += to_first * f;
-		if (paired) *(lanes8 *)(void *)w->row[j] += to_second * f;
+		const quern_real share = weighted ? w->weight[q] : 1, arm_i = w->arm[0][q],
+						 arm_j = paired ? w->arm[1][q] : 0;
+		const lanes4 first = share * (plain + arm_i * lever), first_on = share * (arm_i * lever_on),
+					 second = share * (arm_j * lever - plain), second_on = share * (arm_j * lever_on);
+		const lanes4 f = { w->force[0][q], w->force[1][q], w->force[2][q], spin ? w->torque[0][q] : 0 };
+		const lanes4 f_on = { spin ? w->torque[1][q] : 0, spin ? w->torque[2][q] : 0, 0, 0 };
+		add_half(w->row[i], &first, &f);
+		if (spin) add_half(w->row[i] + 4, &first_on, &f_on);
+		if (paired) add_half(w->row[j], &second, &f);
+		if (paired && spin) add_half(w->row[j] + 4, &second_on, &f_on);
 		if (!books) continue;
-		const lanes8 d = { w->dashpot[0][q], w->dashpot[1][q], w->dashpot[2][q],
-			spin ? w->drag_torque[0][q] : 0, spin ? w->drag_torque[1][q] : 0, spin ? w->drag_torque[2][q] : 0,
-			w->rubbed[q], 0 };
-		*(lanes8 *)(void *)w->drag_row[i] += (to_first + own) * d;
-		if (paired) *(lanes8 *)(void *)w->drag_row[j] += to_second * d;
+		const lanes4 d = { w->dashpot[0][q], w->dashpot[1][q], w->dashpot[2][q],
+			spin ? w->drag_torque[0][q] : 0 };
+		const lanes4 d_on = { spin ? w->drag_torque[1][q] : 0, spin ? w->drag_torque[2][q] : 0, w->rubbed[q],
+			0 };
+		const lanes4 first_own = first_on + own;
+		add_half(w->drag_row[i], &first, &d);
+		add_half(w->drag_row[i] + 4, &first_own, &d_on);
+		if (paired) add_half(w->drag_row[j], &second, &d);
+		if (paired && spin) add_half(w->drag_row[j] + 4, &second_on, &d_on);
 	}
 }
 
 QUERN_INLINE void add_forces(const forces_work *w, uint32_t first, uint32_t last, uint32_t n, const int dim,
 	const bool spin, const bool weighted, const bool paired, const bool books) {
 	if (dim == 3) add_3d(w, first, last, n, spin, weighted, paired, books);
-	else if (books) add_books_2d(w, first, last, n, spin, weighted, paired);
-	else add_2d(w, first, last, n, spin, weighted, paired);
+	else add_2d(w, first, last, n, spin, weighted, paired, books);
 }
 
 /* Couples have rows of their own, with what damps from lane 3 on: a sum that took a chunk's torques and then its couples

@@ -27,6 +27,8 @@ enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGI
 
 /* A row at once: the same bits for any instruction set. */
 typedef quern_real lanes8 __attribute__((vector_size(64)));
+/* Half a row, which most processors hold in one register. */
+typedef quern_real lanes4 __attribute__((vector_size(32)));
 
 /* A contact deeper than is allowed. */
 typedef struct deep_contact {
