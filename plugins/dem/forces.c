@@ -3,7 +3,7 @@
  *
  * A block's grains are written by one worker alone. A pair inside a block is computed once; a pair across two blocks
  * once in each, with the same operands in the same order, so both see the same force. Sums run in list order. */
-#include "forces.h"
+#include "packed.h"
 #include <math.h>
 #include <string.h>
 
@@ -105,6 +105,33 @@ static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	quern_dem_fold_couples(sh, &w, n);
 	quern_dem_integrate(sh, &w, b, sums);
 	if (sh->checks) quern_dem_check_grains(sh, b);
+}
+
+static void pack_block(void *arg, uint32_t b, uint32_t worker) {
+	(void)worker;
+	quern_dem_pack(arg, b);
+}
+
+/* Rows of all grains lie behind what the first worker takes, which asks for no more than that and so leaves them where they
+ * are: they need no zeros, which the host's memory would get first. */
+static bool pack_grains(forces_shared *sh, const quern_set_view grains) {
+	const quern_step *s = sh->s;
+	forces_work w;
+	const size_t own = (lay_out(sh, &w, NULL) + 63) & ~(size_t)63, row = sizeof *sh->place,
+				 motions = packed_motions((int)s->dim);
+	char *base = s->host->scratch(s->run, 0, own + (1 + motions) * row * grains.n);
+	if (!base) return false;
+	sh->motion = (lanes4 *)(void *)(base + own);
+	sh->place = sh->motion + motions * (size_t)grains.n;
+	s->host->parallel(s->run, grains.n_blocks, pack_block, sh);
+	return true;
+}
+
+/* All blocks: the same whether they move or are looked at. */
+static bool act_on_blocks(forces_shared *sh, const quern_set_view grains) {
+	if (sh->contact && !pack_grains(sh, grains)) return false;
+	sh->s->host->parallel(sh->s->run, grains.n_blocks, move_block, sh);
+	return true;
 }
 
 static bool any_couples(const quern_step *s) {
@@ -243,7 +270,7 @@ quern_status quern_dem_forces(const void *self, const quern_step *s) {
 	const quern_set_view grains = s->host->set(s->run, "grain");
 	if (!grains.n) return QUERN_OK;
 	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
-	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);
+	if (!act_on_blocks(&sh, grains)) return QUERN_E_MEMORY;
 	for (uint32_t q = 0; q < grains.n_blocks; q++)
 		if (sh.bad[quern_nth(sh.by_place, q)] >= 0) return lost(&sh, sh.bad[quern_nth(sh.by_place, q)]);
 	collect(&sh, grains.n_blocks);
@@ -265,7 +292,7 @@ quern_status quern_dem_observe(const void *self, const quern_step *s) {
 		if (s->use[OBSERVE_KINETIC + e].real[0]) s->use[OBSERVE_KINETIC + e].real[0][0] = 0;
 	if (!grains.n) return QUERN_OK;
 	if (!prepare(&sh, grains)) return QUERN_E_MEMORY;
-	s->host->parallel(s->run, grains.n_blocks, move_block, &sh);
+	if (!act_on_blocks(&sh, grains)) return QUERN_E_MEMORY;
 	quern_status status = quern_dem_judge_grains(&sh, grains.n_blocks);
 	if (status == QUERN_OK && sh.deep) status = quern_dem_judge_contacts(&sh, grains.n_blocks);
 	if (status != QUERN_OK) return status;

@@ -59,6 +59,7 @@ typedef struct forces_shared {
 	quern_real *farthest;                    /* [block] square of the way since the last list */
 	quern_real *turned;            /* [block][2] sums of m v.v', of old and new velocity, and of m */
 	int32_t *bad;                  /* [block] first grain that is lost, or -1 */
+	lanes4 *place, *motion;        /* rows by grain: packed.h */
 	bool checks, deep;             /* grains are checked in this step; contacts are */
 	int32_t *outside;              /* [block] first grain out of the domain, or -1 */
 	deep_contact *worst, *watched; /* [block] */
@@ -92,6 +93,8 @@ typedef struct contact_chunk {
 	quern_real *held;           /* by slot: what springs held in the last step; NULL: nobody asks */
 } contact_chunk;
 
+/* Makes the rows of grains of block b that contacts read, of its own and of its neighbours. */
+void quern_dem_pack(const forces_shared *, uint32_t b);
 /* Adds what the contacts of block b do to its rows, and to its energies. */
 void quern_dem_pairs(const forces_shared *, forces_work *, uint32_t b, quern_real *sums);
 void quern_dem_touches(const forces_shared *, forces_work *, uint32_t b, quern_real *sums);

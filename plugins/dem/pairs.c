@@ -1,27 +1,73 @@
 /* SPDX-License-Identifier: MIT */
 /* pairs - contacts between grains of one block: the distance test, geometry and motion */
-#include "forces.h"
+#include "packed.h"
+
+/* ---- rows of grains ---- */
+
+QUERN_INLINE void pack(
+	const forces_shared *sh, uint32_t begin, uint32_t end, const int dim, const bool spin) {
+	quern_real *const *x = sh->use[FORCE_OLD_POSITION].real, *const *v = sh->use[FORCE_OLD_VELOCITY].real,
+					  *const *s = sh->use[FORCE_OLD_SPIN].real;
+	const quern_real *radius = sh->use[FORCE_RADIUS].real[0], *mass = sh->use[FORCE_MASS].real[0];
+	const int32_t *fixed = sh->use[FORCE_FIXED].index;
+	for (uint32_t i = begin; i < end; i++) {
+		const quern_real m = fixed && fixed[i] ? -mass[i] : mass[i];
+		lanes4 *motion = &sh->motion[packed_motions(dim) * (size_t)i];
+		sh->place[i] = dim == 3 ? (lanes4) { x[0][i], x[1][i], x[2][i], radius[i] }
+								: (lanes4) { x[0][i], x[1][i], radius[i], m };
+		motion[0] = dim == 3 ? (lanes4) { v[0][i], v[1][i], v[2][i], m }
+							 : (lanes4) { v[0][i], v[1][i], spin ? s[0][i] : 0, 0 };
+		if (dim == 3 && spin) motion[1] = (lanes4) { s[0][i], s[1][i], s[2][i], 0 };
+	}
+}
+
+void quern_dem_pack(const forces_shared *sh, uint32_t b) {
+	const uint32_t begin = sh->grain[b], end = sh->grain[b + 1];
+	if (sh->s->dim == 2) {
+		if (sh->spin) pack(sh, begin, end, 2, true);
+		else pack(sh, begin, end, 2, false);
+	} else if (sh->spin) pack(sh, begin, end, 3, true);
+	else pack(sh, begin, end, 3, false);
+}
+
+/* ---- who is near ---- */
+
+/* Distances of four pairs to `normal`, the sums of their radii to `overlap`. */
+QUERN_INLINE void put_distances(const forces_shared *sh, const forces_work *w, uint32_t to,
+	const int32_t *first, const int32_t *second, const int dim) {
+	static const lanes4 spatial = { -1, -1, -1, 1 }, planar = { -1, -1, 1, 0 };
+	lanes4 i[4], j[4], d[4];
+	packed_rows(sh->place, 1, first, i);
+	packed_rows(sh->place, 1, second, j);
+	for (int k = 0; k < 4; k++) i[k] += (dim == 3 ? spatial : planar) * j[k];
+	packed_turn(i, d);
+	for (int k = 0; k < dim; k++) packed_put(w->normal[k] + to, &d[k]);
+	packed_put(w->overlap + to, &d[dim]);
+}
 
 /* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what
  * it held is booked. */
 QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n,
 	const quern_real *held, const int dim) {
-	const quern_column at = sh->use[FORCE_OLD_POSITION];
-	const quern_real *restrict x = at.real[0], *restrict y = at.real[1], *restrict z = at.real[2];
-	const quern_real *restrict radius = sh->use[FORCE_RADIUS].real[0];
 	const int32_t *restrict first = sh->use[FORCE_FIRST].index + begin, *restrict second =
 																			sh->use[FORCE_SECOND].index +
 																			begin;
+	const quern_real *restrict dx = w->normal[0], *restrict dy = w->normal[1], *restrict dz = w->normal[2],
+							   *restrict both = w->overlap;
 	const quern_real reach = sh->d->reach;
 	const quern_images p = sh->images;
 	int32_t *restrict near = w->slot;
 	uint32_t kept = 0;
+	for (uint32_t k = 0; k + 4 <= n; k += 4) put_distances(sh, w, k, first + k, second + k, dim);
+	for (uint32_t k = n & ~3u; k < n; k += 4) { /* what is left of four, filled up with the last one */
+		const int32_t last[2][4] = { { first[k], first[k + 1 < n ? k + 1 : n - 1], first[n - 1] },
+			{ second[k], second[k + 1 < n ? k + 1 : n - 1], second[n - 1] } };
+		put_distances(sh, w, k, last[0], last[1], dim);
+	}
 	QUERN_SIMD
 	for (uint32_t k = 0; k < n; k++) {
-		const int32_t i = first[k], j = second[k];
-		const quern_vec d =
-			quern_vec_image((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
-		const quern_real most = radius[i] + radius[j] + reach;
+		const quern_vec d = quern_vec_image((quern_vec) { dx[k], dy[k], dim == 3 ? dz[k] : 0 }, p, dim);
+		const quern_real most = both[k] + reach;
 		near[k] = (quern_vec_dot(d, d, dim) < most * most);
 	}
 	if (held) {
@@ -35,24 +81,45 @@ QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t 
 		near[kept] = (int32_t)k;
 		kept += (uint32_t)is;
 	}
+	for (uint32_t q = kept; q < kept + 3; q++) w->first[q] = w->second[q] = (int32_t)sh->grain[0];
 	return kept;
 }
 
+/* ---- geometry and motion ---- */
+
+/* Leaves the distances in `normal`, the radii in `arm`, in 2-D the masses in `mass` and `force`. */
+QUERN_INLINE void load_places(const forces_shared *sh, const forces_work *w, uint32_t n, const int dim) {
+	for (uint32_t q = 0; q < n; q += 4) {
+		lanes4 i[4], j[4], d[4], mine[4], other[4];
+		packed_rows(sh->place, 1, w->first + q, i);
+		packed_rows(sh->place, 1, w->second + q, j);
+		for (int k = 0; k < 4; k++) { /* its motion is asked for next */
+			__builtin_prefetch(&sh->motion[packed_motions(dim) * (size_t)w->first[q + (uint32_t)k]]);
+			__builtin_prefetch(&sh->motion[packed_motions(dim) * (size_t)w->second[q + (uint32_t)k]]);
+		}
+		for (int k = 0; k < 4; k++) d[k] = i[k] - j[k];
+		packed_turn(d, d);
+		packed_turn(i, mine);
+		packed_turn(j, other);
+		for (int k = 0; k < dim; k++) packed_put(w->normal[k] + q, &d[k]);
+		packed_put(w->arm[0] + q, &mine[dim]);
+		packed_put(w->arm[1] + q, &other[dim]);
+		if (dim == 3) continue;
+		packed_put(w->mass + q, &mine[3]);
+		packed_put(w->force[0] + q, &other[3]);
+	}
+}
+
 QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32_t n, const int dim) {
-	const quern_column at = sh->use[FORCE_OLD_POSITION];
-	const quern_real *restrict x = at.real[0], *restrict y = at.real[1], *restrict z = at.real[2];
-	const quern_real *restrict radius = sh->use[FORCE_RADIUS].real[0];
-	const int32_t *restrict first = w->first, *restrict second = w->second;
 	const quern_images p = sh->images;
 	quern_real *restrict overlap = w->overlap, *restrict effective = w->radius;
 	quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
 	quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
+	load_places(sh, w, n, dim);
 	QUERN_SIMD
 	for (uint32_t q = 0; q < n; q++) {
-		const int32_t i = first[q], j = second[q];
-		const quern_vec d =
-			quern_vec_image((quern_vec) { x[i] - x[j], y[i] - y[j], dim == 3 ? z[i] - z[j] : 0 }, p, dim);
-		const quern_real ri = radius[i], rj = radius[j];
+		const quern_vec d = quern_vec_image((quern_vec) { nx[q], ny[q], dim == 3 ? nz[q] : 0 }, p, dim);
+		const quern_real ri = arm_i[q], rj = arm_j[q];
 		const quern_real length = __builtin_sqrt(quern_vec_dot(d, d, dim)),
 						 one_over = length > 0 ? 1 / length : 0;
 		nx[q] = d.x * one_over;
@@ -66,66 +133,86 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	}
 }
 
+/* Leaves v_i - v_j in `velocity`, w_i in `spin`; w_j in `turn`, in 2-D in `torque`; in 3-D the masses in `mass` and
+ * `force`. */
+QUERN_INLINE void load_motion(
+	const forces_shared *sh, const forces_work *w, uint32_t n, const int dim, const bool spin) {
+	for (uint32_t q = 0; q < n; q += 4) {
+		lanes4 i[4], j[4], d[4], mine[4], other[4];
+		packed_rows(sh->motion, packed_motions(dim), w->first + q, i);
+		packed_rows(sh->motion, packed_motions(dim), w->second + q, j);
+		for (int k = 0; k < 4; k++) d[k] = i[k] - j[k];
+		packed_turn(d, d);
+		packed_turn(i, mine);
+		packed_turn(j, other);
+		for (int k = 0; k < dim; k++) packed_put(w->velocity[k] + q, &d[k]);
+		if (dim == 2 && spin) {
+			packed_put(w->spin[0] + q, &mine[2]);
+			packed_put(w->torque[0] + q, &other[2]);
+		}
+		if (dim == 2) continue;
+		packed_put(w->mass + q, &mine[3]);
+		packed_put(w->force[0] + q, &other[3]);
+		if (!spin) continue;
+		packed_columns(sh->motion + 1, 2, w->first + q, mine);
+		packed_columns(sh->motion + 1, 2, w->second + q, other);
+		for (int k = 0; k < 3; k++) {
+			packed_put(w->spin[k] + q, &mine[k]);
+			packed_put(w->turn[k] + q, &other[k]);
+		}
+	}
+}
+
 /* v_c = v_i - v_j + w_i x b_i - w_j x b_j with b_i = -arm_i n, b_j = arm_j n */
 QUERN_INLINE void motion(
 	const forces_shared *sh, const forces_work *w, uint32_t n, const int dim, const bool spin) {
-	const quern_column v = sh->use[FORCE_OLD_VELOCITY], s = sh->use[FORCE_OLD_SPIN];
-	const quern_real *restrict u = v.real[0], *restrict uy = v.real[1], *restrict uz = v.real[2];
-	const quern_real *restrict s0 = s.real[0], *restrict s1 = s.real[1], *restrict s2 = s.real[2];
-	const int32_t *restrict first = w->first, *restrict second = w->second;
 	const quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
 	const quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
 	quern_real *restrict vx = w->velocity[0], *restrict vy = w->velocity[1], *restrict vz = w->velocity[2];
 	quern_real *restrict sx = w->spin[0], *restrict sy = w->spin[1], *restrict sz = w->spin[2];
 	quern_real *restrict tx = w->turn[0], *restrict ty = w->turn[1], *restrict tz = w->turn[2];
-	QUERN_SIMD
-	for (uint32_t q = 0; q < n; q++) {
-		const int32_t i = first[q], j = second[q];
-		quern_real x = u[i] - u[j], y = uy[i] - uy[j], z = dim == 3 ? uz[i] - uz[j] : 0;
-		if (spin && dim == 2) {
-			const quern_real wi = s0[i], wj = s0[j], sum = arm_i[q] * wi + arm_j[q] * wj;
-			x += sum * ny[q];
-			y -= sum * nx[q];
+	const quern_real *restrict planar = w->torque[0];
+	load_motion(sh, w, n, dim, spin);
+	if (spin && dim == 2) {
+		QUERN_SIMD
+		for (uint32_t q = 0; q < n; q++) {
+			const quern_real wi = sx[q], wj = planar[q], sum = arm_i[q] * wi + arm_j[q] * wj;
+			vx[q] += sum * ny[q];
+			vy[q] -= sum * nx[q];
 			sx[q] = wi - wj;
 		}
-		if (spin && dim == 3) {
-			const quern_vec wi = { s0[i], s1[i], s2[i] }, wj = { s0[j], s1[j], s2[j] };
+	}
+	if (spin && dim == 3) {
+		QUERN_SIMD
+		for (uint32_t q = 0; q < n; q++) {
+			const quern_vec wi = { sx[q], sy[q], sz[q] }, wj = { tx[q], ty[q], tz[q] };
 			const quern_vec sum = { arm_i[q] * wi.x + arm_j[q] * wj.x, arm_i[q] * wi.y + arm_j[q] * wj.y,
 				arm_i[q] * wi.z + arm_j[q] * wj.z };
-			x -= sum.y * nz[q] - sum.z * ny[q];
-			y -= sum.z * nx[q] - sum.x * nz[q];
-			z -= sum.x * ny[q] - sum.y * nx[q];
+			vx[q] -= sum.y * nz[q] - sum.z * ny[q];
+			vy[q] -= sum.z * nx[q] - sum.x * nz[q];
+			vz[q] -= sum.x * ny[q] - sum.y * nx[q];
 			sx[q] = wi.x - wj.x, sy[q] = wi.y - wj.y, sz[q] = wi.z - wj.z;
 			tx[q] = 0.5 * (wi.x + wj.x), ty[q] = 0.5 * (wi.y + wj.y), tz[q] = 0.5 * (wi.z + wj.z);
 		}
-		vx[q] = x;
-		vy[q] = y;
-		if (dim == 3) vz[q] = z;
 	}
 }
 
 /* m_i m_j/(m_i + m_j), where a fixed grain counts as a wall; weight min(w_i, w_j). */
 static void masses(const forces_shared *sh, const forces_work *w, uint32_t n) {
-	const quern_real *restrict mass = sh->use[FORCE_MASS].real[0], *restrict weight =
-																	   sh->use[FORCE_WEIGHT].real[0];
-	const int32_t *restrict fixed = sh->use[FORCE_FIXED].index, *restrict first = w->first,
-							*restrict second = w->second;
-	quern_real *restrict out = w->mass, *restrict share = w->weight;
+	const quern_real *restrict weight = sh->use[FORCE_WEIGHT].real[0], *restrict other = w->force[0];
+	const int32_t *restrict first = w->first, *restrict second = w->second;
+	quern_real *restrict mass = w->mass, *restrict share = w->weight;
 	QUERN_SIMD
 	for (uint32_t q = 0; q < n; q++) {
-		const quern_real a = mass[first[q]], b = mass[second[q]];
-		out[q] = a * b / (a + b);
+		const quern_real mine = mass[q], its = other[q], a = mine < 0 ? -mine : mine,
+						 b = its < 0 ? -its : its;
+		const quern_real pair = a * b / (a + b), on_first = mine < 0 ? b : pair;
+		mass[q] = its < 0 ? a : on_first;
 	}
-	if (fixed)
-		for (uint32_t q = 0; q < n; q++) {
-			out[q] = fixed[first[q]] ? mass[second[q]] : out[q];
-			out[q] = fixed[second[q]] ? mass[first[q]] : out[q];
-		}
-	if (weight)
-		for (uint32_t q = 0; q < n; q++) {
-			const quern_real a = weight[first[q]], b = weight[second[q]];
-			share[q] = a < b ? a : b;
-		}
+	for (uint32_t q = 0; q < n && weight; q++) {
+		const quern_real a = weight[first[q]], b = weight[second[q]];
+		share[q] = a < b ? a : b;
+	}
 }
 
 static int32_t item_at(const forces_shared *sh, uint32_t k) {
