@@ -79,7 +79,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	const quern_bound *integrator = dem_integrator(sh->s);
 	for (uint32_t r = 0; r < integrator->n_uses && sh->looks; r++)
 		carve_columns(&c, w->own[r], quern_shape_size(integrator->uses[r].shape, dim), GRAINS);
-	w->row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
+	w->row = carve(&c, ((size_t)sh->most_grains + 4) * sizeof *w->row);
 	if (sh->couple) w->couple_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	if (sh->books && dim == 3) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
 	return c.used + 64;

@@ -15,10 +15,13 @@ enum {
 	G_MEAN,
 	G_MEAN_SPIN = 11,
 	G_WAY = 14,
-	G_NEW_POSITION = 16,
-	G_NEW_VELOCITY = 19,
-	G_NEW_SPIN = 22,
-	N_GRAIN_COLUMNS = 25
+	G_KEPT,
+	G_WHOLE,
+	G_LOST,
+	G_NEW_POSITION,
+	G_NEW_VELOCITY = 21,
+	G_NEW_SPIN = 24,
+	N_GRAIN_COLUMNS = 27
 };
 /* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in
  * 3-D have a row of their own. */
@@ -78,7 +81,7 @@ typedef struct forces_work {
 		*drag_torque[3];
 	law_row *rows; /* of all laws, one after the other */
 	int32_t *first, *second, *slot, *feature;
-	/* per grain of the block, one more for partners outside; couples, and from lane 3 on what of them damps */
+	/* per grain of the block, one more for partners outside, and three that are read with the last; couples, and from lane 3 on what of them damps */
 	quern_real (*row)[8], (*drag_row)[8], (*couple_row)[8];
 	quern_real *grains[N_GRAIN_COLUMNS];
 	quern_real *own[QUERN_MOST_USES][9]; /* of the integrator, while nothing moves */

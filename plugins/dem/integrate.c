@@ -1,68 +1,98 @@
 /* SPDX-License-Identifier: MIT */
 /* integrate - moves the grains of one block, holds those that are fixed, and looks for those that are lost */
-#include "forces.h"
-#include <math.h>
+#include "packed.h"
 #include <string.h>
 
-/* How much of the old velocity the new one keeps. */
-static void compare_velocities(const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n) {
-	const quern_column *u = sh->use;
-	const quern_real *restrict mass = u[FORCE_MASS].real[0] + begin;
-	quern_real turned = 0, whole = 0;
-	for (uint32_t k = 0; k < sh->s->dim; k++) {
-		const quern_real *restrict old = u[FORCE_OLD_VELOCITY].real[k] + begin;
-		const quern_real *restrict now = u[FORCE_VELOCITY].real[k] + begin;
-		for (uint32_t i = 0; i < n; i++) turned += mass[i] * old[i] * now[i];
-	}
-	for (uint32_t i = 0; i < n; i++) whole += mass[i];
-	sh->turned[2 * b] += turned;
-	sh->turned[2 * b + 1] += whole;
+/* The sum of n numbers, and the most of n that are not negative: at most GRAINS, in a tree of one shape for any n,
+ * in which what is missing is 0. No number waits for all those before it. */
+static void fill_up(quern_real *column, uint32_t n) {
+	memset(column + n, 0, (GRAINS - n) * sizeof(quern_real));
+}
+static quern_real sum_up(quern_real *restrict column, uint32_t n) {
+	fill_up(column, n);
+	for (uint32_t half = GRAINS / 2; half; half /= 2)
+		for (uint32_t i = 0; i < half; i++) column[i] += column[i + half];
+	return column[0];
+}
+static quern_real most_of(quern_real *restrict column, uint32_t n) {
+	fill_up(column, n);
+	for (uint32_t half = GRAINS / 2; half; half /= 2)
+		for (uint32_t i = 0; i < half; i++)
+			column[i] = column[i + half] > column[i] ? column[i + half] : column[i];
+	return column[0];
 }
 
-/* What leaves this stage must be finite, and slower than a radius per step. */
+/* The square of the way since the last list; how much of the old velocity the new one keeps; and 1 where a grain is lost: what
+ * leaves this stage must be finite, and slower than a radius per step. */
+QUERN_INLINE void compare(
+	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n, const int dim) {
+	const quern_column *u = sh->use;
+	const quern_real *restrict x = u[FORCE_POSITION].real[0] + begin,
+							   *restrict y = u[FORCE_POSITION].real[1] + begin,
+							   *restrict z = dim == 3 ? u[FORCE_POSITION].real[2] + begin : NULL;
+	const quern_real *restrict ax = u[FORCE_ANCHOR].real[0] + begin,
+							   *restrict ay = u[FORCE_ANCHOR].real[1] + begin,
+							   *restrict az = dim == 3 ? u[FORCE_ANCHOR].real[2] + begin : NULL;
+	const quern_real *restrict vx = u[FORCE_VELOCITY].real[0] + begin,
+							   *restrict vy = u[FORCE_VELOCITY].real[1] + begin,
+							   *restrict vz = dim == 3 ? u[FORCE_VELOCITY].real[2] + begin : NULL;
+	const quern_real *restrict ox = u[FORCE_OLD_VELOCITY].real[0] + begin,
+							   *restrict oy = u[FORCE_OLD_VELOCITY].real[1] + begin,
+							   *restrict oz = dim == 3 ? u[FORCE_OLD_VELOCITY].real[2] + begin : NULL;
+	const quern_real *restrict mass = u[FORCE_MASS].real[0] + begin, *restrict radius =
+																		 u[FORCE_RADIUS].real[0] + begin;
+	const quern_real dt = sh->s->dt;
+	quern_real *restrict way = w->grains[G_WAY], *restrict kept = w->grains[G_KEPT],
+						 *restrict whole = w->grains[G_WHOLE], *restrict lost = w->grains[G_LOST];
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_vec d = { x[i] - ax[i], y[i] - ay[i], dim == 3 ? z[i] - az[i] : 0 };
+		const quern_vec now = { vx[i], vy[i], dim == 3 ? vz[i] : 0 },
+						old = { ox[i], oy[i], dim == 3 ? oz[i] : 0 };
+		const quern_real step = quern_vec_dot(now, now, dim) * dt * dt, most = radius[i] * radius[i];
+		way[i] = quern_vec_dot(d, d, dim);
+		kept[i] = mass[i] * quern_vec_dot(old, now, dim);
+		whole[i] = mass[i];
+		lost[i] = step <= most ? 0 : 1; /* an unordered comparison finds a NaN too */
+	}
+}
+
 static void check_grains(
 	const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
-	const quern_column *u = sh->use;
-	const quern_real *restrict radius = u[FORCE_RADIUS].real[0] + begin;
-	const quern_real dt = sh->s->dt;
-	quern_real farthest = sh->farthest[b];
-	quern_real *restrict way = w->grains[G_WAY], *restrict fast = w->grains[G_WAY + 1];
-	memset(way, 0, n * sizeof(quern_real));
-	memset(fast, 0, n * sizeof(quern_real));
-	for (uint32_t k = 0; k < sh->s->dim; k++) {
-		const quern_real *restrict x = u[FORCE_POSITION].real[k] + begin, *restrict v =
-																			  u[FORCE_VELOCITY].real[k] +
-																			  begin;
-		const quern_real *restrict anchor = u[FORCE_ANCHOR].real[k] + begin;
-		QUERN_SIMD
-		for (uint32_t i = 0; i < n; i++) {
-			const quern_real d = x[i] - anchor[i];
-			way[i] += d * d;
-			fast[i] += v[i] * v[i];
-		}
-	}
-	/* an unordered comparison finds a NaN too */
-	for (uint32_t i = 0; i < n; i++) {
-		const quern_real step = fast[i] * dt * dt, most = radius[i] * radius[i];
-		farthest = way[i] > farthest ? way[i] : farthest;
-		if (!(step <= most) && sh->bad[b] < 0) sh->bad[b] = (int32_t)(begin + i);
-	}
-	sh->farthest[b] = farthest;
+	if (sh->s->dim == 2) compare(sh, w, begin, n, 2);
+	else compare(sh, w, begin, n, 3);
+	for (uint32_t i = 0; i < n && sh->bad[b] < 0; i++)
+		if (w->grains[G_LOST][i] > 0) sh->bad[b] = (int32_t)(begin + i);
+	const quern_real farthest = most_of(w->grains[G_WAY], n);
+	sh->farthest[b] = farthest > sh->farthest[b] ? farthest : sh->farthest[b];
+	sh->turned[2 * b] += sum_up(w->grains[G_KEPT], n);
+	sh->turned[2 * b + 1] += sum_up(w->grains[G_WHOLE], n);
 }
 
+/* Forces and torques from rows to columns, and what turns and resists. */
 static void load_grains(
 	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t row, uint32_t n) {
 	const quern_column *u = sh->use;
-	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
-	const quern_real *weight = u[FORCE_WEIGHT].real[0], turning = quern_radius_inertia(dim);
-	for (uint32_t i = 0; i < n; i++) {
-		const quern_real m = (weight ? weight[begin + i] : 1) * u[FORCE_MASS].real[0][begin + i];
-		const quern_real r = u[FORCE_RADIUS].real[0][begin + i];
-		w->grains[G_MASS][i] = m;
-		w->grains[G_INERTIA][i] = turning * m * r * r;
-		for (uint32_t k = 0; k < dim; k++) w->grains[G_FORCE + k][i] = w->row[row + i][k];
-		for (uint32_t k = 0; k < n_spin; k++) w->grains[G_TORQUE + k][i] = w->row[row + i][dim + k];
+	const quern_real *restrict mass = u[FORCE_MASS].real[0] + begin, *restrict radius =
+																		 u[FORCE_RADIUS].real[0] + begin;
+	const quern_real *weight = u[FORCE_WEIGHT].real[0], turning = quern_radius_inertia(sh->s->dim);
+	quern_real *restrict m = w->grains[G_MASS], *restrict inertia = w->grains[G_INERTIA];
+	const lanes4 *half = (const lanes4 *)(const void *)w->row[row];
+	for (uint32_t i = 0; i < n; i += 4, half += 8) { /* rows behind the last one are there to be looked at */
+		lanes4 column[4];
+		packed_turn((const lanes4[4]) { half[0], half[2], half[4], half[6] }, column);
+		for (uint32_t k = 0; k < 2; k++) packed_put(w->grains[G_FORCE + k] + i, &column[k]);
+		packed_put(w->grains[sh->s->dim == 2 ? G_TORQUE : G_FORCE + 2] + i, &column[2]);
+		if (sh->s->dim == 2) continue;
+		packed_put(w->grains[G_TORQUE] + i, &column[3]);
+		packed_turn((const lanes4[4]) { half[1], half[3], half[5], half[7] }, column);
+		for (uint32_t k = 0; k < 2; k++) packed_put(w->grains[G_TORQUE + 1 + k] + i, &column[k]);
 	}
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) m[i] = mass[i];
+	for (uint32_t i = 0; i < n && weight; i++) m[i] = weight[begin + i] * mass[i];
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) inertia[i] = turning * m[i] * radius[i] * radius[i];
 }
 
 /* Fixed grains stay; what they take up is an impulse on the others. */
@@ -144,6 +174,5 @@ void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, qu
 		hold_fixed(sh, w, b, begin, n);
 		if (sh->books) quern_dem_lose(sh, w, begin, row, n, sums);
 		check_grains(sh, b, begin, n, w);
-		compare_velocities(sh, b, begin, n);
 	}
 }

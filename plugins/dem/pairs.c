@@ -233,8 +233,15 @@ static uint32_t alike(const forces_shared *sh, uint32_t begin, uint32_t n) {
 	return low;
 }
 
+/* Rows of the block's own grains come in a stream, before contacts ask for them in any order. */
+static void foresee(const forces_shared *sh, uint32_t b) {
+	enum { AT_ONCE = 64 / sizeof(lanes4) };
+	for (uint32_t i = sh->grain[b]; i < sh->grain[b + 1]; i += AT_ONCE) __builtin_prefetch(&sh->place[i]);
+}
+
 QUERN_INLINE void block(
 	const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums, const int dim, const bool spin) {
+	foresee(sh, b);
 	for (uint32_t begin = sh->contact[b], end = sh->contact[b + 1], n; begin < end; begin += n) {
 		n = alike(sh, begin, end - begin < sh->cap ? end - begin : sh->cap);
 		contact_chunk c = { .block = b,
