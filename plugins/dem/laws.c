@@ -50,7 +50,7 @@ static void scatter_rows(const forces_shared *sh, const forces_work *w, const co
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
 			void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole || row->shape == QUERN_ID) continue;
-			forget(row->shape, whole, c->begin, c->n_slots, row->initial);
+			if (c->n < c->n_slots) forget(row->shape, whole, c->begin, c->n_slots, row->initial);
 			quern_scatter(row->shape, whole, rows[r].mine[k], c->begin, w->slot, c->n);
 		}
 	}

@@ -103,39 +103,103 @@ static uint32_t beside(
 	return n;
 }
 
-static uint32_t pairs(
-	const void *self, const quern_neighbour_job *job, uint32_t b, uint32_t cap, quern_pair *out) {
+/* Grains that may be near those of one cell. */
+enum { CANDIDATES = 128 };
+typedef struct {
+	uint32_t n;
+	int32_t grain[CANDIDATES], near[CANDIDATES], hit[CANDIDATES];
+	_Alignas(64) quern_real x[CANDIDATES], y[CANDIDATES], z[CANDIDATES], radius[CANDIDATES];
+} candidates;
+
+/* Where pairs go, and those of which block are looked for: inside it those whose second grain comes later. */
+typedef struct {
+	const quern_neighbour_job *job;
+	quern_images images;
+	int32_t begin;
+	uint32_t n, cap;
+	quern_pair *out;
+} finding;
+
+/* Pairs of grain i and the candidates. */
+QUERN_INLINE void find(finding *f, candidates *c, int32_t i, const int dim) {
+	const quern_neighbour_job *job = f->job;
+	const quern_vec at = { job->position[0][i], job->position[1][i], dim == 3 ? job->position[2][i] : 0 };
+	const quern_real own = job->radius[i], beyond = job->reach;
+	const quern_images images = f->images;
+	const int32_t begin = f->begin;
+	uint32_t hits = 0;
+	QUERN_SIMD
+	for (uint32_t q = 0; q < c->n; q++) {
+		const quern_vec apart = { at.x - c->x[q], at.y - c->y[q], dim == 3 ? at.z - c->z[q] : 0 };
+		const quern_vec d = quern_vec_image(apart, images, dim);
+		const quern_real reach = own + c->radius[q] + beyond;
+		c->near[q] = (quern_vec_dot(d, d, dim) < reach * reach) & ((c->grain[q] < begin) | (c->grain[q] > i));
+	}
+	for (uint32_t q = 0; q < c->n; q++) {
+		c->hit[hits] = (int32_t)q;
+		hits += (uint32_t)c->near[q];
+	}
+	for (uint32_t h = 0; h < hits; h++, f->n++)
+		if (f->n < f->cap) f->out[f->n] = (quern_pair) { i, c->grain[c->hit[h]] };
+}
+
+/* The same for all grains of a cell; then there is room for others. */
+QUERN_INLINE void find_all(finding *f, candidates *c, uint32_t first, uint32_t last, const int dim) {
+	for (uint32_t i = first; i < last; i++) find(f, c, (int32_t)i, dim);
+	c->n = 0;
+}
+
+/* Pairs of the grains `first` .. `last` of a cell and those of one of its neighbours. */
+QUERN_INLINE void beside_cell(
+	finding *f, candidates *c, uint32_t first, uint32_t last, const uint32_t range[2], const int dim) {
+	const quern_neighbour_job *job = f->job;
+	for (uint32_t k = range[0]; k < range[0] + range[1]; k++) {
+		if ((int32_t)k >= f->begin && k <= first) continue;
+		if (c->n == CANDIDATES) find_all(f, c, first, last, dim);
+		const uint32_t q = c->n++;
+		c->grain[q] = (int32_t)k;
+		c->x[q] = job->position[0][k];
+		c->y[q] = job->position[1][k];
+		if (dim == 3) c->z[q] = job->position[2][k];
+		c->radius[q] = job->radius[k];
+	}
+}
+
+/* Cell by cell: its grains have the same neighbours. */
+QUERN_INLINE uint32_t find_pairs(
+	const quern_neighbour_job *job, uint32_t b, uint32_t cap, quern_pair *out, const int dim) {
 	const layout *l = job->memory;
 	const uint32_t(*range)[2] = (const uint32_t(*)[2])(const void *)(l + 1);
-	const uint32_t begin = job->block[b], end = job->block[b + 1];
-	const quern_images images = quern_images_of(job->dim, job->lower, job->upper, job->periodic);
-	uint32_t n = 0;
-	(void)self;
-	for (uint32_t i = begin; i < end; i++) {
-		uint32_t near[3][3], count[3];
-		for (uint32_t a = 0; a < 3; a++)
-			count[a] = beside(l, job, a, a < job->dim ? cell_along(l, job, a, i) : 0, near[a]);
+	const uint32_t end = job->block[b + 1];
+	finding f = { .job = job,
+		.images = quern_images_of(job->dim, job->lower, job->upper, job->periodic),
+		.begin = (int32_t)job->block[b],
+		.cap = cap,
+		.out = out };
+	candidates c;
+	c.n = 0;
+	for (uint32_t first = job->block[b], last; first < end; first = last) {
+		uint32_t cell[3] = { 0 }, near[3][3], count[3];
+		for (uint32_t a = 0; a < 3; a++) {
+			if (a < job->dim) cell[a] = cell_along(l, job, a, first);
+			count[a] = beside(l, job, a, cell[a], near[a]);
+		}
+		const uint32_t *own = range[(cell[2] * l->count[1] + cell[1]) * l->count[0] + cell[0]];
+		last = own[0] + own[1];
 		for (uint32_t z = 0; z < count[2]; z++)
 			for (uint32_t y = 0; y < count[1]; y++)
-				for (uint32_t x = 0; x < count[0]; x++) {
-					const uint32_t *r =
-						range[(near[2][z] * l->count[1] + near[1][y]) * l->count[0] + near[0][x]];
-					for (uint32_t k = r[0]; k < r[0] + r[1]; k++) {
-						if (k >= begin && k <= i) continue;
-						quern_real d2 = 0;
-						for (uint32_t a = 0; a < job->dim; a++) {
-							const quern_real d = quern_image(
-								job->position[a][i] - job->position[a][k], images.half[a], images.length[a]);
-							d2 += d * d;
-						}
-						const quern_real reach = job->radius[i] + job->radius[k] + job->reach;
-						if (!(d2 < reach * reach)) continue;
-						if (n < cap) out[n] = (quern_pair) { (int32_t)i, (int32_t)k };
-						n++;
-					}
-				}
+				for (uint32_t x = 0; x < count[0]; x++)
+					beside_cell(&f, &c, first, last,
+						range[(near[2][z] * l->count[1] + near[1][y]) * l->count[0] + near[0][x]], dim);
+		find_all(&f, &c, first, last, dim);
 	}
-	return n;
+	return f.n;
+}
+
+static uint32_t pairs(
+	const void *self, const quern_neighbour_job *job, uint32_t b, uint32_t cap, quern_pair *out) {
+	(void)self;
+	return job->dim == 2 ? find_pairs(job, b, cap, out, 2) : find_pairs(job, b, cap, out, 3);
 }
 
 static const quern_neighbour_ops ops = {
