@@ -15,7 +15,7 @@ typedef struct {
 	const quern_row *motion;
 	trips trips;
 	calm calm;
-	bool relieves;        /* points of crowded cells */
+	bool answers;         /* volume does, to how full cells are */
 	quern_real full;      /* from there on a cell is crowded */
 	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
 } gather_work;
@@ -24,8 +24,9 @@ typedef struct {
 	quern_row tile[QUERN_TILE_MOST];
 	trip_memory trip;
 	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
-	_Alignas(64) quern_real kept[3][STENCIL];
-	fit_memory fit; /* where the transfer asks for it */
+	_Alignas(64) quern_real kept[3][STENCIL], mean_pressure[STENCIL];
+	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS]; /* Pa, m^3, by cell of the block */
+	fit_memory fit;                                               /* where the transfer asks for it */
 } gather_memory;
 
 /* What the nodes say at the points of a chunk. */
@@ -139,29 +140,66 @@ static uint32_t cell_in_block(const gather_work *w, uint32_t b, uint32_t i) {
 	return b * QUERN_BLOCK_CELLS + place;
 }
 
-/* Mass that came where there was no room has brought its volume along, and does not press: where the neighbourhood is too
- * full and flows, there is a least pressure, and what the material's lacks goes to it as a compression beside that of the flow. At rest
- * no mass arrives, and a bed is denser here than there. */
-static void relieve_chunk(const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
+static quern_real pressure_of(const gather_work *w, uint32_t i) {
+	quern_real pressure = 0;
+	for (uint32_t k = 0; k < w->s->dim; k++) pressure -= w->s->use[GATHER_STRESS].real[k][i] / w->s->dim;
+	return pressure;
+}
+
+/* Of the stress-free density: a point less dense is open, its volume is the grid's. */
+static const quern_real dense = 0.98;
+
+/* The mean pressure of each cell's points, by volume. */
+static void level_block(const gather_work *w, gather_memory *m, uint32_t b) {
+	const quern_real *mass = w->s->use[GATHER_MASS].real[0], *volume = w->s->use[GATHER_VOLUME].real[0];
+	memset(m->level, 0, sizeof m->level);
+	memset(m->room, 0, sizeof m->room);
+	for (uint32_t i = w->point[b]; i < w->point[b + 1]; i++) {
+		const uint32_t c = cell_in_block(w, b, i) - b * QUERN_BLOCK_CELLS;
+		if (mass[i] < dense * w->p->density * volume[i]) continue;
+		m->level[c] += volume[i] * pressure_of(w, i);
+		m->room[c] += volume[i];
+	}
+	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++)
+		m->level[c] = m->room[c] > 0 ? m->level[c] / m->room[c] : 0;
+}
+
+/* What a point's pressure lacks of the least one of a crowded cell. At rest no mass arrives, and a bed is denser here than there. */
+static quern_real lacks_least(
+	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, uint32_t at) {
+	const mpm *p = w->p;
+	quern_real pressure = pressure_of(w, at), trace = 0;
+	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
+	pressure -= p->bulk * trace * w->s->dt; /* what the flow itself will make of it */
+	const quern_real least = p->relief * p->bulk * (w->s->use[GATHER_CROWDING].real[0][c] - w->full);
+	return least > 0 && least > pressure ? fmin(1, p->answer * w->s->dt) * (least - pressure) : 0;
+}
+
+/* Points do not feel that they lie one upon the other: as material is sheared, their density goes to the grid's, a part for each
+ * unit of shear. A point far looser than its cell, or far denser, is at a surface. */
+static quern_real lacks_density(const gather_work *w, const gather_memory *m, uint32_t i, quern_real rate) {
+	const quern_real own = m->density[i], off = m->grid_density[i] / own - 1,
+					 part = w->p->follow * rate * w->s->dt;
+	if (own < dense * w->p->density || off < -0.1) return 0;
+	return part / (1 + part) * w->p->bulk * fmin(off, 0.2);
+}
+
+/* Mass that came where there was no room has brought its volume along, and does not press: what pressure lacks comes as a compression
+ * beside that of the flow, where material flows, so that it holds for every material. */
+static void answer_chunk(const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
 	const mpm *p = w->p;
 	const uint32_t dim = w->s->dim;
-	const quern_real dt = w->s->dt, answer = fmin(1, p->answer * dt), still = flowing * p->rest_rate;
-	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0];
+	const quern_real still = flowing * p->rest_rate;
 	for (uint32_t i = 0; i < n; i++) {
-		const quern_real fast = calm_shear(m->gradient, i, dim) / (still * still),
+		const uint32_t c = cell_in_block(w, b, begin + i);
+		const quern_real rate2 = calm_shear(m->gradient, i, dim), fast = rate2 / (still * still),
 						 flows = fast * fast / (1 + fast * fast);
-		quern_real pressure = 0, trace = 0;
-		for (uint32_t k = 0; k < dim; k++) {
-			pressure -= w->s->use[GATHER_STRESS].real[k][begin + i] / dim;
-			trace += m->gradient[(dim + 1) * k][i];
-		}
-		pressure -= p->bulk * trace * dt; /* what the flow itself will make of it */
-		const quern_real over = crowding[cell_in_block(w, b, begin + i)] - w->full,
-						 least = p->relief * p->bulk * over;
-		const quern_real lack = least > 0 && least > pressure ? flows * answer * (least - pressure) : 0;
+		const quern_real lack =
+			flows * (lacks_least(w, m, c, i, begin + i) + lacks_density(w, m, i, sqrt(rate2)));
+		m->mean_pressure[i] = m->level[c - b * QUERN_BLOCK_CELLS];
 		for (uint32_t k = 0; k < dim; k++) {
 			m->kept[k][i] = m->gradient[(dim + 1) * k][i];
-			m->gradient[(dim + 1) * k][i] -= lack / (p->bulk * dt * dim);
+			m->gradient[(dim + 1) * k][i] -= lack / (p->bulk * w->s->dt * dim);
 		}
 	}
 }
@@ -176,7 +214,8 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 		.dt = w->s->dt,
 		.grid_density = m->grid_density,
 		.density = m->density,
-		.use = own };
+		.use = own,
+		.mean_pressure = w->answers ? m->mean_pressure : NULL };
 	for (uint32_t k = 0; k < dim * dim; k++) b.gradient[k] = m->gradient[k];
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
 		b.stress[k] = u[GATHER_STRESS].real[k] + begin;
@@ -223,6 +262,7 @@ QUERN_INLINE void gather_block(
 	if (begin == end) return;
 	quern_tile_load(w->g, w->motion, b, m->tile);
 	trips_begin_block(&w->trips, &m->trip, b, last);
+	if (last && w->answers) level_block(w, m, b);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
@@ -236,9 +276,9 @@ QUERN_INLINE void gather_block(
 			calm_note(
 				&w->calm, k, i + k, m->gradient, m->trip.pic, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
 		move_chunk(w, m, b, i, n, dim);
-		if (w->relieves) relieve_chunk(w, m, b, i, n);
+		if (w->answers) answer_chunk(w, m, b, i, n);
 		call_material(w, m, i, n);
-		for (int k = 0; k < dim && w->relieves; k++)
+		for (int k = 0; k < dim && w->answers; k++)
 			memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
 		finish_chunk(w, m, b, i, n);
 	}
@@ -308,7 +348,8 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	w.bad = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.moved = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.full = s->use[GATHER_FULL].real[0] ? dead_band * s->use[GATHER_FULL].real[0][0] : 0;
-	w.relieves = p->relief > 0 && p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
+	w.answers =
+		(p->relief > 0 || p->follow > 0) && p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };
 	if (!w.bad || !w.moved || calm_init(&w.calm, s, points.n) != QUERN_OK) return QUERN_E_MEMORY;

@@ -23,6 +23,7 @@ typedef struct mpm {
 	bool matrix, moments;                       /* or what the transfer gives; whose moment can be kept */
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
 	quern_real relief, answer; /* of the pressure to cells that are too full: over the bulk modulus, 1/s */
+	quern_real follow;         /* of density, to the grid's: a rate over the shear rate */
 	quern_real rest, diameter, rest_rate; /* shear rate of what is at rest: over sqrt(g/D), 1/s */
 	quern_real share_wall, share_next;    /* of a wall's nodes */
 	uint32_t dim;

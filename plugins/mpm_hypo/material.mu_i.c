@@ -68,9 +68,9 @@ QUERN_INLINE void put_outputs(const int dim, const mu_i *law, const quern_materi
 	put_hypoelastic_energies(dim, law->bulk_modulus, law->shear, b);
 }
 
-/* `dim`, `rated` and `relaxed` are constants in every caller. */
-QUERN_INLINE void kernel(
-	const int dim, const bool rated, const bool relaxed, const mu_i *self, const quern_material_batch *b) {
+/* `dim`, `rated`, `relaxed` and `mean` are constants in every caller. */
+QUERN_INLINE void kernel(const int dim, const bool rated, const bool relaxed, const bool mean,
+	const mu_i *self, const quern_material_batch *b) {
 	const mu_i law = *self;
 	const quern_real dt = b->dt, shear = law.shear, lambda = law.bulk_modulus - 2 * shear / dim;
 	const quern_real mu_s = law.static_friction, mu_2 = law.limit_friction;
@@ -79,7 +79,7 @@ QUERN_INLINE void kernel(
 	const quern_real per_strain = dt > 0 ? 1 / (shear * dt) : 0;
 	const quern_real critical = law.critical_density, one_over_critical = 1 / critical;
 	const quern_real pull = relaxed ? 1 - quern_exp(-law.pressure_rate * dt) : 0;
-	const quern_real *restrict grid_density = b->grid_density;
+	const quern_real *restrict grid_density = b->grid_density, *restrict mean_pressure = b->mean_pressure;
 	quern_real *restrict density = b->density, *restrict rate = rated ? b->use[SHEAR_RATE].real[0] : NULL;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
@@ -97,7 +97,9 @@ QUERN_INLINE void kernel(
 		const quern_real tau = __builtin_sqrt(symmetric_half_square(dim, s));
 		const bool dilute = rho<critical, flows = tau> mu_s * p;
 		const bool open = dilute | (p <= 0);
-		const quern_real flow = flow_stress(mu_s * p, mu_2 * p, tau, slowness * __builtin_sqrt(p));
+		const quern_real around = mean ? mean_pressure[i] : p; /* of the inertial number */
+		const quern_real flow =
+			flow_stress(mu_s * p, mu_2 * p, tau, slowness * __builtin_sqrt(around > 0 ? around : p));
 		/* an elastic stress keeps its bits, so that a point at rest stays as it is */
 		const symmetric closed =
 			symmetric_select(flows, symmetric_scale_shift(dim, flow / tau, s, -p), trial);
@@ -112,11 +114,16 @@ QUERN_INLINE void kernel(
 
 QUERN_INLINE void update(const int dim, const void *self, const quern_material_batch *b) {
 	const bool rated = b->use[SHEAR_RATE].real[0] != NULL, relaxed = ((const mu_i *)self)->pressure_rate > 0;
+	const bool mean = b->mean_pressure != NULL;
 	if (rated) {
-		if (relaxed) kernel(dim, true, true, self, b);
-		else kernel(dim, true, false, self, b);
-	} else if (relaxed) kernel(dim, false, true, self, b);
-	else kernel(dim, false, false, self, b);
+		if (relaxed && mean) kernel(dim, true, true, true, self, b);
+		else if (relaxed) kernel(dim, true, true, false, self, b);
+		else if (mean) kernel(dim, true, false, true, self, b);
+		else kernel(dim, true, false, false, self, b);
+	} else if (relaxed && mean) kernel(dim, false, true, true, self, b);
+	else if (relaxed) kernel(dim, false, true, false, self, b);
+	else if (mean) kernel(dim, false, false, true, self, b);
+	else kernel(dim, false, false, false, self, b);
 }
 static void update_2d(const void *self, const quern_material_batch *b) { update(2, self, b); }
 static void update_3d(const void *self, const quern_material_batch *b) { update(3, self, b); }
