@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { GRADIENT, GRID_DENSITY, DENSITY, STRESS, WAVE, ENERGY };
+enum { GRADIENT, GRID_DENSITY, DENSITY, STRESS, WAVE, ENERGY, MEAN_PRESSURE };
 enum { OUTPUTS = 1, ASSIGNS = 2, VARIANTS = 4 };
 
 typedef struct {
@@ -29,6 +29,7 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	QUERN_CHECK_VECTOR(batch.gradient, k, b, GRADIENT, k->dim * k->dim);
 	QUERN_CHECK_VECTOR(batch.stress, k, b, STRESS, stresses(k));
 	batch.grid_density = quern_check_at(k, b, GRID_DENSITY, 0);
+	batch.mean_pressure = quern_check_at(k, b, MEAN_PRESSURE, 0);
 	batch.density = quern_check_at(k, b, DENSITY, 0);
 	batch.wave_speed = quern_check_at(k, b, WAVE, 0);
 	batch.energy = quern_check_at(k, b, ENERGY, 0);
@@ -44,6 +45,8 @@ static quern_check_kernel *create(
 	if (update) {
 		c->host->add(k, GRADIENT, "gradient", QUERN_CHECK_IN, k->dim * k->dim);
 		c->host->add(k, GRID_DENSITY, "grid_density", QUERN_CHECK_IN, 1);
+		/* as in a hybrid; with outputs as in a continuum alone, so that both are seen */
+		if (!outputs) c->host->add(k, MEAN_PRESSURE, "mean_pressure", QUERN_CHECK_IN, 1);
 	}
 	c->host->add(k, DENSITY, "density", QUERN_CHECK_CHANGED, 1);
 	c->host->add(k, STRESS, "stress", QUERN_CHECK_CHANGED, stresses(k));
@@ -110,6 +113,9 @@ static quern_check_kernel *make(
 	for (uint32_t i = 0; i < n; i++) {
 		quern_check_given(k, DENSITY, 0)[i] *= c->host->uniform(63, i, 0.998, 1.002);
 		quern_check_given(k, GRID_DENSITY, 0)[i] *= c->host->uniform(64, i, 0.9, 1.05);
+		if (k->at[MEAN_PRESSURE] < 0) continue;
+		const double pressure = -quern_check_given(k, STRESS, 0)[i] * c->host->uniform(65, i, -0.5, 2);
+		quern_check_given(k, MEAN_PRESSURE, 0)[i] = pressure > 0 ? pressure : 0;
 	}
 	return k;
 }

@@ -176,12 +176,12 @@ static quern_real lacks_least(
 }
 
 /* Points do not feel that they lie one upon the other: as material is sheared, their density goes to the grid's, a part for each
- * unit of shear. A point far looser than its cell, or far denser, is at a surface. */
-static quern_real lacks_density(const gather_work *w, const gather_memory *m, uint32_t i, quern_real rate) {
+ * unit of shear. A point far denser than its cell is at a surface. Returned: by what share it grows in this step. */
+static quern_real follow_grid(const gather_work *w, const gather_memory *m, uint32_t i, quern_real rate) {
 	const quern_real own = m->density[i], off = m->grid_density[i] / own - 1,
 					 part = w->p->follow * rate * w->s->dt;
 	if (own < dense * w->p->density || off < -0.1) return 0;
-	return part / (1 + part) * w->p->bulk * fmin(off, 0.2);
+	return part / (1 + part) * fmin(off, 0.2);
 }
 
 /* Mass that came where there was no room has brought its volume along, and does not press: what pressure lacks comes as a compression
@@ -194,8 +194,9 @@ static void answer_chunk(const gather_work *w, gather_memory *m, uint32_t b, uin
 		const uint32_t c = cell_in_block(w, b, begin + i);
 		const quern_real rate2 = calm_shear(m->gradient, i, dim), fast = rate2 / (still * still),
 						 flows = fast * fast / (1 + fast * fast);
-		const quern_real lack =
-			flows * (lacks_least(w, m, c, i, begin + i) + lacks_density(w, m, i, sqrt(rate2)));
+		const quern_real followed = flows * follow_grid(w, m, i, sqrt(rate2)),
+						 lack = flows * lacks_least(w, m, c, i, begin + i) + p->bulk * followed;
+		m->density[i] *= 1 + followed;
 		m->mean_pressure[i] = m->level[c - b * QUERN_BLOCK_CELLS];
 		for (uint32_t k = 0; k < dim; k++) {
 			m->kept[k][i] = m->gradient[(dim + 1) * k][i];
@@ -348,8 +349,7 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	w.bad = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.moved = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.full = s->use[GATHER_FULL].real[0] ? dead_band * s->use[GATHER_FULL].real[0][0] : 0;
-	w.answers =
-		(p->relief > 0 || p->follow > 0) && p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
+	w.answers = p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };
 	if (!w.bad || !w.moved || calm_init(&w.calm, s, points.n) != QUERN_OK) return QUERN_E_MEMORY;

@@ -52,7 +52,7 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.def = 4, .max = 1e3, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rest, "1",
 		"In a hybrid, shear rate over sqrt(g/D) below which material is at rest and motion below the grid is stopped, of "
-		"points and of the grains that meet them; 0: never.",
+		"points and of the grains that meet them, and far above which volume answers; 0: neither is done.",
 		.def = 0.003, .max = 1e6, .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(mpm, diameter, "grain.diameter", "m", "Mean diameter of the grains.",
 		.from = "grain.diameter", .flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),

@@ -56,8 +56,8 @@ static quern_real full_of(const relaxing *r, uint32_t i) {
 
 /* As many cells as grains at most, or nearly so, however far these lie apart. */
 static void lay_out(const relaxing *r, cells *c) {
-	const quern_real most = 1 + __builtin_sqrt((quern_real)r->all), widest = 2 * r->widest + r->skin;
-	const quern_real lines = r->dim == 2 ? most : most > 4096 ? 256 : 16 + most / 4;
+	const quern_real widest = 2 * r->widest + r->skin, all = r->all;
+	const quern_real lines = 1 + (r->dim == 2 ? __builtin_sqrt(all) : cbrt(all));
 	for (uint32_t k = 0; k < 3; k++) {
 		c->lower[k] = 0, c->inverse[k] = 0, c->count[k] = 1, c->periodic[k] = false;
 		if (k >= r->dim) continue;
