@@ -87,6 +87,8 @@ static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin
 static const quern_real calm_rate = 400;
 /* Of the shear rate of what is at rest: where material flows for certain. */
 static const quern_real flowing = 30;
+/* What is shaken changes volume as much as shape, what flows hardly: weight of the former. */
+static const quern_real shaken = 30;
 /* What is full, over what was full at first: that varies by so much. */
 static const quern_real dead_band = 1.01;
 
@@ -178,10 +180,13 @@ static quern_real lacks_least(
 /* Points do not feel that they lie one upon the other: as material is sheared, their density goes to the grid's, a part for each
  * unit of shear. A point far denser than its cell is at a surface. Returned: by what share it grows in this step. */
 static quern_real follow_grid(const gather_work *w, const gather_memory *m, uint32_t i, quern_real rate) {
+	quern_real trace = 0;
+	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
 	const quern_real own = m->density[i], off = m->grid_density[i] / own - 1,
-					 part = w->p->follow * rate * w->s->dt;
+					 sheared = rate * rate / (rate * rate + shaken * trace * trace),
+					 part = w->p->follow * rate * sheared * w->s->dt;
 	if (own < dense * w->p->density || off < -0.1) return 0;
-	return part / (1 + part) * fmin(off, 0.2);
+	return part / (1 + part) * fmin(off, 0.1);
 }
 
 /* Mass that came where there was no room has brought its volume along, and does not press: what pressure lacks comes as a compression

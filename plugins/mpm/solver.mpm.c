@@ -49,7 +49,7 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, follow, "1",
 		"In a hybrid, rate over the shear rate at which the density of points goes to the grid's; 0: it does not.",
-		.def = 4, .max = 1e3, .flags = QUERN_ADVANCED),
+		.def = 2, .max = 1e3, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rest, "1",
 		"In a hybrid, shear rate over sqrt(g/D) below which material is at rest and motion below the grid is stopped, of "
 		"points and of the grains that meet them, and far above which volume answers; 0: neither is done.",

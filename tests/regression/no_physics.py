@@ -22,7 +22,7 @@ DOCUMENTED = {
 }
 ENGLISH = {"body", "contact", "contacts", "energy", "mass", "material", "motion", "node", "point", "points", "shape",
            "touch"}  # words that mean something else too: only as texts of their own
-OWN = {"total", "cell", "solver", "observer"}  # the host's own sets and kinds
+OWN = {"total", "cell", "solver", "observer", "grid"}  # the host's own sets and kinds, and what it reckons on
 
 
 def ask(*words):
