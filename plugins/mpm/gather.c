@@ -185,7 +185,7 @@ static quern_real follow_grid(const gather_work *w, const gather_memory *m, uint
 	const quern_real own = m->density[i], off = m->grid_density[i] / own - 1,
 					 sheared = rate * rate / (rate * rate + shaken * trace * trace),
 					 part = w->p->follow * rate * sheared * w->s->dt;
-	if (own < dense * w->p->density || off < -0.1) return 0;
+	if (!(rate > 0) || own < dense * w->p->density || off < -0.1) return 0;
 	return part / (1 + part) * fmin(off, 0.1);
 }
 
