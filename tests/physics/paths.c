@@ -147,7 +147,7 @@ static void bridges_form_and_break(void **unused) {
 		good &= table_row("pull over that in closed form, worst gap", force, 0, 1e-13);
 		good &= table_row("stored, over minus the work that is left, worst gap", books, 0, 1e-10);
 		good &= table_row("nothing more is lost", (c.rubbed - formed) / whole, 0, 0);
-		press(&c, dim, -rupture);
+		press(&c, dim, -rupture * (1 + 1e-9)); /* the test reckons where it breaks by other roundings */
 		good &= table_row("force once broken", fabs(c.force) + fabs(c.stored) + c.memory, 0, 0);
 		press(&c, dim, -0.1 * rupture);
 		good &= table_row("force when near again", fabs(c.force) + fabs(c.stored) + c.memory, 0, 0);
