@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* neighbours.cells - linked cells as wide as the farthest pair; blocks of 16 x 16 or 8 x 8 x 8 of them.
  * docs/theory/grains.md, section 4 */
-#include <math.h>
-#include <quern/neighbours.h>
-#include <quern/space.h>
+#include "cell_grid.h"
 
 typedef struct {
 	int32_t unused;
@@ -11,75 +9,30 @@ typedef struct {
 static const quern_param params[] = { QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
-/* The cells cover the grains' bounding box, or the whole length of a periodic axis. */
-typedef struct {
-	uint32_t count[3];
-	uint32_t n;
-	quern_real lower[3], inverse[3]; /* 1/m */
-	uint32_t edge;                   /* cells of a block along an axis */
-} layout;
+static uint32_t edge_of(uint32_t dim) { return dim == 2 ? 16 : 8; }
 
-static layout layout_of(const quern_neighbour_job *job) {
-	layout l = { .count = { 1, 1, 1 }, .n = 1, .edge = job->dim == 2 ? 16 : 8 };
-	quern_real least = 2 * job->largest + job->reach;
-	quern_real lower[3] = { 0 }, length[3] = { 0 };
-	for (uint32_t a = 0; a < job->dim; a++) {
-		const quern_real *x = job->position[a];
-		quern_real low = x[0], high = x[0];
-		for (uint32_t i = 1; i < job->n; i++) {
-			low = x[i] < low ? x[i] : low;
-			high = x[i] > high ? x[i] : high;
-		}
-		lower[a] = job->periodic[a] ? job->lower[a] : low;
-		length[a] = job->periodic[a] ? job->upper[a] - job->lower[a] : high - low;
-	}
-	/* a few far flyers must not ask for more cells than there are grains to fill them: widen the cells instead */
-	for (;; least *= 1.5) {
-		quern_real total = 1;
-		for (uint32_t a = 0; a < job->dim; a++) total *= floor(length[a] / least) + 1;
-		if (total <= 16.0 * job->n + 4096) break;
-	}
-	for (uint32_t a = 0; a < job->dim; a++) {
-		const quern_real fit = floor(length[a] / least);
-		l.count[a] = job->periodic[a] ? (fit < 1 ? 1 : (uint32_t)fit) : (uint32_t)fit + 1;
-		l.lower[a] = lower[a];
-		l.inverse[a] = job->periodic[a] ? l.count[a] / length[a] : 1 / least;
-		l.n *= l.count[a];
-	}
-	return l;
-}
-
-static uint32_t cell_along(const layout *l, const quern_neighbour_job *job, uint32_t a, uint32_t i) {
-	const int32_t c = quern_cell_along(job->position[a][i], l->lower[a], l->inverse[a]);
-	return (uint32_t)quern_cell_held(c, (int32_t)l->count[a]);
+static cell_grid layout_of(const quern_neighbour_job *job) {
+	const extent e = extent_of(job);
+	return cell_grid_of(job, &e, 2 * job->largest + job->reach, job->n);
 }
 
 static size_t keys(const void *self, const quern_neighbour_job *job, uint64_t *key) {
 	(void)self;
 	if (!job->n) return 0;
-	const layout l = layout_of(job);
-	const uint32_t bx = (l.count[0] + l.edge - 1) / l.edge, by = (l.count[1] + l.edge - 1) / l.edge;
-	for (uint32_t i = 0; i < job->n; i++) {
-		uint32_t c[3] = { 0 };
-		for (uint32_t a = 0; a < job->dim; a++) c[a] = cell_along(&l, job, a, i);
-		const uint64_t block = ((uint64_t)(c[2] / l.edge) * by + c[1] / l.edge) * bx + c[0] / l.edge;
-		const uint32_t place = ((c[2] % l.edge) * l.edge + c[1] % l.edge) * l.edge + c[0] % l.edge;
-		key[i] = block << 32 | place;
-	}
-	return sizeof(layout) + ((size_t)l.n + 1) * 2 * sizeof(uint32_t);
+	const cell_grid l = layout_of(job);
+	for (uint32_t i = 0; i < job->n; i++) key[i] = block_key(&l, edge_of(job->dim), job, i);
+	return sizeof l + (size_t)l.n * 2 * sizeof(uint32_t);
 }
 
 /* Grains of one cell lie together after the sort: its first one and its count are all there is to keep. */
 static void index_cells(const void *self, const quern_neighbour_job *job) {
-	layout *l = job->memory;
+	cell_grid *l = job->memory;
 	uint32_t(*range)[2] = (uint32_t(*)[2])(void *)(l + 1);
 	(void)self;
 	if (!job->n) return;
 	*l = layout_of(job);
 	for (uint32_t i = 0; i < job->n; i++) {
-		uint32_t c[3] = { 0 };
-		for (uint32_t a = 0; a < job->dim; a++) c[a] = cell_along(l, job, a, i);
-		uint32_t *r = range[(c[2] * l->count[1] + c[1]) * l->count[0] + c[0]];
+		uint32_t *r = range[cell_of(l, job, i)];
 		if (!r[1]) r[0] = i;
 		r[1]++;
 	}
@@ -87,7 +40,7 @@ static void index_cells(const void *self, const quern_neighbour_job *job) {
 
 /* The distinct cells beside c along an axis; three, or fewer at an edge or around a short periodic axis. */
 static uint32_t beside(
-	const layout *l, const quern_neighbour_job *job, uint32_t a, uint32_t c, uint32_t out[3]) {
+	const cell_grid *l, const quern_neighbour_job *job, uint32_t a, uint32_t c, uint32_t out[3]) {
 	const uint32_t count = l->count[a];
 	uint32_t n = 0;
 	if (a >= job->dim) return out[0] = 0, 1;
@@ -168,7 +121,7 @@ QUERN_INLINE void beside_cell(
 /* Cell by cell: its grains have the same neighbours. */
 QUERN_INLINE uint32_t find_pairs(
 	const quern_neighbour_job *job, uint32_t b, uint32_t cap, quern_pair *out, const int dim) {
-	const layout *l = job->memory;
+	const cell_grid *l = job->memory;
 	const uint32_t(*range)[2] = (const uint32_t(*)[2])(const void *)(l + 1);
 	const uint32_t end = job->block[b + 1];
 	finding f = { .job = job,
@@ -184,7 +137,7 @@ QUERN_INLINE uint32_t find_pairs(
 			if (a < job->dim) cell[a] = cell_along(l, job, a, first);
 			count[a] = beside(l, job, a, cell[a], near[a]);
 		}
-		const uint32_t *own = range[(cell[2] * l->count[1] + cell[1]) * l->count[0] + cell[0]];
+		const uint32_t *own = range[cell_number(l, cell)];
 		last = own[0] + own[1];
 		for (uint32_t z = 0; z < count[2]; z++)
 			for (uint32_t y = 0; y < count[1]; y++)

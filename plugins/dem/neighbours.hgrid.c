@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* neighbours.hgrid - a hierarchical grid: every size of grains has cells of its own width. After Ogarko & Luding 2012.
  * docs/theory/grains.md, section 4 */
+#include "cell_grid.h"
 #include "levels.h"
-#include <math.h>
-#include <quern/neighbours.h>
-#include <quern/space.h>
 
 typedef struct {
 	int32_t unused;
@@ -12,61 +10,18 @@ typedef struct {
 static const quern_param params[] = { QUERN_END_PARAMS };
 static const quern_use uses[] = { QUERN_END_USES };
 
-/* The cells of a level cover the grains' bounding box, or the whole length of a periodic axis. */
-typedef struct {
-	uint32_t count[3];
-	uint32_t first;                             /* its first cell, in the row of all levels' cells */
-	quern_real lower[3], inverse[3], length[3]; /* m, 1/m, m; length: of a cell */
-} grid;
-
 typedef struct {
 	level_set levels;
-	grid level[MOST_LEVELS];
-	uint32_t n_cells; /* of all levels */
-	uint32_t edge;    /* of a block, in cells of the level with most grains */
+	cell_grid level[MOST_LEVELS];
+	uint32_t first[MOST_LEVELS]; /* a level's first cell, in the row of all levels' cells */
+	uint32_t n_cells;            /* of all levels */
+	uint32_t edge;               /* of a block, in cells of the level with most grains */
 } layout;
 
 /* ---- levels and cells ---- */
 
-typedef struct {
-	quern_real lower[3], length[3];
-} extent;
-
-static extent extent_of(const quern_neighbour_job *job) {
-	extent e = { .lower = { 0 } };
-	for (uint32_t a = 0; a < job->dim; a++) {
-		const quern_real *x = job->position[a];
-		quern_real low = x[0], high = x[0];
-		for (uint32_t i = 1; i < job->n; i++) {
-			low = x[i] < low ? x[i] : low;
-			high = x[i] > high ? x[i] : high;
-		}
-		e.lower[a] = job->periodic[a] ? job->lower[a] : low;
-		e.length[a] = job->periodic[a] ? job->upper[a] - job->lower[a] : high - low;
-	}
-	return e;
-}
-
 /* What is as wide as the widest pair, rounding included. */
 static quern_real widened(quern_real width) { return width * (1 + 1e-9); }
-
-/* A few small grains in much room must not ask for more cells than they fill: theirs are wider then. */
-static grid grid_of(const quern_neighbour_job *job, const extent *e, quern_real width, uint32_t n_grains) {
-	grid g = { .count = { 1, 1, 1 } };
-	for (;; width *= 1.5) {
-		quern_real total = 1;
-		for (uint32_t a = 0; a < job->dim; a++) total *= floor(e->length[a] / width) + 1;
-		if (total <= 16.0 * n_grains + 4096) break;
-	}
-	for (uint32_t a = 0; a < job->dim; a++) {
-		const quern_real fit = floor(e->length[a] / width);
-		g.count[a] = job->periodic[a] ? (fit < 1 ? 1 : (uint32_t)fit) : (uint32_t)fit + 1;
-		g.lower[a] = e->lower[a];
-		g.length[a] = job->periodic[a] ? e->length[a] / g.count[a] : width;
-		g.inverse[a] = 1 / g.length[a];
-	}
-	return g;
-}
 
 /* Cells along a block that would hold about as many grains as those of `cells` do of equal ones. */
 static uint32_t edge_of(const level_set *levels, uint32_t dim) {
@@ -83,17 +38,11 @@ static layout layout_of(const quern_neighbour_job *job) {
 	const extent e = extent_of(job);
 	l.edge = edge_of(&l.levels, job->dim);
 	for (uint32_t h = 0; h < l.levels.n; h++) {
-		grid *g = &l.level[h];
-		*g = grid_of(job, &e, widened(2 * l.levels.most[h] + job->reach), l.levels.count[h]);
-		g->first = l.n_cells;
-		l.n_cells += g->count[0] * g->count[1] * g->count[2];
+		l.level[h] = cell_grid_of(job, &e, widened(2 * l.levels.most[h] + job->reach), l.levels.count[h]);
+		l.first[h] = l.n_cells;
+		l.n_cells += l.level[h].n;
 	}
 	return l;
-}
-
-static uint32_t cell_along(const grid *g, const quern_neighbour_job *job, uint32_t a, uint32_t i) {
-	const int32_t c = quern_cell_along(job->position[a][i], g->lower[a], g->inverse[a]);
-	return (uint32_t)quern_cell_held(c, (int32_t)g->count[a]);
 }
 
 /* ---- the index: grains by level and cell, with copies of what the search reads of them ---- */
@@ -125,15 +74,8 @@ static size_t keys(const void *self, const quern_neighbour_job *job, uint64_t *k
 	(void)self;
 	if (!job->n) return 0;
 	const layout l = layout_of(job);
-	const grid *g = &l.level[l.levels.crowded];
-	const uint32_t bx = (g->count[0] + l.edge - 1) / l.edge, by = (g->count[1] + l.edge - 1) / l.edge;
-	for (uint32_t i = 0; i < job->n; i++) {
-		uint32_t c[3] = { 0 };
-		for (uint32_t a = 0; a < job->dim; a++) c[a] = cell_along(g, job, a, i);
-		const uint64_t block = ((uint64_t)(c[2] / l.edge) * by + c[1] / l.edge) * bx + c[0] / l.edge;
-		const uint32_t place = ((c[2] % l.edge) * l.edge + c[1] % l.edge) * l.edge + c[0] % l.edge;
-		key[i] = block << 32 | place;
-	}
+	const cell_grid *g = &l.level[l.levels.crowded];
+	for (uint32_t i = 0; i < job->n; i++) key[i] = block_key(g, l.edge, job, i);
 	return bytes_of(&l, job);
 }
 
@@ -144,10 +86,8 @@ static void index_levels(const void *self, const quern_neighbour_job *job) {
 	*(layout *)job->memory = layout_of(job);
 	const hindex at = index_at(job->memory, job);
 	for (uint32_t i = 0; i < job->n; i++) {
-		const grid *g = &at.l->level[level_of(&at.l->levels, job->radius[i])];
-		uint32_t c[3] = { 0 };
-		for (uint32_t a = 0; a < job->dim; a++) c[a] = cell_along(g, job, a, i);
-		at.cell[i] = g->first + (c[2] * g->count[1] + c[1]) * g->count[0] + c[0];
+		const uint32_t h = level_of(&at.l->levels, job->radius[i]);
+		at.cell[i] = at.l->first[h] + cell_of(&at.l->level[h], job, i);
 		at.start[at.cell[i] + 2]++;
 	}
 	for (uint32_t c = 0; c < at.l->n_cells; c++) at.start[c + 2] += at.start[c + 1];
@@ -177,7 +117,7 @@ typedef struct {
 	int32_t low, n, count;
 } span;
 
-static span span_of(const grid *g, bool periodic, uint32_t a, quern_real x, quern_real width) {
+static span span_of(const cell_grid *g, bool periodic, uint32_t a, quern_real x, quern_real width) {
 	const int32_t count = (int32_t)g->count[a];
 	int32_t low = quern_cell_along(x - width, g->lower[a], g->inverse[a]),
 			high = quern_cell_along(x + width, g->lower[a], g->inverse[a]);
@@ -223,14 +163,15 @@ QUERN_INLINE void look_along(
 
 /* A row of cells is one stretch of the index, or two where it goes through the seam. */
 QUERN_INLINE void look_at(
-	hunt *s, const grid *g, const span *along, uint32_t i, const int dim, const bool plain, const whose of) {
+	hunt *s, uint32_t level, const span *along, uint32_t i, const int dim, const bool plain, const whose of) {
+	const cell_grid *g = &s->at.l->level[level];
+	const uint32_t *first = s->at.start + s->at.l->first[level];
 	const span *x = &along[0];
 	const int32_t deep = dim == 3 ? along[2].n : 1;
 	for (int32_t tz = 0; tz < deep; tz++)
 		for (int32_t ty = 0; ty < along[1].n; ty++) {
 			const uint32_t z = dim == 3 ? cell_at(&along[2], tz) : 0;
-			const uint32_t *start =
-				s->at.start + g->first + (z * g->count[1] + cell_at(&along[1], ty)) * g->count[0];
+			const uint32_t *start = first + (z * g->count[1] + cell_at(&along[1], ty)) * g->count[0];
 			const uint32_t begin = cell_at(x, 0), end = begin + (uint32_t)x->n;
 			const uint32_t over = end > g->count[0] ? end - g->count[0] : 0;
 			look_along(s, i, start[begin], start[end - over], dim, plain, of);
@@ -240,7 +181,7 @@ QUERN_INLINE void look_at(
 
 QUERN_INLINE void look(hunt *s, uint32_t level, uint32_t i, const int dim, const whose of) {
 	const quern_neighbour_job *job = s->job;
-	const grid *g = &s->at.l->level[level];
+	const cell_grid *g = &s->at.l->level[level];
 	const quern_real width = widened(job->radius[i] + s->at.l->levels.most[level] + job->reach);
 	span along[3];
 	bool plain = true;
@@ -248,8 +189,8 @@ QUERN_INLINE void look(hunt *s, uint32_t level, uint32_t i, const int dim, const
 		along[a] = span_of(g, job->periodic[a], a, job->position[a][i], width);
 		plain = plain && is_plain(&along[a], g->length[a], s->images.half[a]);
 	}
-	if (plain) look_at(s, g, along, i, dim, true, of);
-	else look_at(s, g, along, i, dim, false, of);
+	if (plain) look_at(s, level, along, i, dim, true, of);
+	else look_at(s, level, along, i, dim, false, of);
 }
 
 QUERN_INLINE void search(hunt *s, const int dim) {
