@@ -384,6 +384,7 @@ static void take_over(filling *f, uint32_t from, const quern_spot *spot, uint32_
 /* The item's grains are those from `from` on. */
 static quern_status relax(filling *f, const quern_bound *packer, uint32_t from) {
 	const quern_step *s = f->step;
+	if (f->n == from || !relaxes(f, packer)) return QUERN_OK;
 	quern_relax_job job = { .dim = f->d->dim,
 		.n = f->n - from,
 		.full = f->full + from,
@@ -391,7 +392,6 @@ static quern_status relax(filling *f, const quern_bound *packer, uint32_t from) 
 		.inside = relax_inside,
 		.gap = relax_gap,
 		.scene = f };
-	if (!relaxes(f, packer) || !job.n) return QUERN_OK;
 	memcpy(job.lower, s->lower, sizeof job.lower);
 	memcpy(job.upper, s->upper, sizeof job.upper);
 	memcpy(job.periodic, s->periodic, sizeof job.periodic);
