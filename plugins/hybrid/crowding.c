@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* crowding - how full the neighbourhood of a cell is, of both clouds and of what is owed. One cell's mass varies by a fifth
- * with the grains that happen to lie in it, so cells around it and updates before count too. docs/theory/hybrid.md, section 5 */
+/* crowding - how full the neighbourhood of a cell is, of both clouds and of what is owed, and how full the cell itself is now. The latter varies by a fifth
+ * with the grains that happen to lie there; for the former cells around it and updates before count too. docs/theory/hybrid.md, section 5 */
 #include "update.h"
 #include <math.h>
 #include <string.h>
 
 /* Of a mean, that the newest update makes. */
 static const quern_real newest = 0.1;
+/* A cell that bodies leave less of has too little in it to be measured. */
+static const quern_real least_open = 0.5;
 
-static quern_real fullness(const update *d, uint32_t block, const int32_t cell[3]) {
+static quern_real crowding_of(const update *d, uint32_t block, const int32_t cell[3]) {
 	const quern_grid_view *g = d->g;
 	quern_grid_cursor home = { .block = (int32_t)block };
 	const int depth = g->dim == 3 ? 1 : 0;
@@ -47,12 +49,13 @@ static void measure_full(const update *d) {
 }
 
 void quern_hybrid_crowding(const update *d) {
-	quern_real *crowding = d->u[U_CROWDING].real[0];
+	quern_real *crowding = d->u[U_CROWDING].real[0], *fullness = d->u[U_FULLNESS].real[0];
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
-		const quern_real now = fullness(d, c / QUERN_BLOCK_CELLS, cell);
+		const quern_real now = crowding_of(d, c / QUERN_BLOCK_CELLS, cell);
 		crowding[c] += (crowding[c] > 0 ? newest : 1) * (now - crowding[c]);
+		if (d->open[c] > least_open) fullness[c] = cell_holds(d, c) / (d->full * d->open[c]);
 	}
 	if (!(d->u[U_FULL].real[0][0] > 0)) measure_full(d);
 }

@@ -57,6 +57,8 @@
 		.doc = "Momentum that neither grains nor points carry.") \
 	X(U_CROWDING, "cell.crowding", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "What a cell and those around it hold, over what fills them, mean over the last updates.") \
+	X(U_FULLNESS, "cell.fullness", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "What a cell itself held at the last update, over what fills its open room.") \
 	X(U_FULL, "total.full", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "The mean of that in the continuum, when there first was one.") \
 	X(U_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, \

@@ -25,8 +25,9 @@ typedef struct {
 	trip_memory trip;
 	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
 	_Alignas(64) quern_real kept[3][STENCIL], mean_pressure[STENCIL];
-	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS]; /* Pa, m^3, by cell of the block */
-	fit_memory fit;                                               /* where the transfer asks for it */
+	/* by cell of the block: Pa and m^3 of its points, kg/m^3 of what it holds */
+	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], held[QUERN_BLOCK_CELLS];
+	fit_memory fit; /* where the transfer asks for it */
 } gather_memory;
 
 /* What the nodes say at the points of a chunk. */
@@ -130,16 +131,16 @@ QUERN_INLINE void move_chunk(
 	}
 }
 
-/* Of the block's cells, the one that a point is in, or the nearest to it: between sorts a point may be beyond. */
-static uint32_t cell_in_block(const gather_work *w, uint32_t b, uint32_t i) {
-	uint32_t place = 0;
+/* Of the block's cells, the one that a place (m from the grid's lower corner) is in, or the nearest to it: between sorts a point may be
+ * beyond. */
+static uint32_t cell_in_block(const gather_work *w, uint32_t b, const quern_real place[3]) {
+	uint32_t cell = 0;
 	for (uint32_t k = w->s->dim; k-- > 0;) {
-		const quern_real x = (w->s->use[GATHER_POSITION].real[k][i] - w->g->lower[k]) / w->g->cell -
-							 w->g->at[b][k] * (int32_t)w->g->edge;
+		const quern_real x = place[k] / w->g->cell - w->g->at[b][k] * (int32_t)w->g->edge;
 		const quern_real most = w->g->edge - 1;
-		place = place * w->g->edge + (uint32_t)(x > 0 ? (x < most ? x : most) : 0);
+		cell = cell * w->g->edge + (uint32_t)(x > 0 ? (x < most ? x : most) : 0);
 	}
-	return b * QUERN_BLOCK_CELLS + place;
+	return cell;
 }
 
 static quern_real pressure_of(const gather_work *w, uint32_t i) {
@@ -148,22 +149,49 @@ static quern_real pressure_of(const gather_work *w, uint32_t i) {
 	return pressure;
 }
 
-/* Of the stress-free density: a point less dense is open, its volume is the grid's. */
-static const quern_real dense = 0.98;
+/* On the grid in the middle of a cell: the mean of its corners. */
+static quern_real centre_density(const gather_work *w, const gather_memory *m, uint32_t place) {
+	const uint32_t dim = w->s->dim, edge = w->g->edge;
+	const uint32_t at[3] = { place % edge, place / edge % edge, place / edge / edge };
+	quern_real sum = 0;
+	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
+		uint32_t node = 0;
+		for (uint32_t k = dim; k-- > 0;) node = node * w->g->span + at[k] + 1 + (corner >> k & 1);
+		sum += m->tile[node][2 * dim];
+	}
+	return sum / (1u << dim);
+}
 
-/* The mean pressure of each cell's points, by volume. */
+/* Of a cell's density, what is measured in the cell itself, and not on the grid. */
+static const quern_real own_part = 0.25;
+
+/* The grid's density in the middle of a cell is smooth, but the same where full cells and empty ones take turns; what the hybrid counts in
+ * a cell is neither. */
+static quern_real density_of(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c) {
+	const quern_real *fullness = w->s->use[GATHER_FULLNESS].real[0];
+	const quern_real centre = centre_density(w, m, c),
+					 counted = fullness ? fullness[b * QUERN_BLOCK_CELLS + c] : 0;
+	return counted > 0 ? centre + own_part * (counted * w->p->density - centre) : centre;
+}
+
+/* The mean pressure of each cell's points, by volume, and the density of each cell. */
 static void level_block(const gather_work *w, gather_memory *m, uint32_t b) {
-	const quern_real *mass = w->s->use[GATHER_MASS].real[0], *volume = w->s->use[GATHER_VOLUME].real[0];
+	const quern_real *volume = w->s->use[GATHER_VOLUME].real[0];
+	quern_real *const *position = w->s->use[GATHER_POSITION].real;
 	memset(m->level, 0, sizeof m->level);
 	memset(m->room, 0, sizeof m->room);
 	for (uint32_t i = w->point[b]; i < w->point[b + 1]; i++) {
-		const uint32_t c = cell_in_block(w, b, i) - b * QUERN_BLOCK_CELLS;
-		if (mass[i] < dense * w->p->density * volume[i]) continue;
+		quern_real place[3];
+		for (uint32_t k = 0; k < w->s->dim; k++) place[k] = position[k][i] - w->g->lower[k];
+		const uint32_t c = cell_in_block(w, b, place);
 		m->level[c] += volume[i] * pressure_of(w, i);
 		m->room[c] += volume[i];
 	}
-	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++)
-		m->level[c] = m->room[c] > 0 ? m->level[c] / m->room[c] : 0;
+	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
+		const bool any = m->room[c] > 0;
+		m->level[c] = any ? m->level[c] / m->room[c] : 0;
+		m->held[c] = any ? density_of(w, m, b, c) : 0;
+	}
 }
 
 /* What a point's pressure lacks of the least one of a crowded cell. At rest no mass arrives, and a bed is denser here than there. */
@@ -177,15 +205,20 @@ static quern_real lacks_least(
 	return least > 0 && least > pressure ? fmin(1, p->answer * w->s->dt) * (least - pressure) : 0;
 }
 
-/* Points do not feel that they lie one upon the other: as material is sheared, their density goes to the grid's, a part for each
- * unit of shear. A point far denser than its cell is at a surface. Returned: by what share it grows in this step. */
-static quern_real follow_grid(const gather_work *w, const gather_memory *m, uint32_t i, quern_real rate) {
+/* Of the stress-free density: a point less dense is open, its volume is the grid's. */
+static const quern_real dense = 0.98;
+
+/* Points do not feel that they lie one upon the other: as material is sheared, their density goes to their cell's, a part for each unit of
+ * shear; if it went to the grid's at their own place it would take over that one's noise. A cell that bears nothing has no friction to lose,
+ * and a point far denser than its cell is at a surface. Returned: by what share the point's density grows in this step. */
+static quern_real follow_cell(
+	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, quern_real rate) {
 	quern_real trace = 0;
 	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
-	const quern_real own = m->density[i], off = m->grid_density[i] / own - 1,
+	const quern_real own = m->density[i], off = m->held[c] / own - 1,
 					 sheared = rate * rate / (rate * rate + shaken * trace * trace),
 					 part = w->p->follow * rate * sheared * w->s->dt;
-	if (!(rate > 0) || own < dense * w->p->density || off < -0.1) return 0;
+	if (!(rate > 0) || !(m->level[c] > 0) || own < dense * w->p->density || off < -0.1) return 0;
 	return part / (1 + part) * fmin(off, 0.1);
 }
 
@@ -196,13 +229,16 @@ static void answer_chunk(const gather_work *w, gather_memory *m, uint32_t b, uin
 	const uint32_t dim = w->s->dim;
 	const quern_real still = flowing * p->rest_rate;
 	for (uint32_t i = 0; i < n; i++) {
-		const uint32_t c = cell_in_block(w, b, begin + i);
+		quern_real before[3];
+		for (uint32_t k = 0; k < dim; k++) before[k] = m->trip.stencil.position[k][i];
+		const uint32_t c = cell_in_block(w, b, before);
 		const quern_real rate2 = calm_shear(m->gradient, i, dim), fast = rate2 / (still * still),
 						 flows = fast * fast / (1 + fast * fast);
-		const quern_real followed = flows * follow_grid(w, m, i, sqrt(rate2)),
-						 lack = flows * lacks_least(w, m, c, i, begin + i) + p->bulk * followed;
+		const quern_real followed = flows * follow_cell(w, m, c, i, sqrt(rate2)),
+						 lack = flows * lacks_least(w, m, b * QUERN_BLOCK_CELLS + c, i, begin + i) +
+								p->bulk * followed;
 		m->density[i] *= 1 + followed;
-		m->mean_pressure[i] = m->level[c - b * QUERN_BLOCK_CELLS];
+		m->mean_pressure[i] = m->level[c];
 		for (uint32_t k = 0; k < dim; k++) {
 			m->kept[k][i] = m->gradient[(dim + 1) * k][i];
 			m->gradient[(dim + 1) * k][i] -= lack / (p->bulk * w->s->dt * dim);

@@ -132,6 +132,7 @@ QUERN_USE_ENUM(WALLS_USES);
 	X(GATHER_CHANGE, "motion.change", "m/s", QUERN_READ, QUERN_VECTOR) \
 	X(GATHER_DENSITY, "motion.density", "kg/m^3", QUERN_READ, QUERN_SCALAR) \
 	X(GATHER_CROWDING, "cell.crowding", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(GATHER_FULLNESS, "cell.fullness", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(GATHER_FULL, "total.full", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
 QUERN_USE_ENUM(GATHER_USES);
 /* clang-format on */

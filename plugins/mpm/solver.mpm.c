@@ -48,7 +48,7 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, answer, "1/s", "Rate at which the pressure rises to that.", .def = 300, .max = 1e9,
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, follow, "1",
-		"In a hybrid, rate over the shear rate at which the density of points goes to the grid's; 0: it does not.",
+		"In a hybrid, rate over the shear rate at which the density of points goes to their cell's; 0: it does not.",
 		.def = 2, .max = 1e3, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rest, "1",
 		"In a hybrid, shear rate over sqrt(g/D) below which material is at rest and motion below the grid is stopped, of "
