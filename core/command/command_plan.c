@@ -4,6 +4,7 @@
 #include "config.h"
 #include "estimate.h"
 #include "options.h"
+#include "prospect.h"
 #include "run.h"
 #include "sections.h"
 #include "text.h"
@@ -109,6 +110,18 @@ static json_t *scene_stages_of(const quern_run *run) {
 	return list;
 }
 
+/* Takes two steps: what comes before it has been asked. */
+static json_t *expected_of(quern_run *run, const quern_estimate *before) {
+	const quern_prospect p = quern_prospect_of(run, before);
+	if (!p.known) return NULL;
+	json_t *all = json_pack("{s:o, s:s, s:f, s:f, s:f}", "entries", entries_of(run), "in_substeps", p.who,
+		"share", p.discrete, "cost", p.ratio, "cost_with_most_substeps", p.best);
+	json_object_set_new(all, "wide_cell", json_real(2 * p.cell));
+	json_object_set_new(all, "wide_substeps", json_integer((json_int_t)p.wide_substeps));
+	json_object_set_new(all, "cost_with_wide_cell", json_real(p.wide));
+	return all;
+}
+
 static json_t *whole(quern_run *run) {
 	const quern_general *g = &run->scene->general;
 	json_t *root = json_object();
@@ -126,13 +139,19 @@ static json_t *whole(quern_run *run) {
 	json_object_set_new(root, "step_limit", number(e.hard));
 	json_object_set_new(root, "step_limit_set_by", json_string(e.hard_reason));
 	json_object_set_new(root, "substeps", json_integer((json_int_t)e.substeps));
-	if (e.most_substeps > 0)
+	if (e.most_substeps > 0) {
 		json_object_set_new(root, "most_substeps", json_integer((json_int_t)e.most_substeps));
+		char why[480];
+		snprintf(why, sizeof why, "%.4g s, set by %s, over %.4g s, set by %s", e.own.step, e.own.step_reason,
+			e.own.substep, e.own.substep_reason);
+		json_object_set_new(root, "most_substeps_set_by", json_string(why));
+	}
 	json_object_set_new(root, "steps", number(e.steps));
 	json_object_set_new(root, "settling_steps", number(e.settle_steps));
 	json_object_set_new(root, "estimated_core_seconds", number(e.running));
 	json_object_set_new(root, "estimated_settling_core_seconds", number(e.settling));
 	json_object_set_new(root, "bytes", json_integer((json_int_t)quern_store_bytes(&run->plan->store)));
+	json_object_set_new(root, "expected", expected_of(run, &e)); /* NULL sets nothing */
 	return root;
 }
 
@@ -197,12 +216,31 @@ static void print_scene_stages(json_t *list) {
 /* Fewer substeps than there is room for cost more long steps than needed; more make the short ones shorter than needed. */
 static void print_substeps(const json_t *root) {
 	const double n = number_of(root, "substeps"), most = number_of(root, "most_substeps");
+	if (most > 0)
+		printf("room for %.0f substeps: a step of %s\n", most, text_of(root, "most_substeps_set_by"));
 	if (most > 0 && n != most)
 		printf(
 			n < most
 				? "%.0f substeps would fit into a step\n"
 				: "no more than %.0f substeps fit into a step, so that these are shorter than they need to be\n",
 			most);
+}
+
+/* Of solvers that hand work to each other: what the first steps have shown. */
+static void print_expected(const json_t *root) {
+	const json_t *e = json_object_get(root, "expected");
+	const char *name;
+	json_t *n;
+	if (!e) return;
+	printf("expected once it runs:");
+	json_object_foreach(json_object_get(e, "entries"), name, n)
+		printf(" %s %.0f,", name, json_number_value(n));
+	printf(" %s carry %.0f %% of the mass\n", text_of(e, "in_substeps"), 100 * number_of(e, "share"));
+	printf("cost over %s alone: about %.2f; with %.0f substeps %.2f, and with cells of %.4g m and %.0f "
+		   "substeps %.2f\n",
+		text_of(e, "in_substeps"), number_of(e, "cost"), number_of(root, "most_substeps"),
+		number_of(e, "cost_with_most_substeps"), number_of(e, "wide_cell"), number_of(e, "wide_substeps"),
+		number_of(e, "cost_with_wide_cell"));
 }
 
 static void print(json_t *root) {
@@ -233,6 +271,7 @@ static void print(json_t *root) {
 	printf("%.0f steps of %.0f substeps, %s on one core\n", number_of(root, "steps"),
 		number_of(root, "substeps"), running);
 	print_substeps(root);
+	print_expected(root);
 }
 
 static quern_status check_step(quern_run *run) {
@@ -267,8 +306,8 @@ static int plan_scene(int argc, char **argv) {
 		quern_run_complain(run, stderr);
 		status = run->status == QUERN_E_PARAM ? QUERN_EXIT_SCENE : QUERN_EXIT_FAILED;
 	} else {
-		json_t *root = whole(run);
 		warn_of_length(run);
+		json_t *root = whole(run);
 		if (json) json_dumpf(root, stdout, JSON_INDENT(2) | JSON_PRESERVE_ORDER), puts("");
 		else print(root);
 		json_decref(root);

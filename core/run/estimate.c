@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "estimate.h"
+#include "watch.h"
 #include "wishes.h"
 #include <math.h>
 #include <stdio.h>
@@ -7,26 +8,46 @@
 
 static const double day = 86400;
 
-/* s on one core for one step of all entries that are counted, by the rough prices in the tables of their solvers: in
- * substeps, or else in whole steps. */
-static double price(const quern_run *run, bool substeps) {
+static double entries(quern_run *run, const quern_section *section) {
+	double sum = 0;
+	for (const quern_set *set = section->ops->sets; set->name; set++)
+		if (set->counted)
+			sum += set->cost[run->scene->general.dimension - 2] * quern_host_table.set(run, set->name).n;
+	return sum;
+}
+
+static double work(quern_run *run, const quern_section *section, uint32_t n, double wider) {
+	if (!section->ops->work) return 0;
+	quern_step step = quern_run_record(run, section);
+	step.n_substeps = n;
+	quern_watch_enter(section->solver->file->plugin.id, "work");
+	const double sum = section->ops->work(section->solver->self, &step, wider);
+	quern_watch_leave();
+	return sum;
+}
+
+/* What moves on the grid is so dense in cells, whatever their width; what takes substeps does not mind them. */
+double quern_estimate_price(quern_run *run, bool substeps, uint32_t n, double wider) {
+	const double fewer =
+		run->scene->general.dimension == 2 ? 1 / (wider * wider) : 1 / (wider * wider * wider);
 	double sum = 0;
 	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
 		const quern_section *section = &run->plan->scene->sections[i];
-		if (quern_section_takes_substeps(section) != substeps) continue;
-		for (const quern_set *set = section->ops->sets; set->name; set++)
-			if (set->counted)
-				sum += set->cost[run->scene->general.dimension - 2] *
-					   quern_host_table.set((quern_run *)(uintptr_t)run, set->name).n;
+		if (substeps == quern_section_takes_substeps(section))
+			sum += entries(run, section) * (substeps ? 1 : fewer);
+		if (!substeps) sum += work(run, section, n, wider);
 	}
 	return sum;
 }
 
 quern_estimate quern_estimate_of(quern_run *run) {
 	const quern_general *g = &run->scene->general;
-	const double substep = price(run, true), step = price(run, false);
-	quern_estimate e = { .substeps = quern_wish_substeps(run->plan->scene) };
-	e.most_substeps = quern_run_most_substeps(run);
+	const uint32_t n = quern_wish_substeps(run->plan->scene);
+	const double substep = quern_estimate_price(run, true, n, 1),
+				 step = quern_estimate_price(run, false, n, 1);
+	quern_estimate e = { .substeps = n };
+	e.own = quern_run_own_steps(run);
+	e.most_substeps = quern_run_most_substeps(&e.own);
 	const double limit = quern_run_limit(run, &e.hard, e.reason, e.hard_reason);
 	e.step = g->step > 0 ? g->step : limit;
 	if (g->step > 0) snprintf(e.reason, sizeof e.reason, "the scene's time.step");

@@ -10,6 +10,7 @@
 /* Without a log, as in `plan`, a warning goes to the terminal all the same. */
 static void host_log(quern_run *run, int level, const char *fmt, ...) {
 	va_list list;
+	if (run->mute) return;
 	va_start(list, fmt);
 	if (run->log) quern_log_addv(run->log, level, fmt, list);
 	else if (level >= 2) {

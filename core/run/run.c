@@ -270,19 +270,27 @@ double quern_run_limit(quern_run *run, double *hard, char reason[200], char hard
 	return least;
 }
 
-uint32_t quern_run_most_substeps(quern_run *run) {
-	double short_step = INFINITY, long_step = INFINITY;
+quern_own_steps quern_run_own_steps(quern_run *run) {
+	quern_own_steps own = { .substep = INFINITY, .step = INFINITY };
 	for (size_t i = 0; i < run->plan->scene->n_sections; i++) {
 		const quern_section *s = &run->plan->scene->sections[i];
 		if (!s->ops->limit) continue;
 		quern_step step = quern_run_record(run, s);
 		step.settling = false;
+		const bool substeps = quern_section_takes_substeps(s);
+		double *least = substeps ? &own.substep : &own.step, beyond = INFINITY;
 		char why[160] = "";
-		double beyond = INFINITY, *least = quern_section_takes_substeps(s) ? &short_step : &long_step;
-		*least = fmin(*least, limit_of(s, &step, &beyond, why));
+		const double limit = limit_of(s, &step, &beyond, why);
+		if (!(limit < *least)) continue;
+		*least = limit;
+		memcpy(substeps ? own.substep_reason : own.step_reason, why, sizeof why);
 	}
-	if (!isfinite(short_step) || !isfinite(long_step) || !(short_step > 0)) return 0;
-	return (uint32_t)fmin(fmax(floor(long_step / short_step * (1 + 1e-9)), 1), 1e9);
+	return own;
+}
+
+uint32_t quern_run_most_substeps(const quern_own_steps *own) {
+	if (!isfinite(own->substep) || !isfinite(own->step) || !(own->substep > 0)) return 0;
+	return (uint32_t)fmin(fmax(floor(own->step / own->substep * (1 + 1e-9)), 1), 1e9);
 }
 
 quern_status quern_run_check_step(quern_run *run, double hard, const char *hard_reason, double recommended) {

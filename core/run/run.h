@@ -54,6 +54,7 @@ struct quern_run {
 	struct quern_held *held; /* by section: the file that it starts from, see start.h; NULL: none is held */
 	bool *
 		taken; /* by field: it holds what another run's state had of it; NULL: none does, or the set-up is over */
+	bool mute;      /* what is tried is not told */
 	char *replaced; /* plugins that took the place of others on the way, a line each; NULL: none */
 };
 
@@ -118,9 +119,14 @@ bool quern_run_accept(quern_run *, quern_text *why);
 quern_status quern_run_check_account(quern_run *);
 /* The smallest recommended long step, the smallest hard limit and what sets the first. */
 double quern_run_limit(quern_run *, double *hard, char reason[200], char hard_reason[200]);
-/* The most substeps of their own recommended length that fit into a long step of those who take none, at least 1; 0: there are
- * not both. */
-uint32_t quern_run_most_substeps(quern_run *);
+/* What those who take substeps and those who take none recommend for their own steps, each alone. */
+typedef struct quern_own_steps {
+	double substep, step; /* s; INFINITY: there is nobody, or nothing limits it */
+	char substep_reason[160], step_reason[160];
+} quern_own_steps;
+quern_own_steps quern_run_own_steps(quern_run *);
+/* The most of the one that fit into one of the other, at least 1; 0: there are not both. */
+uint32_t quern_run_most_substeps(const quern_own_steps *);
 bool quern_section_takes_substeps(const quern_section *);
 /* Ends the run: keeps the first message. */
 quern_status quern_run_stop(quern_run *, quern_status, const char *fmt, ...)

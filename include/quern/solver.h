@@ -179,6 +179,9 @@ typedef struct quern_solver_ops {
 	/* [stage] since 2.1: one number for each of `looks`, now and then between two steps, for a line on the terminal and
 	 * progress.json; a number that means nothing now is NaN. Nothing depends on them. Uses are those of the first stage */
 	void (*look)(const void *self, const quern_step *, quern_real *out);
+	/* [stage] since 2.1: s that a long step of this solver takes on one core, about, beside what the prices of its sets' entries say: work
+	 * on the grid, or on the entries of others. `wider`: as if cells were so many times as wide. For estimates; may be NULL */
+	quern_real (*work)(const void *self, const quern_step *, quern_real wider);
 } quern_solver_ops;
 
 #define QUERN_SOLVER_SIZES                                                                                   \
@@ -191,7 +194,7 @@ QUERN_KIND(solver, quern_solver_ops, "Sets of entities, and stages that move the
 	QUERN_OPTIONALLY(quern_solver_ops, substeps), QUERN_OPTIONALLY(quern_solver_ops, settled),
 	QUERN_OPTIONALLY(quern_solver_ops, account), QUERN_OPTIONALLY(quern_solver_ops, settling),
 	QUERN_OPTIONALLY(quern_solver_ops, cell), QUERN_OPTIONALLY(quern_solver_ops, accept),
-	QUERN_OPTIONALLY(quern_solver_ops, look));
+	QUERN_OPTIONALLY(quern_solver_ops, look), QUERN_OPTIONALLY(quern_solver_ops, work));
 
 #ifdef __cplusplus
 }

@@ -52,6 +52,8 @@ quern_status quern_hybrid_grow(const void *self, const quern_step *);
 quern_status quern_hybrid_audit(const void *self, const quern_step *);
 /* Rows of the audit: J that grains and points have in their springs and in turning, an upper bound. */
 quern_real quern_hybrid_held(const quern_step *);
+/* s that coupling and books take in a long step on one core, about: see quern_solver_ops.work. */
+quern_real quern_hybrid_work(const void *self, const quern_step *, quern_real wider);
 /* Rows of the audit: from now on motion is judged by what there is now. */
 void quern_hybrid_begin_gain(const quern_step *, quern_real kinetic);
 /* Rows of the audit: ends the run if grains and points, which carry so much mass, move with more energy than there was,

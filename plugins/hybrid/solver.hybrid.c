@@ -230,7 +230,8 @@ static const char *const needs[] = { "grains", "continuum", NULL }, *const with[
 
 static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "hybrid", .needs = needs, .with = with,
 	.after = with, .sets = sets, .slots = slots, .stages = stages, .sums = sums, .ready = ready,
-	.substeps = substeps, .account = account, .looks = looks, .look = quern_hybrid_look };
+	.substeps = substeps, .account = account, .looks = looks, .look = quern_hybrid_look,
+	.work = quern_hybrid_work };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,

@@ -17,6 +17,7 @@ DOCUMENTED = {
     "run/account.c": {"mass"},
     "check/check_scene.c": {"mass"},
     "run/run.c": {"mass"},
+    "run/prospect.c": {"mass"},
     "output/frame.c": {".position"},  # the first dataset of a group, by which programs place the others
     "store/field.c": {"cells"},  # the group of the host's own set "cell"
 }
