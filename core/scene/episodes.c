@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "episodes.h"
+#include "param.h"
 #include "text.h"
 #include <math.h>
 #include <stdlib.h>
@@ -16,10 +17,30 @@ static bool is_fixed(const char *path) {
 	return quern_same_head(quern_observe_slot.name, path);
 }
 
+/* A word in place of a number of a solver's own stands for what was published before the run, in all stages. */
+static void keep_numbers(quern_scene *s, quern_tree *tree) {
+	for (size_t i = 0; i < s->n_sections; i++) {
+		const quern_section *section = &s->sections[i];
+		const quern_param *row = section->solver->file->params;
+		for (; section->node->kind == QUERN_NODE_MAP && row && row->name; row++) {
+			const quern_node *node =
+				row->type == QUERN_T_INT && row->text ? quern_node_find(section->node, row->name) : NULL;
+			if (!node || node->kind != QUERN_NODE_SCALAR || !quern_is_name(node->text)) continue;
+			char *path = quern_format("%s.%s", section->name, row->name),
+				 *text = quern_format("%.0f", quern_param_number(row, section->solver->self));
+			const quern_node number = { .kind = QUERN_NODE_SCALAR, .mark = node->mark, .text = text };
+			quern_tree_replace(tree, path, &number, node->mark, s->report);
+			free(path);
+			free(text);
+		}
+	}
+}
+
 /* The scene with other values; NULL after a sentence. Its marks are those of the old one. */
 static quern_scene *vary(quern_scene *s, const quern_node *set) {
 	quern_tree *tree = quern_tree_copy(s->tree);
 	const size_t before = quern_report_errors(s->report);
+	keep_numbers(s, tree);
 	for (size_t i = 0; i < set->n; i++) {
 		const quern_entry *e = &set->entries[i];
 		if (is_fixed(e->key))

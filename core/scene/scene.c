@@ -134,6 +134,7 @@ static void publish_scene(quern_scene *s) {
 	quern_scene_publish(&setup, "scene.gravity", "m/s^2", gravity);
 	quern_scene_publish(&setup, "scene.height", "m", size);
 	quern_scene_publish(&setup, "scene.speed", "m/s", sqrt(2 * gravity * size));
+	if (g->step > 0) quern_scene_publish(&setup, "scene.step", "s", g->step);
 }
 
 static void read_periodic(quern_scene *s, const quern_node *domain) {

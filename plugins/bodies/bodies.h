@@ -75,6 +75,20 @@ static inline quern_real quern_bodies_speed(
 	return most;
 }
 
+/* A step at t = 0 as far as the set-up knows it, for what looks at slots, gravity and domain alone. */
+static inline quern_step quern_bodies_before(
+	const quern_setup *setup, const quern_bound *const *slot, const uint32_t *n_slot) {
+	quern_step s = {
+		.dim = setup->dim, .slot = slot, .n_slot = n_slot, .host = setup->host, .stage_step = -1
+	};
+	for (uint32_t k = 0; k < 3; k++) {
+		s.gravity[k] = setup->gravity[k];
+		s.lower[k] = setup->lower[k], s.upper[k] = setup->upper[k];
+		s.periodic[k] = setup->periodic[k];
+	}
+	return s;
+}
+
 /* Whether any body of a slot ever moves. */
 static inline bool quern_bodies_move(const quern_bound *body, uint32_t n) {
 	for (uint32_t b = 0; b < n; b++)

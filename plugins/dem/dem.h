@@ -151,6 +151,9 @@ void quern_dem_look_at_run(const void *self, const quern_step *, quern_real *out
 bool quern_dem_settled(const void *self, const quern_step *);
 quern_real quern_dem_settling(const void *self, const quern_step *);
 quern_real quern_dem_limit(const void *self, const quern_step *, quern_real *hard, char reason[160]);
+/* s, the recommended step before there are grains, from parameters alone: of the lightest grains that the materials in the bits of
+ * `expected` may bring. The step's slots, gravity and domain are looked at, and no set. INFINITY: no law limits it. */
+quern_real quern_dem_expected_step(const dem *, const quern_step *, uint64_t expected);
 
 /* ---- grain_file.c ---- */
 typedef struct grain_table {

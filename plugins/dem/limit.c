@@ -157,12 +157,10 @@ static void find_limits(
 		}
 }
 
-quern_real quern_dem_limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
-	const dem *d = self;
+static quern_real limit_of_lightest(
+	const dem *d, const quern_step *s, const lightest *l, quern_real *hard, char reason[160]) {
 	contact_limit fast = { .period = INFINITY, .hard = INFINITY }, first = fast;
-	lightest l[MOST_MATERIALS];
 	quern_real least = INFINITY;
-	lightest_grains(d, s, l);
 	find_limits(d, s, l, &fast, &first);
 	for (uint32_t k = 0; k < d->n_materials; k++) least = fmin(least, l[k].radius);
 	*hard = first.hard;
@@ -176,4 +174,21 @@ quern_real quern_dem_limit(const void *self, const quern_step *s, quern_real *ha
 	if (!(0.1 * least < speed * chosen)) return chosen;
 	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, least);
 	return 0.1 * least / speed;
+}
+
+quern_real quern_dem_limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
+	lightest l[MOST_MATERIALS];
+	lightest_grains(self, s, l);
+	return limit_of_lightest(self, s, l, hard, reason);
+}
+
+quern_real quern_dem_expected_step(const dem *d, const quern_step *s, uint64_t expected) {
+	lightest l[MOST_MATERIALS];
+	quern_real hard;
+	char reason[160];
+	for (uint32_t k = 0; k < d->n_materials; k++) {
+		l[k] = (lightest) { .mass = { INFINITY, INFINITY }, .radius = INFINITY, .fixed = d->fixed };
+		if (expected >> k & 1) expect(d, &l[k], k);
+	}
+	return limit_of_lightest(d, s, l, &hard, reason);
 }

@@ -437,6 +437,17 @@ static void publish_packing(const dem *d, const quern_setup *setup, const quern_
 	setup->host->publish(setup, "grain.critical_density", "kg/m^3", (packing - 0.03) * density);
 }
 
+/* For who counts these steps before there are grains, and a word for that who lets them be counted. */
+static void publish_step(
+	const dem *d, const quern_setup *setup, const quern_bound *const *slot, const uint32_t *n_slot) {
+	const quern_step s = quern_bodies_before(setup, slot, n_slot);
+	uint64_t expected = 0;
+	for (uint32_t k = 0; k < d->n_materials; k++) expected |= (uint64_t)is_in_bed(d, k) << k;
+	const quern_real step = quern_dem_expected_step(d, &s, expected ? expected : UINT64_MAX);
+	if (isfinite(step)) setup->host->publish(setup, "grain.step", "s", step);
+	setup->host->publish(setup, "substeps.auto", "1", 0);
+}
+
 static quern_status check_above(const dem *d, const quern_setup *setup, uint32_t n_bodies, quern_err *err) {
 	const dem_fill *fill = d->fill.items;
 	quern_status status = QUERN_OK;
@@ -470,6 +481,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	}
 	find_sinking(d, setup, law, n_slot[SLOT_CONTACT]);
 	publish_packing(d, setup, law, n_slot[SLOT_CONTACT]);
+	publish_step(d, setup, slot, n_slot);
 	return QUERN_OK;
 }
 

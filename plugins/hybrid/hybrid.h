@@ -17,6 +17,8 @@
 typedef struct hybrid {
 	int32_t substeps, update, samples, average, growth; /* from the scene */
 	quern_real hysteresis, gain;
+	quern_real step, grain_step,
+		continuum_step; /* s, published, for `substeps: auto`; NaN: unknown, or counted already */
 	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
@@ -50,10 +52,10 @@ quern_status quern_hybrid_couple(const void *self, const quern_step *);
 quern_status quern_hybrid_back(const void *self, const quern_step *);
 quern_status quern_hybrid_grow(const void *self, const quern_step *);
 quern_status quern_hybrid_audit(const void *self, const quern_step *);
-/* Rows of the audit: J that grains and points have in their springs and in turning, an upper bound. */
-quern_real quern_hybrid_held(const quern_step *);
 /* s that coupling and books take in a long step on one core, about: see quern_solver_ops.work. */
 quern_real quern_hybrid_work(const void *self, const quern_step *, quern_real wider);
+/* Rows of the audit: J that grains and points have in their springs and in turning, an upper bound. */
+quern_real quern_hybrid_held(const quern_step *);
 /* Rows of the audit: from now on motion is judged by what there is now. */
 void quern_hybrid_begin_gain(const quern_step *, quern_real kinetic);
 /* Rows of the audit: ends the run if grains and points, which carry so much mass, move with more energy than there was,

@@ -2,11 +2,15 @@
 /* solver.hybrid - who is where: zones, conversions, the coupling of grains and continuum. docs/theory/hybrid.md */
 #include "../common/outlets.h"
 #include "hybrid.h"
+#include <math.h>
 
 static const char *const weightings[] = { "half", "ramp", NULL };
-static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
-										  "Grain steps per step of the continuum.", .def = 10, .min = 1,
-										  .max = 10000),
+enum { MOST_SUBSTEPS = 10000 };
+static const quern_param params[] = {
+	QUERN_PARAM(hybrid, substeps, "1",
+		"Grain steps per step of the continuum; auto: as many as fit into one, chosen "
+		"once before the run. scene.yaml has the number.",
+		.text = "substeps", .def = 10, .min = 1, .max = MOST_SUBSTEPS),
 	QUERN_PARAM(
 		hybrid, update, "1", "Grain steps between updates of the zones.", .def = 400, .min = 1, .max = 1e9),
 	QUERN_PARAM(hybrid, samples, "1", "Samples of the contact stress between updates.", .def = 8, .min = 1,
@@ -44,6 +48,12 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(
 		hybrid, solves, NULL, "The coupling sees all nodes at once; set by itself.", .flags = QUERN_ADVANCED),
+	QUERN_PARAM_AS(hybrid, step, "time_step", "s", "The scene's own long step, if it gives one.",
+		.from = "scene.step", .max = 1e12, .flags = QUERN_MAYBE | QUERN_MIN_OPEN | QUERN_ADVANCED),
+	QUERN_PARAM_AS(hybrid, grain_step, "grain.step", "s", "Recommended step of the grains.",
+		.from = "grain.step", .max = 1e12, .flags = QUERN_MAYBE | QUERN_MIN_OPEN | QUERN_ADVANCED),
+	QUERN_PARAM_AS(hybrid, continuum_step, "continuum.step", "s", "Recommended step of the continuum.",
+		.from = "continuum.step", .max = 1e12, .flags = QUERN_MAYBE | QUERN_MIN_OPEN | QUERN_ADVANCED),
 	QUERN_PARAM_AS(hybrid, diameter, "grain.diameter", "m", "Mean diameter of grains that are placed.",
 		.from = "grain.diameter", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, radii.spread, "grain.spread", "1", "Spread of their radii.",
@@ -63,7 +73,8 @@ static const quern_param params[] = { QUERN_PARAM(hybrid, substeps, "1",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(hybrid, pourings, "grain.sources", "1", "How many sources of grains there are.",
 		.from = "grain.sources", .max = 1e9, .flags = QUERN_ADVANCED),
-	QUERN_END_PARAMS };
+	QUERN_END_PARAMS
+};
 static const quern_use uses[] = { QUERN_END_USES };
 
 static const quern_set sets[] = { { .name = "mixture", .doc = "What grains bring to the nodes.", .rows = 8 },
@@ -154,8 +165,25 @@ static const quern_stage stages[] = { { .name = "hybrid.update",
 		.run = quern_hybrid_audit },
 	{ .name = NULL } };
 
+/* `auto`: as many of the grains' recommended steps as fit into the continuum's, so that neither is shorter than it need be, and into a
+ * long step that the scene gives as many as leave none of them longer. docs/theory/hybrid.md, section 7 */
+static quern_status choose_substeps(hybrid *h, const quern_setup *setup, quern_err *err) {
+	if (setup->later)
+		return setup->host->fail(err, QUERN_E_PARAM, "substeps",
+			"auto is chosen once, before the run: a stage keeps that number, or gives one of its own");
+	if (isnan(h->grain_step) || isnan(h->continuum_step))
+		return setup->host->fail(err, QUERN_E_PARAM, "substeps",
+			"auto has nothing to count: no contact law of the grains limits their step; give a number");
+	const quern_real slack = 1e-9, n = isnan(h->step) ? floor(h->continuum_step / h->grain_step * (1 + slack))
+													  : ceil(h->step / h->grain_step * (1 - slack));
+	h->substeps = n < 1 ? 1 : n < MOST_SUBSTEPS ? (int32_t)n : MOST_SUBSTEPS;
+	return QUERN_OK;
+}
+
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	hybrid *h = self;
+	if (!h->substeps && choose_substeps(h, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	h->step = h->grain_step = h->continuum_step = NAN; /* what is made anew is not kept in scene.yaml */
 	if (h->oracle_cells == 3)
 		return setup->host->fail(err, QUERN_E_PARAM, "oracle_cells",
 			"must be 1, 2 or 4, as many as go into the side of a block of cells");

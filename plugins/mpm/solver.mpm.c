@@ -279,6 +279,29 @@ static quern_status find_rough(mpm *p, const quern_setup *setup, const quern_bou
 	return QUERN_OK;
 }
 
+static const quern_real recommended = 0.9; /* of the longest stable step */
+
+/* m/s, of bodies from t = s->time on and of what sources pour. */
+static quern_real fastest_given(const mpm *p, const quern_step *s) {
+	quern_real square = 0;
+	for (uint32_t i = 0; i < p->source.n && p->sources; i++) {
+		const quern_real *v = quern_source_at(&p->source, i)->velocity;
+		const quern_real v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+		square = v2 > square ? v2 : square;
+	}
+	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY), poured = sqrt(square);
+	return bodies > poured ? bodies : poured;
+}
+
+/* 1/s, of stress waves: omega^2 = chi max(d K, 2 G)/rho for any arrangement of points. */
+static quern_real frequency(const mpm *p) {
+	const quern_real modulus = p->dim * p->bulk > 2 * p->shear ? p->dim * p->bulk : 2 * p->shear;
+	return sqrt(p->stiffness * modulus / p->density) / p->cell;
+}
+
+/* 1/s; with advection dt (omega/2 + |v|/h) < 1. */
+static quern_real rate_at(const mpm *p, quern_real fastest) { return 0.5 * frequency(p) + fastest / p->cell; }
+
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	mpm *p = self;
@@ -310,10 +333,11 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 		return QUERN_E_PARAM;
 	setup->host->publish(setup, "continuum.density", "kg/m^3", p->density);
 	setup->host->publish(setup, "continuum.bulk_modulus", "Pa", p->bulk);
+	const quern_step before = quern_bodies_before(setup, slot, n_slot);
+	setup->host->publish(setup, "continuum.step", "s", recommended / rate_at(p, fastest_given(p, &before)));
 	return QUERN_OK;
 }
 
-/* omega^2 = chi max(d K, 2 G)/rho for any arrangement of points; with advection dt (omega/2 + |v|/h) < 1. */
 static quern_real limit(const void *self, const quern_step *s, quern_real *hard, char reason[160]) {
 	const mpm *p = self;
 	const uint32_t n = s->host->set(s->run, "point").n;
@@ -322,21 +346,14 @@ static quern_real limit(const void *self, const quern_step *s, quern_real *hard,
 		const quern_real v2 = cloud_square(&s->use[FILL_VELOCITY], i, s->dim);
 		fastest = v2 > fastest ? v2 : fastest;
 	}
-	const quern_real bodies = quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY);
-	for (uint32_t i = 0; i < p->source.n && p->sources; i++) {
-		const quern_real *v = quern_source_at(&p->source, i)->velocity;
-		const quern_real v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-		fastest = v2 > fastest ? v2 : fastest;
-	}
+	const quern_real given = fastest_given(p, s);
 	fastest = sqrt(fastest);
-	fastest = bodies > fastest ? bodies : fastest;
-	const quern_real modulus = s->dim * p->bulk > 2 * p->shear ? s->dim * p->bulk : 2 * p->shear;
-	const quern_real omega = sqrt(p->stiffness * modulus / p->density) / p->cell;
-	const quern_real rate = 0.5 * omega + fastest / p->cell;
+	fastest = given > fastest ? given : fastest;
+	const quern_real rate = rate_at(p, fastest);
 	snprintf(reason, 160, "stress waves of %s in cells of %.3g m%s", s->slot[SLOT_MATERIAL][0].id, p->cell,
-		fastest > 0.5 * omega * p->cell ? " and the speed of points or bodies" : "");
+		fastest > 0.5 * frequency(p) * p->cell ? " and the speed of points or bodies" : "");
 	*hard = 1 / rate;
-	return 0.9 / rate;
+	return recommended / rate;
 }
 
 enum { SUM_ELASTIC = SUM_OWN, SUM_LEFT, SUM_POURED };
