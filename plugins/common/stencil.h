@@ -67,54 +67,92 @@ QUERN_INLINE bool stencil_holds(const quern_grid_view *g, uint32_t block, uint32
 	return t >= -0.5 && t <= (quern_real)g->edge + 0.5;
 }
 
+/* ---- rows in parts ---- */
+
+/* A row as the processor takes it in one go: a compiler that has to cut rows by itself passes each factor through memory, and waits for it. */
+#if defined __AVX512F__
+enum { PARTS = 1 };
+#elif defined __AVX__
+enum { PARTS = 2 };
+#else
+enum { PARTS = 4 };
+#endif
+enum { PART_LANES = QUERN_LANES / PARTS };
+typedef quern_real row_part __attribute__((vector_size(PART_LANES * sizeof(quern_real)), may_alias));
+typedef struct parted_row {
+	row_part part[PARTS];
+} parted_row;
+
+QUERN_INLINE row_part *parts_of(quern_row *row) { return (row_part *)(void *)row; }
+QUERN_INLINE const row_part *const_parts_of(const quern_row *row) {
+	return (const row_part *)(const void *)row;
+}
+/* Lanes in a list are put together in registers; one after the other they are not. */
+QUERN_INLINE parted_row parted(const quern_real l[QUERN_LANES]) {
+#if defined __AVX512F__
+	return (parted_row) { { { l[0], l[1], l[2], l[3], l[4], l[5], l[6], l[7] } } };
+#elif defined __AVX__
+	return (parted_row) { { { l[0], l[1], l[2], l[3] }, { l[4], l[5], l[6], l[7] } } };
+#else
+	return (parted_row) { { { l[0], l[1] }, { l[2], l[3] }, { l[4], l[5] }, { l[6], l[7] } } };
+#endif
+}
+#define PARTED(...) parted((const quern_real[QUERN_LANES]) { __VA_ARGS__ })
+
 /* What a particle sends: `base` to every node; `along` per metre of way from the particle to the node (a velocity
  * gradient); `slope` per unit of the function's slope (a stress). Lanes that `along` and `slope` use must differ. */
 typedef struct sent {
-	quern_row base, along[3], slope[3];
+	parted_row base, along[3], slope[3];
 } sent;
 
-/* Adds one particle to the tile. `split` holds 1 in the lanes of `slope`, 0 elsewhere. */
-QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, const quern_row *split_lanes,
-	quern_row *tile, const int dim, quern_real cell, int32_t span) {
-	const quern_row split = *split_lanes, rest = 1 - split;
-	quern_real way[3][3];
-	for (int a = 0; a < dim; a++)
-		for (int k = 0; k < 3; k++) way[a][k] = (quern_real)(s->first[a][i] + k) * cell - s->position[a][i];
+QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent *p,
+	const quern_row *split_lanes, quern_row *tile, const int dim, quern_real way[3][3], int32_t span,
+	const int k) {
+	const row_part split = const_parts_of(split_lanes)[k], rest = 1 - split;
 	for (int z = 0; z < (dim == 3 ? 3 : 1); z++) {
-		quern_row u = p->base, ax = p->along[0] + p->slope[0], ay = p->along[1], sy = p->slope[1];
+		row_part u = p->base.part[k], ax = p->along[0].part[k] + p->slope[0].part[k],
+				 ay = p->along[1].part[k], sy = p->slope[1].part[k];
 		if (dim == 3) {
 			const quern_real v = s->value[2][z][i];
-			u = v * (u + way[2][z] * p->along[2]) + s->slope[2][z][i] * p->slope[2];
+			u = v * (u + way[2][z] * p->along[2].part[k]) + s->slope[2][z][i] * p->slope[2].part[k];
 			ax = v * ax;
 			ay = v * ay;
 			sy = v * sy;
 		}
 		for (int y = 0; y < 3; y++) {
 			const quern_real v = s->value[1][y][i];
-			const quern_row e = v * (u + way[1][y] * ay) + s->slope[1][y][i] * sy, t = v * ax;
+			const row_part e = v * (u + way[1][y] * ay) + s->slope[1][y][i] * sy, t = v * ax;
 			quern_row *row = tile + s->node[i] + (z * span + y) * span;
 			for (int x = 0; x < 3; x++) {
 				const quern_real w = s->value[0][x][i];
-				row[x] += w * e + (w * way[0][x] * rest + s->slope[0][x][i] * split) * t;
+				parts_of(row + x)[k] += w * e + (w * way[0][x] * rest + s->slope[0][x][i] * split) * t;
 			}
 		}
 	}
 }
 
-/* The weighted sum of a tile's rows at one particle in out[0]; with `slopes`, in out[1 + axis] their sums with what
- * `slope` has in place of the weights along that axis. */
-QUERN_INLINE void stencil_gather_by(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
-	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4], int32_t span) {
-	quern_row sum = { 0 }, sx = { 0 }, sy = { 0 }, sz = { 0 };
+/* Adds one particle to the tile. `split` holds 1 in the lanes of `slope`, 0 elsewhere. */
+QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, const quern_row *split,
+	quern_row *tile, const int dim, quern_real cell, int32_t span) {
+	quern_real way[3][3] = { { 0 } };
+	for (int a = 0; a < dim; a++)
+		for (int k = 0; k < 3; k++) way[a][k] = (quern_real)(s->first[a][i] + k) * cell - s->position[a][i];
+	for (int k = 0; k < PARTS; k++) stencil_scatter_part(s, i, p, split, tile, dim, way, span, k);
+}
+
+QUERN_INLINE void stencil_gather_part(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
+	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4], int32_t span, const int k) {
+	row_part sum = { 0 }, sx = { 0 }, sy = { 0 }, sz = { 0 };
 	for (int z = 0; z < (dim == 3 ? 3 : 1); z++) {
-		quern_row u = { 0 }, ux = { 0 }, uy = { 0 };
+		row_part u = { 0 }, ux = { 0 }, uy = { 0 };
 		for (int y = 0; y < 3; y++) {
 			const quern_row *row = tile + s->node[i] + (z * span + y) * span;
-			const quern_row e =
-				s->value[0][0][i] * row[0] + s->value[0][1][i] * row[1] + s->value[0][2][i] * row[2];
+			const row_part a = const_parts_of(row)[k], b = const_parts_of(row + 1)[k],
+						   c = const_parts_of(row + 2)[k];
+			const row_part e = s->value[0][0][i] * a + s->value[0][1][i] * b + s->value[0][2][i] * c;
 			u += s->value[1][y][i] * e;
 			if (!slopes) continue;
-			const quern_row d = slope[0][0][i] * row[0] + slope[0][1][i] * row[1] + slope[0][2][i] * row[2];
+			const row_part d = slope[0][0][i] * a + slope[0][1][i] * b + slope[0][2][i] * c;
 			ux += s->value[1][y][i] * d;
 			uy += slope[1][y][i] * e;
 		}
@@ -124,8 +162,15 @@ QUERN_INLINE void stencil_gather_by(const stencil *s, uint32_t i, const quern_ro
 		sy += v * uy;
 		if (dim == 3) sz += slope[2][z][i] * u;
 	}
-	out[0] = sum;
-	if (slopes) out[1] = sx, out[2] = sy, out[3] = sz;
+	parts_of(&out[0])[k] = sum;
+	if (slopes) parts_of(&out[1])[k] = sx, parts_of(&out[2])[k] = sy, parts_of(&out[3])[k] = sz;
+}
+
+/* The weighted sum of a tile's rows at one particle in out[0]; with `slopes`, in out[1 + axis] their sums with what
+ * `slope` has in place of the weights along that axis. */
+QUERN_INLINE void stencil_gather_by(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
+	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4], int32_t span) {
+	for (int k = 0; k < PARTS; k++) stencil_gather_part(s, i, tile, dim, slopes, slope, out, span, k);
 }
 
 /* The same with the functions' own slopes. */

@@ -72,8 +72,8 @@ static inline void trips_call(const trips *t, trip_memory *m, fit_memory *fit, q
 
 /* What particle i, that carries so much mass, sends. */
 QUERN_INLINE void trips_send(const trips *t, trip_memory *m, uint32_t i, quern_real mass, const int dim) {
-	sent p = { .base = { 0 } };
-	for (int a = 0; a < dim; a++) p.base[a] = mass * m->send[a][i];
+	sent p = { 0 };
+	p.base = PARTED(mass * m->send[0][i], mass * m->send[1][i], dim == 3 ? mass * m->send[2][i] : 0);
 	stencil_scatter(&m->stencil, i, &p, &(quern_row) { 0 }, m->sent, dim, t->g->cell, (int32_t)t->g->span);
 }
 

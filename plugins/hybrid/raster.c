@@ -23,14 +23,14 @@ typedef struct {
 QUERN_INLINE sent send_grain(
 	const raster_work *w, const raster_memory *m, uint32_t k, uint32_t i, bool affine, const int dim) {
 	const quern_real mass = cloud_mass(&w->grains, i);
-	sent p = { .base = { 0 } };
-	p.base[0] = mass;
-	for (int a = 0; a < dim; a++) p.base[1 + a] = mass * w->s->use[R_VELOCITY].real[a][i];
+	quern_real *const *u = w->s->use[R_VELOCITY].real;
+	sent p = { 0 };
+	p.base = PARTED(mass, mass * u[0][i], mass * u[1][i], dim == 3 ? mass * u[2][i] : 0);
 	if (!affine) return p;
 	quern_row v[4];
 	stencil_gather(&m->stencil, k, m->motion, dim, true, v, (int32_t)w->g->span);
 	for (int a = 0; a < dim; a++)
-		for (int c = 0; c < dim; c++) p.along[a][1 + c] = mass * v[1 + a][c];
+		p.along[a] = PARTED(0, mass * v[1 + a][0], mass * v[1 + a][1], dim == 3 ? mass * v[1 + a][2] : 0);
 	return p;
 }
 

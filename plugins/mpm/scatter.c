@@ -22,21 +22,23 @@ QUERN_INLINE sent send_point(const quern_column *u, uint32_t i, const int dim) {
 	const quern_real m = weight * u[SCATTER_MASS].real[0][i], volume = -weight * u[SCATTER_VOLUME].real[0][i];
 	quern_real *const *v = u[SCATTER_VELOCITY].real;
 	const symmetric t = SYMMETRIC_AT(u[SCATTER_STRESS].real, i, dim);
-	sent p = { .base = { 0 } };
-	if (dim == 2) {
-		p.base = (quern_row) { m, m * v[0][i], m * v[1][i], 0, 0, 0, 0, 0 };
-		p.slope[0] = (quern_row) { 0, 0, 0, volume * t.xx, volume * t.xy, 0, 0, 0 };
-		p.slope[1] = (quern_row) { 0, 0, 0, volume * t.xy, volume * t.yy, 0, 0, 0 };
-	} else {
-		p.base = (quern_row) { m, m * v[0][i], m * v[1][i], m * v[2][i], 0, 0, 0, 0 };
-		p.slope[0] = (quern_row) { 0, 0, 0, 0, volume * t.xx, volume * t.xy, volume * t.xz, 0 };
-		p.slope[1] = (quern_row) { 0, 0, 0, 0, volume * t.xy, volume * t.yy, volume * t.yz, 0 };
-		p.slope[2] = (quern_row) { 0, 0, 0, 0, volume * t.xz, volume * t.yz, volume * t.zz, 0 };
-	}
 	quern_real *const *l = u[SCATTER_AFFINE].real; /* m (v + L (x_i - x)) */
-	if (l[0])
-		for (int a = 0; a < dim; a++)
-			for (int k = 0; k < dim; k++) p.along[a][1 + k] = m * l[dim * k + a][i];
+	sent p;
+	if (dim == 2) {
+		p.base = PARTED(m, m * v[0][i], m * v[1][i]);
+		p.slope[0] = PARTED(0, 0, 0, volume * t.xx, volume * t.xy);
+		p.slope[1] = PARTED(0, 0, 0, volume * t.xy, volume * t.yy);
+		p.slope[2] = PARTED(0);
+	} else {
+		p.base = PARTED(m, m * v[0][i], m * v[1][i], m * v[2][i]);
+		p.slope[0] = PARTED(0, 0, 0, 0, volume * t.xx, volume * t.xy, volume * t.xz);
+		p.slope[1] = PARTED(0, 0, 0, 0, volume * t.xy, volume * t.yy, volume * t.yz);
+		p.slope[2] = PARTED(0, 0, 0, 0, volume * t.xz, volume * t.yz, volume * t.zz);
+	}
+	for (int a = 0; a < 3; a++)
+		p.along[a] = !l[0] || a >= dim
+						 ? PARTED(0)
+						 : PARTED(0, m * l[a][i], m * l[dim + a][i], dim == 3 ? m * l[2 * dim + a][i] : 0);
 	return p;
 }
 
