@@ -20,8 +20,10 @@ static const char *who_takes_substeps(const quern_run *run) {
 }
 
 /* A second long step, since what solvers hand to each other may take a first one to look at. */
+enum { STEPS = 2 };
+static const double patience = 30; /* s on one core, by the prices in the tables */
+
 static bool try_steps(quern_run *run) {
-	enum { STEPS = 2 };
 	run->mute = true;
 	run->clock.settled = 1;
 	while (run->clock.step < STEPS) switch (quern_run_next(run)) {
@@ -38,7 +40,8 @@ quern_prospect quern_prospect_of(quern_run *run, const quern_estimate *before) {
 	};
 	const quern_own_steps *own = &before->own;
 	const double alone = quern_estimate_price(run, true, 1, 1), n = before->substeps;
-	if (!p.who || !(p.substeps > 0) || !(alone > 0) || !try_steps(run)) return p;
+	if (!p.who || !(p.substeps > 0) || !(alone > 0) || STEPS * n * alone > patience || !try_steps(run))
+		return p;
 	const quern_account sums = quern_run_account(run);
 	const double mass = quern_account_of(&sums, "mass"), substep = quern_estimate_price(run, true, 1, 1);
 	if (!(mass > 0)) return p;

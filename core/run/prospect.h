@@ -4,7 +4,8 @@
 #include "estimate.h"
 
 typedef struct quern_prospect {
-	bool known;      /* false: nobody takes long steps beside those who take substeps, or the steps failed */
+	bool
+		known; /* false: nobody takes long steps beside those who take substeps, or the two steps failed or would take half a minute */
 	const char *who; /* take substeps: what a scene calls the entries of the first set of those that do */
 	double discrete; /* share of the mass that they carry, after two steps */
 	double ratio;    /* cost over that of these alone: with the scene's own substeps, */

@@ -77,8 +77,19 @@ static void the_same_on_any_number_of_threads(void **unused) {
 				p[0].discrete == p[1].discrete);
 }
 
+static void what_takes_long_is_not_tried(void **unused) {
+	quern_run *run = column(1);
+	(void)unused;
+	quern_estimate e = quern_estimate_of(run);
+	e.substeps = 1e9;
+	assert_false(quern_prospect_of(run, &e).known);
+	assert_true(run->clock.step == 0);
+	harness_close(run);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(ratios_by_hand),
-		cmocka_unit_test(prices_follow_counts), cmocka_unit_test(the_same_on_any_number_of_threads) };
+		cmocka_unit_test(prices_follow_counts), cmocka_unit_test(the_same_on_any_number_of_threads),
+		cmocka_unit_test(what_takes_long_is_not_tried) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
