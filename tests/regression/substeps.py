@@ -21,7 +21,7 @@ def chosen(name, *options):
 
 def as_many_as_fit():
     """The number is that for which plan has room; with it the grains set the step, and what sets both steps is said."""
-    for name in ("bed", "chute", "column", "strip", "shear"):
+    for name in ("bed", "column", "shear"):
         plan = chosen(name)
         n, why = plan["substeps"], plan["most_substeps_set_by"]
         print(f"{name}: {n} substeps; {why}")
