@@ -8,7 +8,7 @@ import sys
 from typing import NoReturn
 
 from . import page
-from .chart_data import FROM_RUNS, Group, Picture, as_csv, told
+from .chart_data import FROM_RUNS, Group, Picture, as_csv, of_tables, told
 from .chart_draw import save
 from .chart_form import METRES, Chart
 from .chart_study import Made, picture_of, read_made
@@ -18,7 +18,8 @@ from .study import Study, read
 from .workers import save as save_text
 
 USAGE = "quern chart STUDY.yaml [OPTION]...\n" \
-    "       quern chart RUN... (--series A[,B] | --profile LABEL.COLUMN | --line FIELD | --distribution FIELD) [OPTION]..."
+    "       quern chart RUN... (--series A[,B] | --profile LABEL.COLUMN | --line FIELD | --distribution FIELD) [OPTION]...\n" \
+    "       quern chart FILE.csv... --table X,Y[,Y] [OPTION]..."
 FORMATS = (".svg", ".png", ".pdf")
 
 
@@ -33,14 +34,16 @@ class Parser(argparse.ArgumentParser):
 def arguments(words: list[str] | None) -> argparse.Namespace:
     parser = Parser(prog="quern chart", usage=USAGE, add_help=False,
                     formatter_class=lambda prog: argparse.HelpFormatter(prog, max_help_position=30, width=200))
-    parser.add_argument("what", metavar="STUDY.yaml | RUN", nargs="+", help="a study whose charts are drawn, or folders of runs; docs/charts.md")
+    parser.add_argument("what", metavar="STUDY.yaml | RUN | FILE.csv", nargs="+",
+                        help="a study whose charts are drawn, folders of runs, or tables; docs/charts.md")
     parser.add_argument("-o", "--output", metavar="PATH",
-                        help="of a study its folder, default: out/NAME; of runs the picture, .svg, .png or .pdf, default: chart.svg")
+                        help="of a study its folder, default: out/NAME; of runs and tables the picture, .svg, .png or .pdf, default: chart.svg")
     parser.add_argument("--only", metavar="NAME", help="of a study: draw this chart alone")
     parser.add_argument("--series", metavar="A[,B]", help="columns of series.csv over time")
     parser.add_argument("--profile", metavar="LABEL.COLUMN", help="all slabs of an observer such as profile.density")
     parser.add_argument("--line", metavar="FIELD", help="a field along a line --from --to")
     parser.add_argument("--distribution", metavar="FIELD", help="which share of grains or points is at or below each value")
+    parser.add_argument("--table", metavar="X,Y[,Y]", help="columns of tables, such as those of quern drive, over another")
     parser.add_argument("--frame", metavar="K", type=int, default=-1, help="the frame, counted from 0; default: the last")
     parser.add_argument("--from", dest="begin", metavar="X,Y[,Z]", help="where the line begins, in m or with units: 10mm,0")
     parser.add_argument("--to", dest="end", metavar="X,Y[,Z]", help="where it ends")
@@ -64,7 +67,7 @@ def merged(words: list[str]) -> list[str]:
 
 
 def kinds_of(options: argparse.Namespace) -> list[str]:
-    return [kind for kind in FROM_RUNS if getattr(options, kind)]
+    return [kind for kind in (*FROM_RUNS, "table") if getattr(options, kind)]
 
 
 def check(parser: Parser, options: argparse.Namespace) -> None:
@@ -155,10 +158,22 @@ def chart_of_runs(options: argparse.Namespace, words: list[str]) -> int:
         one.label = f"{one.label}, {picture.y[0]}"
     for other in others:
         join(picture, other)
+    return saved(picture, what, options, words)
+
+
+def saved(picture: Picture, what: str, options: argparse.Namespace, words: list[str]) -> int:
     output = pathlib.Path(options.output or "chart.svg")
     save(picture, [output], about(words, options.title or what, ", ".join(options.what)))
     print(output)
     return 0
+
+
+def chart_of_tables(options: argparse.Namespace, words: list[str]) -> int:
+    columns = options.table.split(",")
+    if len(columns) < 2:
+        raise QuernError(f"--table {options.table}: give two columns or more, X,Y")
+    tables = dict(zip(labels_of(options.what), map(pathlib.Path, options.what)))
+    return saved(of_tables(tables, columns, options.title), options.table, options, words)
 
 
 def join(picture: Picture, other: Picture) -> None:
@@ -224,6 +239,8 @@ def main(words: list[str] | None = None) -> int:
     words = sys.argv[1:] if words is None else words
     options = arguments(words)
     try:
+        if options.table:
+            return chart_of_tables(options, words)
         if kinds_of(options):
             return chart_of_runs(options, words)
         return charts_of_study(read(pathlib.Path(options.what[0]), options.what[0]), options, words)

@@ -13,8 +13,8 @@ import yaml
 
 from .chart_form import Chart
 from .measure import Measure, taken
-from .program import sentence_of
-from .runs import Frame, Run, open as open_run
+from .program import QuernError, sentence_of
+from .runs import Frame, Run, Series, open as open_run
 from .table import DAMAGE
 
 
@@ -273,6 +273,32 @@ def draw_distribution(chart: Chart, groups: list[Group], _which=-1) -> Picture:
 
 
 FROM_RUNS = {"series": draw_series, "profile": draw_profile, "line": draw_line, "distribution": draw_distribution}
+
+
+# ---- tables that belong to no run ----
+
+def of_tables(tables: dict[str, pathlib.Path], columns: list[str], title: str) -> Picture:
+    """The first column across, the others up; they share one unit. A line for each column of each table."""
+    across, *up = columns
+    picture = Picture("table", "table", title, (across, "1"), (", ".join(up), "1"), [])
+    units = set()
+    for label, path in tables.items():
+        table = Series(path)
+        for name in columns:
+            if name not in table:
+                raise QuernError(f"{path} has no column '{name}'; it has {', '.join(table)}", 2)
+        units |= {(table.units[across], table.units[name]) for name in up}
+        for name in up:
+            words = [label] * (len(tables) > 1) + [name.replace("_", " ")] * (len(up) > 1)
+            picture.curves.append(Curve(", ".join(words) or label, table[across], table[name]))
+    if len(units) > 1:
+        raise QuernError("columns of one chart share one unit: " + ", ".join(sorted(f"'{y}' over '{x}'" for x, y in units)), 2)
+    if not any(len(one.x) for one in picture.curves):
+        raise QuernError("there is nothing to draw: no row", 2)
+    (unit_x, unit_y), = units
+    picture.x = across.replace("_", " "), unit_x
+    picture.y = ", ".join(up).replace("_", " "), unit_y
+    return picture
 
 
 # ---- the numbers as a file ----

@@ -11,7 +11,7 @@ QUERN, SOURCE = os.environ["QUERN"], pathlib.Path(os.environ["QUERN_SOURCE"])
 SCENE = str(SOURCE / "configs/two_grains.yaml")
 HYBRID = str(SOURCE / "configs/column.yaml")
 COMMANDS = {"run": [SCENE], "plan": [SCENE], "list": [], "describe": ["contact.linear"], "schema": [],
-            "new": ["oracle", "mine"], "check": ["x.so"], "render": ["x"]}
+            "new": ["oracle", "mine"], "check": ["x.so"], "drive": ["elastic", "--path=tension"], "render": ["x"]}
 
 
 def quern(*words, status=0, **options):
@@ -53,13 +53,13 @@ def check_unknown():
 
 
 def check_words():
-    for command in ("run", "plan", "describe", "check", "render"):
+    for command in ("run", "plan", "describe", "check", "drive", "render"):
         assert said(command, "a", "b") == f"quern {command}: 'b' is one word too many"
         assert "is missing" in said(command)
     for command in ("list", "schema"):
         assert "takes no word" in said(command, "a")
     assert "a kind and a name are missing" in said("new", "oracle")
-    for command in ("run", "new", "schema", "render"):
+    for command in ("run", "new", "schema", "drive", "render"):
         assert "needs " in said(command, *COMMANDS[command], "-o", "")
     print("too many words, too few and empty ones are refused")
 

@@ -6,7 +6,7 @@ import pathlib
 SOURCE = pathlib.Path(os.environ["QUERN_SOURCE"])
 LINE = "SPDX-License-Identifier: MIT"
 
-files = [path for folder in ("core", "include", "plugins", "python", "render", "studies", "tests", "tools") for path in (SOURCE / folder).rglob("*")
+files = [path for folder in ("core", "drive", "include", "plugins", "python", "render", "studies", "tests", "tools") for path in (SOURCE / folder).rglob("*")
          if path.is_file() and "__pycache__" not in path.parts and (path.suffix in (".c", ".h", ".cc", ".py") or path.name == "meson.build" or path.parent.name == "tools" and path.suffix == "")]
 for path in files:
     template = path.name.startswith("template.")

@@ -16,7 +16,7 @@ import tempfile
 SOURCE, QUERN = pathlib.Path(os.environ["QUERN_SOURCE"]), pathlib.Path(os.environ["QUERN"])
 PAGES = {"README.md": 10, "docs/tutorial.md": 13, "docs/run_folder.md": 4, "docs/python.md": 5, "docs/film.md": 8, "docs/studies.md": 3, "docs/observers.md": 1}
 if importlib.util.find_spec("matplotlib"):
-    PAGES["docs/charts.md"] = 3
+    PAGES |= {"docs/charts.md": 3, "docs/drive.md": 2}
 PIECE = re.compile(r"^```(yaml|python|text)\n(.*?)^```|^    (build/quern [^\n]*)$", re.M | re.S)
 
 
@@ -91,10 +91,10 @@ def links():
 def tour():
     """Every file of docs/tour.md is there, and every name that stands with a file is in it."""
     text = (SOURCE / "docs/tour.md").read_text().replace("\n", " ")
-    found = re.findall(r"`(\w+)` in +`((?:core|plugins)/[\w/.]+)`", text)
-    found += [(name, file) for file, name in re.findall(r"`((?:core|plugins)/[\w/.]+)`, `(\w+)`", text)]
+    found = re.findall(r"`(\w+)` in +`((?:core|drive|plugins)/[\w/.]+)`", text)
+    found += [(name, file) for file, name in re.findall(r"`((?:core|drive|plugins)/[\w/.]+)`, `(\w+)`", text)]
     assert len(found) >= 25, f"{len(found)} names in docs/tour.md"
-    for file in set(re.findall(r"`((?:core|plugins|configs)/[\w/.]+\.\w+)`", text)):
+    for file in set(re.findall(r"`((?:core|drive|plugins|configs)/[\w/.]+\.\w+)`", text)):
         assert (SOURCE / file).exists(), f"docs/tour.md names {file}, which is not there"
     for name, file in found:
         assert re.search(rf"\b{name}\b", (SOURCE / file).read_text()), f"docs/tour.md looks for {name} in {file}"
