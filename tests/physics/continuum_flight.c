@@ -529,11 +529,11 @@ static void apic_keeps_angular_momentum(void **unused) {
  * free faces too. In a step in which nothing moves. */
 static void apic_keeps_linear_fields(void **unused) {
 	static const double l[2][2] = { { 0.7, -3 }, { 1.1, -0.4 } };
-	static const char *const shapes[] = { "gimp", "linear" };
+	static const char *const shapes[] = { "gimp", "bspline", "linear" };
 	(void)unused;
 	bool good = true;
 	table_head("a linear field after one step: velocity over |L| h, matrix over |L|");
-	for (int k = 0; k < 2; k++) {
+	for (int k = 0; k < 3; k++) {
 		quern_run *run = harness_open(1,
 			"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [2, 2]},\n"
 			"time: {end: 1e-16, step: 1e-18}, output: {every: 1e-17},\n"

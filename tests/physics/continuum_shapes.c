@@ -12,7 +12,10 @@
 
 #include "plugin_alone.h"
 #include "table.h"
+#include <level.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 enum { CELLS = 6, BATCH = 1024 };
 static const double cell = 0.1;
@@ -91,17 +94,36 @@ static void add_point(const batch *m, uint32_t i, uint32_t dim, bool walls, miss
 	}
 }
 
+/* The published function of the distance to a node, and its slope, in cells. */
+static double gimp(double x, double l, double *slope) {
+	const double d = fabs(x), sign = x > 0 ? 1 : -1;
+	*slope = d < l ? -x / l : d < 1 - l ? -sign : d < 1 + l ? -sign * (1 + l - d) / (2 * l) : 0;
+	return d < l       ? 1 - (d * d + l * l) / (2 * l)
+		   : d < 1 - l ? 1 - d
+		   : d < 1 + l ? (1 + l - d) * (1 + l - d) / (4 * l)
+					   : 0;
+}
+
+static double bspline(double x, double unused, double *slope) {
+	const double d = fabs(x), sign = x > 0 ? 1 : -1;
+	(void)unused;
+	*slope = d < 0.5 ? -2 * x : d < 1.5 ? -sign * (1.5 - d) : 0;
+	return d < 0.5 ? 0.75 - d * d : d < 1.5 ? 0.5 * (1.5 - d) * (1.5 - d) : 0;
+}
+
 static const struct {
 	const char *id, *name;
-	double half_width; /* 0: the plugin has none */
-} shapes[] = { { "shape.gimp", "gimp, l = h/4", 0.25 }, { "shape.gimp", "gimp, l = h/2", 0.5 },
-	{ "shape.gimp", "gimp, l = h/6", 1.0 / 6 }, { "shape.gimp", "gimp, l = h/8", 0.125 },
-	{ "shape.gimp", "gimp, l = h/10", 0.1 }, { "shape.linear", "linear", 0 } };
+	double edge; /* between pieces, beside a node; of gimp the half-width that it is given */
+	double (*formula)(double x, double l, double *slope); /* NULL: its slope jumps at nodes */
+} shapes[] = { { "shape.gimp", "gimp, l = h/4", 0.25, gimp }, { "shape.gimp", "gimp, l = h/2", 0.5, gimp },
+	{ "shape.gimp", "gimp, l = h/6", 1.0 / 6, gimp }, { "shape.gimp", "gimp, l = h/8", 0.125, gimp },
+	{ "shape.gimp", "gimp, l = h/10", 0.1, gimp }, { "shape.bspline", "bspline", 0.5, bspline },
+	{ "shape.linear", "linear", 0, NULL } };
 enum { SHAPES = sizeof shapes / sizeof *shapes };
 
 static alone make_shape(int k) {
-	const alone_value gimp[] = { { "half_width", shapes[k].half_width }, { NULL, 0 } };
-	return alone_make(shapes[k].id, 3, shapes[k].half_width > 0 ? gimp : gimp + 1);
+	const alone_value width[] = { { "half_width", shapes[k].edge }, { NULL, 0 } };
+	return alone_make(shapes[k].id, 3, shapes[k].formula == gimp ? width : width + 1);
 }
 
 /* Partition of unity and linear completeness, the same in the middle, at walls and in corners. */
@@ -119,8 +141,7 @@ static void completeness(void **unused) {
 				for (uint32_t round = 0; round < 20; round++) {
 					for (uint32_t i = 0; i < BATCH; i++)
 						for (uint32_t a = 0; a < dim; a++)
-							m->position[a][i] =
-								place((uint32_t)(uniform() * 1e6), fmin(shapes[k].half_width, 0.5));
+							m->position[a][i] = place((uint32_t)(uniform() * 1e6), shapes[k].edge);
 					weigh(&shape, m, BATCH, dim, walls);
 					for (uint32_t i = 0; i < BATCH; i++) add_point(m, i, dim, walls, &worst);
 				}
@@ -138,25 +159,15 @@ static void completeness(void **unused) {
 	assert_true(good);
 }
 
-/* The published function of the distance to a node, and its slope, in cells. */
-static double gimp(double x, double l, double *slope) {
-	const double d = fabs(x), sign = x > 0 ? 1 : -1;
-	*slope = d < l ? -x / l : d < 1 - l ? -sign : d < 1 + l ? -sign * (1 + l - d) / (2 * l) : 0;
-	return d < l       ? 1 - (d * d + l * l) / (2 * l)
-		   : d < 1 - l ? 1 - d
-		   : d < 1 + l ? (1 + l - d) * (1 + l - d) / (4 * l)
-					   : 0;
-}
-
 /* Every weight is the published function with the node outside a wall folded in: S_0 += 2 S_-1, S_1 -= S_-1. */
 static void formula(void **unused) {
 	(void)unused;
 	batch *m = calloc(1, sizeof *m);
 	bool good = m != NULL;
-	table_head("gimp against its formula");
-	for (int k = 0; shapes[k].half_width > 0; k++) {
+	table_head("each against its formula");
+	for (int k = 0; k < SHAPES && shapes[k].formula; k++) {
 		const alone shape = make_shape(k);
-		const double l = shapes[k].half_width;
+		const double l = shapes[k].edge;
 		double value = 0, slope = 0;
 		for (uint32_t round = 0; round < 20; round++) {
 			for (uint32_t i = 0; i < BATCH; i++)
@@ -167,7 +178,7 @@ static void formula(void **unused) {
 				for (uint32_t a = 0; a < 2; a++) {
 					const double t = m->position[a][i] / cell;
 					double w[CELLS + 3] = { 0 }, g[CELLS + 3] = { 0 };
-					for (int n = -1; n <= CELLS + 1; n++) w[n + 1] = gimp(t - n, l, &g[n + 1]);
+					for (int n = -1; n <= CELLS + 1; n++) w[n + 1] = shapes[k].formula(t - n, l, &g[n + 1]);
 					w[1] += 2 * w[0], w[2] -= w[0], w[CELLS + 1] += 2 * w[CELLS + 2],
 						w[CELLS] -= w[CELLS + 2];
 					g[1] += 2 * g[0], g[2] -= g[0], g[CELLS + 1] += 2 * g[CELLS + 2],
@@ -220,8 +231,67 @@ static void shares(void **unused) {
 	assert_true(good);
 }
 
+static uint64_t hash_more(uint64_t hash, const void *data, size_t n) {
+	for (const unsigned char *p = data; n--; p++) hash = (hash ^ *p) * 1099511628211u;
+	return hash;
+}
+
+/* One number for all that a shape gives on a fixed set of places. */
+static uint64_t hash_of(int k, batch *m) {
+	const alone shape = make_shape(k);
+	uint64_t hash = 14695981039346656037u;
+	state = 88172645463325252u;
+	for (int walls = 0; walls <= 1; walls++) {
+		for (uint32_t i = 0; i < BATCH; i++)
+			for (uint32_t a = 0; a < 3; a++)
+				m->position[a][i] = place((uint32_t)(uniform() * 1e6), shapes[k].edge);
+		weigh(&shape, m, BATCH, 3, walls);
+		hash = hash_more(hash, m->value, sizeof m->value);
+		hash = hash_more(hash, m->slope, sizeof m->slope);
+		hash = hash_more(hash, m->first, sizeof m->first);
+	}
+	free(shape.self);
+	return hash;
+}
+
+/* The same bits from the objects in this folder, of all instruction sets that this processor has; how many there are. */
+static int same_hash(int k, const char *folder, batch *m, uint64_t *hash) {
+	int n = 0;
+	for (int level = 1; level <= quern_level_here(); level++) {
+		char name[16], path[4096];
+		snprintf(name, sizeof name, "v%d", level);
+		snprintf(path, sizeof path, level > 1 ? "%s/%s.%s.so" : "%s/%s.so", folder, shapes[k].id, name);
+		if (access(path, R_OK)) continue;
+		setenv("QUERN_PLUGINS_DIR", folder, 1), setenv("QUERN_PLUGINS_LEVEL", name, 1);
+		const uint64_t found = hash_of(k, m);
+		if (!*hash) *hash = found;
+		if (found != *hash) fail_msg("%s, %s: other bits", path, shapes[k].name);
+		n++;
+	}
+	return n;
+}
+
+/* The same bits for every instruction set, and for the objects beside the program of another compiler, if QUERN_OTHER names one. */
+static void bits(void **unused) {
+	(void)unused;
+	const char *other = getenv("QUERN_OTHER"), *slash = other ? strrchr(other, '/') : NULL;
+	char folder[4096], beside[4096];
+	batch *m = calloc(1, sizeof *m);
+	assert_non_null(m);
+	snprintf(folder, sizeof folder, "%s", getenv("QUERN_PLUGINS_DIR"));
+	if (slash) snprintf(beside, sizeof beside, "%.*s/plugins", (int)(slash - other), other);
+	else printf("  QUERN_OTHER names no program of another compiler: not compared\n");
+	for (int k = 0; k < SHAPES; k++) {
+		uint64_t hash = 0;
+		assert_true(same_hash(k, folder, m, &hash) > 0);
+		if (slash) assert_true(same_hash(k, beside, m, &hash) > 0);
+		printf("  %-20s %016llx\n", shapes[k].name, (unsigned long long)hash);
+	}
+	free(m);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(completeness), cmocka_unit_test(formula),
-		cmocka_unit_test(shares) };
+		cmocka_unit_test(shares), cmocka_unit_test(bits) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -32,6 +32,7 @@ CHANGES = [
                                          "grains.fill.1.packer=random"], "packer.random", "packer.two_point_tangent"),
     ("coupling", ["hybrid.coupling=lumped"], "coupling.lumped", "coupling.affine"),
     ("shape", ["continuum.shape=linear"], "shape.linear", "shape.gimp"),
+    ("shape, of B-splines", ["continuum.shape=bspline"], "shape.bspline", "shape.gimp"),
     # a force that acts in two steps has no place in the hybrid's books
     ("integrator, of grains alone", ["model=grains", "grains.integrator=velocity_verlet"], "integrator.velocity_verlet",
      "integrator.symplectic_euler"),
