@@ -213,10 +213,10 @@ static void tell(const drive_record *r, const drive_material *m, const drive_poi
 	double stress[DRIVE_MOST_COMPONENTS] = { 0 };
 	for (uint32_t c = 0; c < quern_drive_components(m->dim); c++) stress[c] = p->stress[c][0];
 	printf(
-		"%s, %u-D: %zu steps, each after at most %u calls of it; at the end pressure %.6g Pa, shear stress %.6g Pa, volume %.6g of "
+		"%s, %u-D: %zu steps, at most %u call%s of it in one; at the end pressure %.6g Pa, shear stress %.6g Pa, volume %.6g of "
 		"that at the beginning\n",
-		m->file->plugin.id, m->dim, r->n_rows - 1, r->most_tries, quern_drive_point_pressure(p),
-		quern_drive_shear_of(m->dim, stress), p->volume);
+		m->file->plugin.id, m->dim, r->n_rows - 1, r->most_tries, r->most_tries == 1 ? "" : "s",
+		quern_drive_point_pressure(p), quern_drive_shear_of(m->dim, stress), p->volume);
 }
 
 /* The table's name: what the picture is called, with another end. */

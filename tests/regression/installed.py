@@ -19,13 +19,14 @@ def run(*command, status=0, **options):
 def build(folder, *options):
     """Configured for a prefix, one instruction set, no tests run; installed below `folder`."""
     run("meson", "setup", folder / "build", SOURCE, "-Dlevels=v1", f"-Dprefix={folder}/there", "-Drender=disabled", "-Doptimization=1", *options)
-    run("ninja", "-C", folder / "build", "quern", "plugins")
+    run("ninja", "-C", folder / "build", "quern", "quern-drive", "plugins")
     run("meson", "install", "-C", folder / "build", "--quiet", "--no-rebuild")
 
 
 def works(program):
     assert len(run(program, "list").splitlines()) > 30, "plugins are missing"
     run(program, "plan", SOURCE / "configs/two_grains.yaml")
+    run(program, "drive", "elastic", "--set=bulk_modulus=1e6", "--set=density=1000", "--path=tension", "-o", pathlib.Path(program).parent / "drive.csv")
     said = run(program, "render", "x", status=1)
     assert "unknown command 'render'" in said, said
 
