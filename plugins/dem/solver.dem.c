@@ -328,6 +328,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	/* points that are made of grains come by quadrants, two per cell and axis, whatever the continuum's own fill has */
 	setup->host->publish(setup, "continuum.half_width", "1", 0.25);
 	setup->host->publish(setup, "grain.density", "kg/m^3", d->material[0].density);
+	quern_real densest = 0;
+	for (uint32_t k = 0; k < d->n_materials; k++) densest = fmax(densest, d->material[k].density);
+	setup->host->publish(setup, "grain.densest", "kg/m^3", densest);
 	setup->host->publish(setup, "grain.radius_spread", "1", d->material[0].radii.spread);
 	setup->host->publish(setup, "grain.radius_law", "1", d->material[0].radii.law);
 	return QUERN_OK;

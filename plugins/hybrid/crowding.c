@@ -5,8 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Of a mean, that the newest update makes. */
-static const quern_real newest = 0.1;
 /* A cell that bodies leave less of has too little in it to be measured. */
 static const quern_real least_open = 0.5;
 
@@ -54,7 +52,7 @@ void quern_hybrid_crowding(const update *d) {
 		int32_t cell[3];
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
 		const quern_real now = crowding_of(d, c / QUERN_BLOCK_CELLS, cell);
-		crowding[c] += (crowding[c] > 0 ? newest : 1) * (now - crowding[c]);
+		crowding[c] += (crowding[c] > 0 ? NEWEST : 1) * (now - crowding[c]);
 		if (d->open[c] > least_open) fullness[c] = cell_holds(d, c) / (d->full * d->open[c]);
 	}
 	if (!(d->u[U_FULL].real[0][0] > 0)) measure_full(d);

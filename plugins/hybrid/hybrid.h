@@ -19,7 +19,7 @@ typedef struct hybrid {
 	quern_real hysteresis, gain;
 	quern_real step, grain_step,
 		continuum_step; /* s, published, for `substeps: auto`; NaN: unknown, or counted already */
-	quern_real diameter, density, packed, law_number; /* of the grains, published by their solver */
+	quern_real diameter, density, solid, packed, law_number; /* of the grains, published by their solver */
 	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every;                /* steps */
 	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */

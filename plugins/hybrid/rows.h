@@ -61,6 +61,11 @@
 		.doc = "What a cell itself held at the last update, over what fills its open room.") \
 	X(U_FULL, "total.full", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "The mean of that in the continuum, when there first was one.") \
+	X(U_CARRIED, "cell.carried", "kg", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "What both clouds carry in a cell, mean over the last updates.") \
+	X(U_DENSEST, "total.densest", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "Density of the densest place over the stress-free one, at the last update.") \
+	X(U_DENSEST_EVER, "total.densest_ever", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "The largest of these so far.") \
 	X(U_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, \
 		.doc = "Sum of the contact stress over the samples since the last update.") \
 	X(U_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Samples of the contact stress.") \

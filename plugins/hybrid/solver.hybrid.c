@@ -62,6 +62,8 @@ static const quern_param params[] = {
 		.from = "grain.radius_law", .max = 1, .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(hybrid, density, "grain.density", "kg/m^3", "Density of their material.",
 		.from = "grain.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
+	QUERN_PARAM_AS(hybrid, solid, "grain.densest", "kg/m^3", "The largest density of any of their materials.",
+		.from = "grain.densest", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, packed, "packed_density", "kg/m^3", "Density of the continuum without stress.",
 		.from = "continuum.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, rest, "continuum.rest", "1/s", "Shear rate of what is at rest.",
@@ -231,12 +233,16 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 
 static uint32_t substeps(const void *self) { return (uint32_t)((const hybrid *)self)->substeps; }
 
-enum { SUM_OWED, SUM_OWED_MOMENTUM, SUM_DEFECT = SUM_OWED_MOMENTUM + 3 };
+enum { SUM_OWED, SUM_OWED_MOMENTUM, SUM_DEFECT = SUM_OWED_MOMENTUM + 3, SUM_DENSEST };
 static const quern_output sums[] = {
 	{ .name = "owed", .unit = "kg", .doc = "The ledger's sum over all cells." },
 	{ .name = "owed_momentum_x", .unit = "kg m/s" }, { .name = "owed_momentum_y", .unit = "kg m/s" },
 	{ .name = "owed_momentum_z", .unit = "kg m/s" },
 	{ .name = "defect", .unit = "1", .doc = "Of the ledger's invariants so far.", .combine = QUERN_MAX },
+	{ .name = "densest",
+		.unit = "1",
+		.doc = "Density of the densest place so far over the continuum's without stress.",
+		.combine = QUERN_MAX },
 	{ .name = NULL }
 };
 
@@ -252,6 +258,7 @@ static void account(const void *self, const quern_step *s, quern_real *out) {
 		out[SUM_OWED_MOMENTUM + k] = s->host->sum_set(s->run, "cell", u[U_OWED_MOMENTUM].real[k]);
 	const quern_real mass = u[U_MASS_DEFECT].real[0][0], momentum = u[U_MOMENTUM_DEFECT].real[0][0];
 	out[SUM_DEFECT] = mass > momentum ? mass : momentum;
+	out[SUM_DENSEST] = u[U_DENSEST_EVER].real[0][0];
 }
 
 static const char *const needs[] = { "grains", "continuum", NULL }, *const with[] = { "bodies", NULL };

@@ -13,6 +13,8 @@ static quern_status reckon(update *d) {
 	quern_status status = quern_hybrid_walls(d);
 	if (status != QUERN_OK) return status;
 	quern_hybrid_fixed(d);
+	status = quern_hybrid_density(d);
+	if (status != QUERN_OK) return status;
 	quern_hybrid_fractions(d);
 	if (d->failed) return QUERN_E_MEMORY;
 	status = quern_hybrid_rates(d);

@@ -50,6 +50,8 @@ typedef struct update {
 
 /* The q-th cell in the order of places: whoever adds up cell by cell, or makes something in them, takes them so. */
 QUERN_INLINE uint32_t nth_cell(const update *d, uint32_t q) { return quern_grid_nth(d->g, q); }
+/* Of a mean over about ten updates, that the newest one makes. */
+#define NEWEST 0.1
 /* Weights of points and of grains in a cell from now on. */
 QUERN_INLINE quern_real point_share(const update *d, uint32_t c) { return d->share[c]; }
 QUERN_INLINE quern_real grain_share(const update *d, uint32_t c) { return 1 - d->share[c]; }
@@ -126,6 +128,10 @@ QUERN_INLINE quern_real cell_room(const update *d, uint32_t c) {
 
 /* ---- crowding.c ---- */
 void quern_hybrid_crowding(const update *);
+
+/* ---- density.c ---- */
+/* Looks for the densest place; warns where it is too dense, and ends the run where no packing is as dense. */
+quern_status quern_hybrid_density(const update *);
 
 /* ---- points.c ---- */
 quern_status quern_hybrid_points(update *);

@@ -15,6 +15,7 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 	X(MASS_DEFECT, "total.mass_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(EXCHANGE_DEFECT, "total.exchange_defect", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(DENSEST, "total.densest", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(PASSED, "total.passed", "kg", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
@@ -31,6 +32,9 @@ static const quern_output outputs[] = {
 	{ .name = "exchange_defect",
 		.unit = "1",
 		.doc = "Of the coupling's momentum, in the last step: the worst node." },
+	{ .name = "densest",
+		.unit = "1",
+		.doc = "Density of the densest place over the continuum's without stress, at the last update." },
 	{ .name = NULL }
 };
 
@@ -50,7 +54,7 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	out[0] = host->sum_set(run, "cell", size) / mass;
 	out[1] = (cloud_total(&grains) + cloud_total(&points)) / mass - 1;
 	out[2] = host->sum_set(run, "cell", u[OWED].real[0]);
-	for (int k = 0; k < 3; k++) out[3 + k] = u[MASS_DEFECT + k].real[0][0];
+	for (int k = 0; k < 4; k++) out[3 + k] = u[MASS_DEFECT + k].real[0][0];
 	return QUERN_OK;
 }
 
