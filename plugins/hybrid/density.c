@@ -5,68 +5,67 @@
 #include "update.h"
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 /* Grains of a window, and of one that walls and faces have cut. */
 enum { GRAINS = 300, FEWEST = 100, WIDEST = 8, WORDS = 96 };
-static const quern_real warned_from =
-	0.05; /* above the stress-free density; and again at twice that, at four times ... */
 
 typedef struct looking {
 	const update *d;
+	uint32_t axis;    /* along which sums are being made */
 	int reach;        /* cells to each side of a window's middle */
 	quern_real least; /* kg that fill the smallest window which says something */
-	quern_real *most; /* by block: the largest ratio of any window with its middle there */
-	int32_t (*middle)[3];
+	/* by cell, before and after the present sums: kg carried; kg that would fill it without stress */
+	quern_real *mass[2], *room[2];
 } looking;
 
-typedef struct window {
-	quern_real mass, room;       /* kg: carried; what would fill it without stress */
-	quern_real pressure, volume; /* of its points: Pa m^3, m^3 */
-} window;
-
-static void add_pressure(const update *d, uint32_t c, window *w) {
-	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const int32_t i = d->point[q];
-		const symmetric t = SYMMETRIC_AT(d->u[U_POINT_STRESS].real, i, d->s->dim);
-		const quern_real volume = d->u[U_POINT_WEIGHT].real[0][i] * d->u[U_POINT_VOLUME].real[0][i];
-		w->pressure -= volume * (t.xx + t.yy + t.zz) / d->s->dim;
-		w->volume += volume;
-	}
-}
-
-/* What has no entry holds nothing, and nobody knows what of it is open. */
-static window window_around(const looking *l, const int32_t cell[3], bool pressed) {
-	const update *d = l->d;
-	const int r = l->reach, depth = d->g->dim == 3 ? r : 0;
-	quern_grid_cursor last = { .block = -1 };
-	window w = { .mass = 0 };
-	for (int z = -depth; z <= depth; z++)
-		for (int y = -r; y <= r; y++)
-			for (int x = -r; x <= r; x++) {
-				int32_t at[3] = { cell[0] + x, cell[1] + y, cell[2] + z };
-				const int32_t c =
-					quern_grid_bring_back(d->g, at) ? quern_grid_entry_near(d->g, &last, at) : -1;
-				if (c < 0) continue;
-				w.mass += d->u[U_CARRIED].real[0][c];
-				w.room += d->full * d->open[c];
-				if (pressed) add_pressure(d, (uint32_t)c, &w);
-			}
-	return w;
-}
-
-static void look_at_block(void *arg, uint32_t b, uint32_t worker) {
+/* A window is a row of rows: sums along one axis after the other. What has no entry holds nothing, and ends a row. */
+static void sum_block(void *arg, uint32_t b, uint32_t worker) {
 	const looking *l = arg;
 	(void)worker;
-	l->most[b] = 0;
 	for (uint32_t c = b * QUERN_BLOCK_CELLS; c < (b + 1) * QUERN_BLOCK_CELLS; c++) {
-		int32_t cell[3];
-		if (!quern_grid_cell_of(l->d->g, c, cell) || !(l->d->u[U_CARRIED].real[0][c] > 0)) continue;
-		const window w = window_around(l, cell, false);
-		if (!(w.room >= l->least && w.mass > l->most[b] * w.room)) continue;
-		l->most[b] = w.mass / w.room;
-		memcpy(l->middle[b], cell, sizeof cell);
+		quern_real mass = l->mass[0][c], room = l->room[0][c];
+		for (int way = -1; way <= 1; way += 2) {
+			int32_t at = cell_beside(l->d, c, l->axis, way);
+			for (int k = 0; k < l->reach && at >= 0; k++) {
+				mass += l->mass[0][at];
+				room += l->room[0][at];
+				at = cell_beside(l->d, (uint32_t)at, l->axis, way);
+			}
+		}
+		l->mass[1][c] = mass;
+		l->room[1][c] = room;
 	}
+}
+
+static void sum_windows(looking *l) {
+	const update *d = l->d;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		l->mass[0][c] = d->u[U_CARRIED].real[0][c];
+		l->room[0][c] = d->full * d->open[c];
+	}
+	for (l->axis = 0; l->axis < d->s->dim; l->axis++) {
+		d->s->host->parallel(d->s->run, d->g->n_blocks, sum_block, l);
+		for (uint32_t c = 0; c < d->n_cells; c++) {
+			l->mass[0][c] = l->mass[1][c];
+			l->room[0][c] = l->room[1][c];
+		}
+	}
+}
+
+/* Around a cell with material, the first by place among equals; -1: no window is wide enough. */
+static int32_t densest(const looking *l, quern_real *ratio) {
+	const update *d = l->d;
+	int32_t found = -1;
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
+		int32_t cell[3];
+		if (!(d->u[U_CARRIED].real[0][c] > 0 && l->room[0][c] >= l->least) ||
+			!quern_grid_cell_of(d->g, c, cell))
+			continue;
+		if (l->mass[0][c] > *ratio * l->room[0][c])
+			*ratio = l->mass[0][c] / l->room[0][c], found = (int32_t)c;
+	}
+	return found;
 }
 
 /* In flow a window's mass is noise from update to update too. */
@@ -78,7 +77,7 @@ static void carry_on(const update *d) {
 
 static bool begin(looking *l) {
 	const update *d = l->d;
-	const uint32_t dim = d->s->dim, blocks = d->g->n_blocks;
+	const uint32_t dim = d->s->dim;
 	const quern_real r = 0.5 * d->h->diameter, disc = 3.141592653589793 * r * r,
 					 grain = d->h->density * (dim == 2 ? disc : 4.0 / 3 * r * disc);
 	quern_real full = 0;
@@ -87,12 +86,35 @@ static bool begin(looking *l) {
 		full = d->full * side * side * (dim == 3 ? side : 1);
 	}
 	l->least = fmin(FEWEST * grain, 0.5 * full);
-	l->most = d->s->host->memory(d->s->run, ((size_t)blocks + 1) * sizeof *l->most);
-	l->middle = d->s->host->memory(d->s->run, ((size_t)blocks + 1) * sizeof *l->middle);
-	return l->most && l->middle;
+	for (int k = 0; k < 2; k++) {
+		l->mass[k] = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
+		l->room[k] = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
+	}
+	return l->mass[0] && l->mass[1] && l->room[0] && l->room[1];
 }
 
 /* ---- what is said of it ---- */
+
+/* Pa, mean over the points of a window. */
+static quern_real pressure_around(const looking *l, const int32_t cell[3]) {
+	const update *d = l->d;
+	const int r = l->reach, depth = d->g->dim == 3 ? r : 0;
+	quern_real sum = 0, volume = 0;
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -r; y <= r; y++)
+			for (int x = -r; x <= r; x++) {
+				int32_t at[3] = { cell[0] + x, cell[1] + y, cell[2] + z };
+				const int32_t c = quern_grid_entry_back(d->g, at);
+				for (uint32_t q = c < 0 ? 0 : d->point_begin[c]; c >= 0 && q < d->point_begin[c + 1]; q++) {
+					const int32_t i = d->point[q];
+					const symmetric t = SYMMETRIC_AT(d->u[U_POINT_STRESS].real, i, d->s->dim);
+					const quern_real own = d->u[U_POINT_WEIGHT].real[0][i] * d->u[U_POINT_VOLUME].real[0][i];
+					sum -= own * (t.xx + t.yy + t.zz) / d->s->dim;
+					volume += own;
+				}
+			}
+	return volume > 0 ? sum / volume : 0;
+}
 
 typedef struct found {
 	quern_real ratio, pressed; /* over the stress-free density; what the points' pressure makes of it */
@@ -100,14 +122,15 @@ typedef struct found {
 	char place[WORDS];
 } found;
 
-static found tell(const looking *l, quern_real ratio, const int32_t cell[3]) {
+static found tell(const looking *l, quern_real ratio, uint32_t entry) {
 	const update *d = l->d;
 	const quern_bound *material = d->s->slot[SLOT_MATERIAL];
-	const window w = window_around(l, cell, true);
 	quern_real bulk, shear, density, x[3];
-	((const quern_material_ops *)material->ops)->moduli(material->self, d->s->dim, &bulk, &shear, &density);
+	int32_t cell[3];
 	found f = { .ratio = ratio, .width = (2 * l->reach + 1) * d->g->cell };
-	f.pressed = 1 + (w.volume > 0 ? fmax(0, w.pressure / w.volume / bulk) : 0);
+	quern_grid_cell_of(d->g, entry, cell);
+	((const quern_material_ops *)material->ops)->moduli(material->self, d->s->dim, &bulk, &shear, &density);
+	f.pressed = 1 + fmax(0, pressure_around(l, cell)) / bulk;
 	quern_hybrid_centre(d, cell, x);
 	if (d->s->dim == 2) snprintf(f.place, WORDS, "(%.4g, %.4g) m", x[0], x[1]);
 	else snprintf(f.place, WORDS, "(%.4g, %.4g, %.4g) m", x[0], x[1], x[2]);
@@ -134,34 +157,27 @@ static quern_status end(const update *d, const found *f) {
 	return d->s->host->stop(d->s->run, QUERN_E_NUMERIC, NULL, -1,
 		"around %s, as a mean over %.3g m and ten updates, material is %.2f times as dense as the continuum "
 		"without stress, %.4g kg/m^3, and denser than what grains consist of, %.4g kg/m^3, which no packing "
-		"is; %s",
+		"is (hybrid.most_density); %s",
 		f->place, f->width, f->ratio, d->h->packed, d->h->solid, remedy(f));
 }
 
-/* How many of 1.05, 1.1, 1.2, 1.4 ... are passed. */
-static int steps_of(quern_real ratio) {
-	int n = 0;
-	for (quern_real above = warned_from; ratio - 1 > above && n < 8; above *= 2) n++;
-	return n;
+/* A continuum that is itself as dense as what grains consist of is a test's, and says nothing. */
+static bool is_solid(const hybrid *h, quern_real ratio) {
+	return h->most_density > 0 && h->solid > h->packed && ratio * h->packed > h->most_density * h->solid;
 }
 
 quern_status quern_hybrid_density(const update *d) {
 	looking l = { .d = d };
 	quern_real ratio = 0, *ever = d->u[U_DENSEST_EVER].real[0];
-	const int32_t *cell = NULL;
 	carry_on(d);
 	if (!begin(&l)) return QUERN_E_MEMORY;
-	d->s->host->parallel(d->s->run, d->g->n_blocks, look_at_block, &l);
-	for (uint32_t q = 0; q < d->g->n_blocks; q++) {
-		const uint32_t b = quern_nth(d->g->by_place, q);
-		if (l.most[b] > ratio) ratio = l.most[b], cell = l.middle[b];
-	}
-	const bool more = steps_of(ratio) > steps_of(*ever),
-			   solid = d->h->solid > d->h->packed && ratio * d->h->packed > d->h->solid;
+	sum_windows(&l);
+	const int32_t c = densest(&l, &ratio);
+	const bool more = steps_passed(ratio - 1) > steps_passed(*ever - 1), solid = is_solid(d->h, ratio);
 	d->u[U_DENSEST].real[0][0] = ratio;
 	*ever = fmax(*ever, ratio);
 	if (!more && !solid) return QUERN_OK;
-	const found f = tell(&l, ratio, cell);
+	const found f = tell(&l, ratio, (uint32_t)c);
 	if (solid) return end(d, &f);
 	warn(d, &f);
 	return QUERN_OK;

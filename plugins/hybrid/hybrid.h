@@ -16,12 +16,12 @@
 
 typedef struct hybrid {
 	int32_t substeps, update, samples, average, growth; /* from the scene */
-	quern_real hysteresis, gain;
+	quern_real hysteresis, gain, most_density;
 	quern_real step, grain_step,
 		continuum_step; /* s, published, for `substeps: auto`; NaN: unknown, or counted already */
 	quern_real diameter, density, solid, packed, law_number; /* of the grains, published by their solver */
-	radius_law radii;                                 /* of grains that enrich cells: a stream of their own */
-	uint32_t dim, every, sample_every;                /* steps */
+	radius_law radii;                  /* of grains that enrich cells: a stream of their own */
+	uint32_t dim, every, sample_every; /* steps */
 	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
 	quern_real rest;     /* 1/s: shear rate of what is at rest */
 	bool moving;         /* some bodies do */

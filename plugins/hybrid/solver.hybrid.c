@@ -25,6 +25,10 @@ static const quern_param params[] = {
 		"Motion beyond twice what there was and gravity gave that ends the run, over what lifts all by a "
 		"diameter; 0: none does.",
 		.def = 1, .max = 1e6, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(hybrid, most_density, "1",
+		"Density of a place, both clouds together, that ends the run, over that of what grains consist of; 0: "
+		"none does.",
+		.def = 1, .max = 1e6, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, weights, "1",
 		"Shares of grains and continuum in the hybrid zone: half each, or a ramp across it, from all grains "
 		"to all "

@@ -129,6 +129,13 @@ QUERN_INLINE quern_real cell_room(const update *d, uint32_t c) {
 /* ---- crowding.c ---- */
 void quern_hybrid_crowding(const update *);
 
+/* How many of 0.05, 0.1, 0.2, 0.4 ... are passed: whoever warns does so again at each. */
+QUERN_INLINE int steps_passed(quern_real part) {
+	int n = 0;
+	for (quern_real step = 0.05; part > step && n < 8; step *= 2) n++;
+	return n;
+}
+
 /* ---- density.c ---- */
 /* Looks for the densest place; warns where it is too dense, and ends the run where no packing is as dense. */
 quern_status quern_hybrid_density(const update *);
