@@ -89,7 +89,7 @@ quern_status quern_hybrid_judge_gain(
 	if (!(h->gain > 0) || kinetic <= 2 * (had + fmax(work, 0)) + slack) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 		"grains and points move with %.3g J, though they had %.3g J at first or when they were poured, and "
-		"gravity and bodies have given %.3g J since: steps of %.3g s make energy, they are too long "
-		"(hybrid.gain)",
+		"gravity and bodies have given %.3g J since: steps of %.3g s make energy, they are too long, or "
+		"grains grow too fast in a jam (hybrid.growth); hybrid.gain says what is allowed",
 		kinetic, had, work, s->dt);
 }

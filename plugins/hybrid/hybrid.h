@@ -24,6 +24,7 @@ typedef struct hybrid {
 	uint32_t dim, every, sample_every; /* steps */
 	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
 	quern_real rest;     /* 1/s: shear rate of what is at rest */
+	quern_real cell;     /* m: of the grid */
 	bool moving;         /* some bodies do */
 	int32_t weights;
 	bool ramped;             /* shares of hybrid cells are a field: cell.weight */
@@ -72,6 +73,9 @@ QUERN_INLINE cloud all_points(const quern_step *s) {
 	return (cloud) { s->use[U_POINT_MASS].real[0], s->use[U_POINT_WEIGHT].real[0], NULL,
 		s->host->set(s->run, "point").n, "point" };
 }
+
+/* Narrower cells say too little of how full they are. */
+QUERN_INLINE bool cells_are_narrow(const hybrid *h) { return h->cell > 0 && h->cell < 1.5 * h->diameter; }
 
 /* The continuum's share in a cell of that zone, where there are no ramps. */
 QUERN_INLINE quern_real zone_share(int32_t zone) {

@@ -3,9 +3,13 @@
 #include "update.h"
 #include <math.h>
 
-enum { FEWEST = 50 }; /* cells: a cell of few grains varies by a tenth */
-#define AWAY 4        /* diameters from a body, beside which grains pack more loosely */
+/* Cells: one of two diameters varies by a tenth. Of a few what is far off can be told. */
+enum { MANY = 50, FEWEST = 10 };
+#define AWAY 4 /* diameters from a body, beside which grains pack more loosely */
 #define OFF 0.01
+#define FAR_OFF 0.1
+#define MOST_COMPRESSED                                                                                      \
+	0.05 /* a continuum that gives way more is softer than grains, and its modulus says nothing of them */
 #define AT_REST 1e-3 /* kinetic energy over m g d, above what settling leaves */
 
 typedef struct bed {
@@ -43,12 +47,15 @@ void quern_hybrid_packing(const update *d) {
 		if (is_bulk(d, c)) add_cell(d, c, &sum);
 	}
 	for (uint32_t k = 0; k < d->s->dim; k++) g2 += d->s->gravity[k] * d->s->gravity[k];
-	if (sum.cells < FEWEST || sum.kinetic > AT_REST * sum.mass * sqrt(g2) * h->diameter) return;
+	if (sum.cells < FEWEST || cells_are_narrow(h) ||
+		sum.kinetic > AT_REST * sum.mass * sqrt(g2) * h->diameter)
+		return;
 	((const quern_material_ops *)material->ops)->moduli(material->self, d->s->dim, &bulk, &shear, &density);
-	const quern_real found = sum.mass / (sum.cells * quern_grid_cell_volume(d->g)) /
-							 (1 + fmax(0, sum.pressure / sum.cells) / bulk);
+	const quern_real compressed = fmax(0, sum.pressure / sum.cells) / bulk;
+	if (compressed > MOST_COMPRESSED) return;
+	const quern_real found = sum.mass / (sum.cells * quern_grid_cell_volume(d->g)) / (1 + compressed);
 	const quern_real off = h->packed / found - 1;
-	if (fabs(off) > OFF)
+	if (fabs(off) > (sum.cells < MANY ? FAR_OFF : OFF))
 		d->s->host->log(d->s->run, 2,
 			"the continuum's density is %.4g kg/m^3, and these grains have settled at %.4g, without what their "
 			"weight compresses: %.1f %% %s; quern calibrate measures it, docs/calibration.md",

@@ -66,6 +66,8 @@
 	X(U_DENSEST, "total.densest", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "Density of the densest place over the stress-free one, at the last update.") \
 	X(U_DENSEST_EVER, "total.densest_ever", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "The largest of these so far.") \
+	X(U_UNCARRIED, "total.uncarried", "1", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "Share of the mass by which grains and points have carried too little or too much, at worst.") \
 	X(U_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, \
 		.doc = "Sum of the contact stress over the samples since the last update.") \
 	X(U_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "Samples of the contact stress.") \

@@ -72,6 +72,8 @@ static const quern_param params[] = {
 		.from = "continuum.density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN | QUERN_ADVANCED, .max = 1e6),
 	QUERN_PARAM_AS(hybrid, rest, "continuum.rest", "1/s", "Shear rate of what is at rest.",
 		.from = "continuum.rest", .flags = QUERN_ADVANCED, .max = 1e300),
+	QUERN_PARAM(
+		hybrid, cell, "m", "Cell of the grid.", .from = "grid.cell", .flags = QUERN_MAYBE | QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, moving, NULL, "Ask for the work of bodies; set by itself where one moves.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, passes, NULL,
@@ -193,6 +195,12 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (h->oracle_cells == 3)
 		return setup->host->fail(err, QUERN_E_PARAM, "oracle_cells",
 			"must be 1, 2 or 4, as many as go into the side of a block of cells");
+	if (h->cell > 0 && h->cell < (1 - 1e-9) * h->diameter)
+		return setup->host->fail(err, QUERN_E_PARAM, NULL,
+			"the grid's cells (continuum.cell) are %.4g m wide, and grains %.4g m: a cell smaller than a grain "
+			"holds none or more than is room for, so that nobody knows how full it is; take two diameters, one "
+			"and a half at least",
+			h->cell, h->diameter);
 	h->dim = setup->dim;
 	h->radii.mean = 0.5 * h->diameter;
 	h->radii.law = h->law_number > 0.5 ? RADIUS_UNIFORM : RADIUS_NORMAL;

@@ -2,6 +2,7 @@
 /* update - the order of a zone update. docs/theory/hybrid.md, section 6, says why it is this one */
 #include "update.h"
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -38,7 +39,24 @@ static quern_status apply(update *d) {
 	return status == QUERN_OK ? quern_hybrid_normals(d) : status;
 }
 
-static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed) {
+/* Cells that the fastest material passes from one update to the next. */
+static quern_real cells_passed(const update *d) {
+	quern_real most = 0;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		quern_real v2 = 0;
+		for (uint32_t k = 0; k < d->s->dim && d->mass[c] > 0; k++)
+			v2 += d->velocity[k][c] * d->velocity[k][c];
+		most = fmax(most, v2);
+	}
+	return sqrt(most) * d->s->dt * d->h->every / d->g->cell;
+}
+
+typedef struct news {
+	uint32_t changed;  /* cells that changed zone */
+	quern_real passed; /* cells */
+} news;
+
+static quern_status once(const hybrid *h, const quern_step *s, news *n) {
 	update d = { .h = h, .s = s };
 	quern_status status = quern_hybrid_sort(&d);
 	if (status == QUERN_OK) {
@@ -50,7 +68,8 @@ static quern_status once(const hybrid *h, const quern_step *s, uint32_t *changed
 	if (status == QUERN_OK) status = apply(&d);
 	free(d.points);
 	free(d.grains);
-	*changed += d.changed;
+	n->changed += d.changed;
+	if (status == QUERN_OK) n->passed = cells_passed(&d);
 	s->use[U_UPDATES].index[0]++;
 	return status;
 }
@@ -76,10 +95,32 @@ void quern_hybrid_look(const void *self, const quern_step *s, quern_real *out) {
 	out[0] = all > 0 ? 100 * sum / all : NAN;
 }
 
-static void say(const quern_step *s, uint32_t changed) {
+/* Booked to the last bit, and yet nobody moves it: what goes through cells unseen is owed where it was. */
+static void warn_of_uncarried(const quern_step *s, quern_real off, quern_real passed) {
+	quern_real *ever = &s->use[U_UNCARRIED].real[0][0];
+	if (steps_passed(fabs(off)) > steps_passed(*ever)) {
+		char why[160];
+		if (passed > 0.5)
+			snprintf(why, sizeof why,
+				"material goes %.2g cells from one update of the zones to the next; a smaller hybrid.update "
+				"sees it pass",
+				passed);
+		else
+			snprintf(why, sizeof why,
+				"there is no room for it where it waits; quern calibrate says which density continuum.material "
+				"takes, and another hybrid.packer may find room");
+		s->host->log(s->run, 2,
+			"grains and points carry %.0f %% %s than there is: the rest stands in the ledger; %s",
+			100 * fabs(off), off < 0 ? "less" : "more", why);
+	}
+	*ever = fmax(*ever, fabs(off));
+}
+
+static void say(const quern_step *s, const news *n) {
 	const quern_column *u = s->use;
 	const quern_real passed = u[U_PASSED].real[0] ? u[U_PASSED].real[0][0] : 0;
 	const quern_real all = u[U_MASS].real[0][0] - passed, whole = all > 0 ? all : 1;
+	const quern_real off = all > 0 ? carried_mass(s) / whole - 1 : 0;
 	quern_real entries = 0;
 	const quern_parts *cells = s->host->parts(s->run, "cell");
 	for (uint32_t q = 0; q < cells->n; q++) {
@@ -88,8 +129,8 @@ static void say(const quern_step *s, uint32_t changed) {
 	}
 	s->host->log(s->run, -1,
 		"update %d at step %lld: %u cells changed zone, entries %.4f of the mass, carried mass %+.4f",
-		u[U_UPDATES].index[0], (long long)s->step, changed, entries / whole,
-		all > 0 ? carried_mass(s) / whole - 1 : 0);
+		u[U_UPDATES].index[0], (long long)s->step, n->changed, entries / whole, off);
+	warn_of_uncarried(s, off, n->passed);
 }
 
 /* What left while the grains settled, less what sources have poured at once: books of what passes know of both. */
@@ -98,24 +139,33 @@ static quern_real passed_before(const quern_step *s) {
 		   book_total(s->use[U_POURED].real[0], s->host->set(s->run, "grain_source").n);
 }
 
+static void warn_of_narrow(const hybrid *h, const quern_step *s) {
+	if (cells_are_narrow(h))
+		s->host->log(s->run, 2,
+			"the grid's cells (continuum.cell) are %.2f diameters of a grain wide: below 1.5 mass waits in entries "
+			"and a bed at rest trembles and sinks; take 2 (docs/stability.md, section 5)",
+			h->cell / h->diameter);
+}
+
 /* The first step only gathers contact stresses: without them new points would start unloaded. The first update then
  * runs twice, since no cell passes from grains to continuum in one. */
 quern_status quern_hybrid_update(const void *self, const quern_step *s) {
 	const hybrid *h = self;
 	const quern_column *u = s->use;
-	uint32_t changed = 0;
+	news n = { .changed = 0 };
 	if (s->step == 0) {
 		update d = { .h = h, .s = s };
 		u[U_MASS].real[0][0] = carried_mass(s) + passed_before(s);
+		warn_of_narrow(h, s);
 		return quern_hybrid_sort(&d); /* so that there are cells to gather stress in */
 	}
 	if ((s->step - 1) % h->every) return QUERN_OK;
-	quern_status status = once(h, s, &changed);
-	if (status == QUERN_OK && s->step == 1) status = once(h, s, &changed);
+	quern_status status = once(h, s, &n);
+	if (status == QUERN_OK && s->step == 1) status = once(h, s, &n);
 	if (status != QUERN_OK) return status;
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, s->dim); k++)
 		memset(u[U_STRESS].real[k], 0, s->host->set(s->run, "cell").n * sizeof(quern_real));
 	u[U_SAMPLES].real[0][0] = 0;
-	say(s, changed);
+	say(s, &n);
 	return QUERN_OK;
 }
