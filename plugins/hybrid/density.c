@@ -95,7 +95,7 @@ static bool begin(looking *l) {
 
 /* ---- what is said of it ---- */
 
-/* Pa, mean over the points of a window. */
+/* Pa, mean over the points of a window; negative where there are none. */
 static quern_real pressure_around(const looking *l, const int32_t cell[3]) {
 	const update *d = l->d;
 	const int r = l->reach, depth = d->g->dim == 3 ? r : 0;
@@ -113,12 +113,13 @@ static quern_real pressure_around(const looking *l, const int32_t cell[3]) {
 					volume += own;
 				}
 			}
-	return volume > 0 ? sum / volume : 0;
+	return volume > 0 ? fmax(0, sum / volume) : -1;
 }
 
 typedef struct found {
 	quern_real ratio, pressed; /* over the stress-free density; what the points' pressure makes of it */
 	quern_real width;          /* m */
+	bool grains_alone;
 	char place[WORDS];
 } found;
 
@@ -130,7 +131,9 @@ static found tell(const looking *l, quern_real ratio, uint32_t entry) {
 	found f = { .ratio = ratio, .width = (2 * l->reach + 1) * d->g->cell };
 	quern_grid_cell_of(d->g, entry, cell);
 	((const quern_material_ops *)material->ops)->moduli(material->self, d->s->dim, &bulk, &shear, &density);
-	f.pressed = 1 + fmax(0, pressure_around(l, cell)) / bulk;
+	const quern_real pressure = pressure_around(l, cell);
+	f.grains_alone = pressure < 0;
+	f.pressed = 1 + fmax(0, pressure) / bulk;
 	quern_hybrid_centre(d, cell, x);
 	if (d->s->dim == 2) snprintf(f.place, WORDS, "(%.4g, %.4g) m", x[0], x[1]);
 	else snprintf(f.place, WORDS, "(%.4g, %.4g, %.4g) m", x[0], x[1], x[2]);
@@ -139,6 +142,10 @@ static found tell(const looking *l, quern_real ratio, uint32_t entry) {
 
 /* What the user can do, by what has made most of it. */
 static const char *remedy(const found *f) {
+	if (f->grains_alone)
+		return "only grains are there: quern calibrate says whether these grains have the density that "
+			   "continuum.material is given, and contacts that are too soft for what they bear let them lie one in "
+			   "another (grains.contact)";
 	if (f->pressed - 1 > 0.5 * (f->ratio - 1))
 		return "its pressure makes most of that: give continuum.material a greater bulk_modulus";
 	return "more mass is there than has room: quern calibrate says whether these grains have the density that "

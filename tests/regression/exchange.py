@@ -11,7 +11,8 @@ import lab
 DEEP = "depth: 8 mm, half_width: 4 mm"
 # slot: options, the plugin they name, the one they replace (None: another slot keeps it)
 CHANGES = [
-    ("contact law", ["grains.contact={hertz: {young: 1e7 Pa, friction: 0.4}}"], "contact.hertz",
+    # grains as soft as that lie one in another, denser than solid
+    ("contact law", ["grains.contact={hertz: {young: 1e7 Pa, friction: 0.4}}", "hybrid.most_density=0"], "contact.hertz",
      "contact.linear"),
     ("a contact law that yields", ["grains.contact={plastic: {stiffness: 1e6 N/m, friction: 0.4}}"], "contact.plastic", "contact.linear"),
     ("contact laws of wet grains", ["grains.contact=[{linear: {stiffness: 1e6 N/m}}, {cohesive: {surface_tension: 0.07 N/m}}]"],
