@@ -53,7 +53,7 @@ void quern_hybrid_crowding(const update *d) {
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
 		const quern_real now = crowding_of(d, c / QUERN_BLOCK_CELLS, cell);
 		crowding[c] += (crowding[c] > 0 ? NEWEST : 1) * (now - crowding[c]);
-		if (d->open[c] > least_open) fullness[c] = cell_holds(d, c) / (d->full * d->open[c]);
+		fullness[c] = d->open[c] > least_open ? cell_holds(d, c) / (d->full * d->open[c]) : 0;
 	}
 	if (!(d->u[U_FULL].real[0][0] > 0)) measure_full(d);
 }

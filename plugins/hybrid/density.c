@@ -41,7 +41,7 @@ static void sum_windows(looking *l) {
 	const update *d = l->d;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		l->mass[0][c] = d->u[U_CARRIED].real[0][c];
-		l->room[0][c] = d->full * d->open[c];
+		l->room[0][c] = d->u[U_ROOM].real[0][c];
 	}
 	for (l->axis = 0; l->axis < d->s->dim; l->axis++) {
 		d->s->host->parallel(d->s->run, d->g->n_blocks, sum_block, l);
@@ -52,14 +52,14 @@ static void sum_windows(looking *l) {
 	}
 }
 
-/* Around a cell with material, the first by place among equals; -1: no window is wide enough. */
+/* Around an open cell with material; -1: no window is wide enough. */
 static int32_t densest(const looking *l, quern_real *ratio) {
 	const update *d = l->d;
 	int32_t found = -1;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		const uint32_t c = nth_cell(d, q);
 		int32_t cell[3];
-		if (!(d->u[U_CARRIED].real[0][c] > 0 && l->room[0][c] >= l->least) ||
+		if (!(d->u[U_CARRIED].real[0][c] > 0 && d->open[c] > 0.5 && l->room[0][c] >= l->least) ||
 			!quern_grid_cell_of(d->g, c, cell))
 			continue;
 		if (l->mass[0][c] > *ratio * l->room[0][c])
@@ -68,11 +68,15 @@ static int32_t densest(const looking *l, quern_real *ratio) {
 	return found;
 }
 
-/* In flow a window's mass is noise from update to update too. */
+/* In flow a window's mass is noise from update to update too. Room is averaged with it: behind the face of a body that moves, the mass of before
+ * would stand in cells that are closed by now. */
 static void carry_on(const update *d) {
-	quern_real *carried = d->u[U_CARRIED].real[0];
+	quern_real *carried = d->u[U_CARRIED].real[0], *room = d->u[U_ROOM].real[0];
 	const quern_real part = d->u[U_UPDATES].index[0] ? NEWEST : 1;
-	for (uint32_t c = 0; c < d->n_cells; c++) carried[c] += part * (d->mass[c] - carried[c]);
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		carried[c] += part * (d->mass[c] - carried[c]);
+		room[c] += part * (d->full * d->open[c] - room[c]);
+	}
 }
 
 static bool begin(looking *l) {

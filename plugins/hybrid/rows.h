@@ -63,6 +63,8 @@
 		.doc = "The mean of that in the continuum, when there first was one.") \
 	X(U_CARRIED, "cell.carried", "kg", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "What both clouds carry in a cell, mean over the last updates.") \
+	X(U_ROOM, "cell.room", "kg", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "What would fill its open room without stress, mean over the last updates.") \
 	X(U_DENSEST, "total.densest", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "Density of the densest place over the stress-free one, at the last update.") \
 	X(U_DENSEST_EVER, "total.densest_ever", "1", QUERN_UPDATE, QUERN_SCALAR, .doc = "The largest of these so far.") \

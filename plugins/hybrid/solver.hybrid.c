@@ -198,7 +198,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (h->cell > 0 && h->cell < (1 - 1e-9) * h->diameter)
 		return setup->host->fail(err, QUERN_E_PARAM, NULL,
 			"the grid's cells (continuum.cell) are %.4g m wide, and grains %.4g m: a cell smaller than a grain "
-			"holds none or more than is room for, so that nobody knows how full it is; take two diameters, one "
+			"holds none or more than there is room for, so that nobody knows how full it is; take two diameters, one "
 			"and a half at least",
 			h->cell, h->diameter);
 	h->dim = setup->dim;

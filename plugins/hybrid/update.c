@@ -39,12 +39,15 @@ static quern_status apply(update *d) {
 	return status == QUERN_OK ? quern_hybrid_normals(d) : status;
 }
 
+/* Of a full cell's mass: what is less, a grain that splashes, does not say how fast material is. */
+static const quern_real least_told = 0.1;
+
 /* Cells that the fastest material passes from one update to the next. */
 static quern_real cells_passed(const update *d) {
 	quern_real most = 0;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		quern_real v2 = 0;
-		for (uint32_t k = 0; k < d->s->dim && d->mass[c] > 0; k++)
+		for (uint32_t k = 0; k < d->s->dim && d->mass[c] > least_told * d->full; k++)
 			v2 += d->velocity[k][c] * d->velocity[k][c];
 		most = fmax(most, v2);
 	}
@@ -100,7 +103,10 @@ static void warn_of_uncarried(const quern_step *s, quern_real off, quern_real pa
 	quern_real *ever = &s->use[U_UNCARRIED].real[0][0];
 	if (steps_passed(fabs(off)) > steps_passed(*ever)) {
 		char why[160];
-		if (passed > 0.5)
+		if (off > 0)
+			snprintf(why, sizeof why,
+				"the ledger owes as much (sums.owed in summary.json), and takes it back where it can");
+		else if (passed > 0.5)
 			snprintf(why, sizeof why,
 				"material goes %.2g cells from one update of the zones to the next; a smaller hybrid.update "
 				"sees it pass",
@@ -110,8 +116,9 @@ static void warn_of_uncarried(const quern_step *s, quern_real off, quern_real pa
 				"there is no room for it where it waits; quern calibrate says which density continuum.material "
 				"takes, and another hybrid.packer may find room");
 		s->host->log(s->run, 2,
-			"grains and points carry %.0f %% %s than there is: the rest stands in the ledger; %s",
-			100 * fabs(off), off < 0 ? "less" : "more", why);
+			off < 0 ? "grains and points carry %.0f %% less than there is: the rest stands in the ledger; %s"
+					: "grains and points carry %.0f %% more than there is: %s",
+			100 * fabs(off), why);
 	}
 	*ever = fmax(*ever, fabs(off));
 }
