@@ -25,8 +25,9 @@ typedef struct {
 	trip_memory trip;
 	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
 	_Alignas(64) quern_real kept[3][STENCIL], mean_pressure[STENCIL];
-	/* by cell of the block: Pa and m^3 of its points, kg/m^3 of what it holds */
-	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], held[QUERN_BLOCK_CELLS];
+	/* by cell of the block: Pa and m^3 of its points, m^3 of those that are open, kg/m^3 of what it holds */
+	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
+		held[QUERN_BLOCK_CELLS];
 	fit_memory fit; /* where the transfer asks for it */
 } gather_memory;
 
@@ -174,23 +175,30 @@ static quern_real density_of(const gather_work *w, const gather_memory *m, uint3
 	return counted > 0 ? centre + own_part * (counted * w->p->density - centre) : centre;
 }
 
-/* The mean pressure of each cell's points, by volume, and the density of each cell. */
+/* Of the stress-free density: a point less dense is open, its volume is the grid's. */
+static const quern_real dense = 0.98;
+
+/* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
+ * where the cell is full; in one that is not they are spray beside it. */
 static void level_block(const gather_work *w, gather_memory *m, uint32_t b) {
-	const quern_real *volume = w->s->use[GATHER_VOLUME].real[0];
+	const quern_real *mass = w->s->use[GATHER_MASS].real[0], *volume = w->s->use[GATHER_VOLUME].real[0];
 	quern_real *const *position = w->s->use[GATHER_POSITION].real;
 	memset(m->level, 0, sizeof m->level);
 	memset(m->room, 0, sizeof m->room);
+	memset(m->loose, 0, sizeof m->loose);
 	for (uint32_t i = w->point[b]; i < w->point[b + 1]; i++) {
 		quern_real place[3];
 		for (uint32_t k = 0; k < w->s->dim; k++) place[k] = position[k][i] - w->g->lower[k];
 		const uint32_t c = cell_in_block(w, b, place);
+		const bool open = mass[i] < dense * w->p->density * volume[i];
 		m->level[c] += volume[i] * pressure_of(w, i);
-		m->room[c] += volume[i];
+		*(open ? &m->loose[c] : &m->room[c]) += volume[i];
 	}
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
-		const bool any = m->room[c] > 0;
-		m->level[c] = any ? m->level[c] / m->room[c] : 0;
+		const bool any = m->room[c] + m->loose[c] > 0;
 		m->held[c] = any ? density_of(w, m, b, c) : 0;
+		const quern_real room = m->room[c] + (m->held[c] > dense * w->p->density ? m->loose[c] : 0);
+		m->level[c] = room > 0 ? m->level[c] / room : 0;
 	}
 }
 
@@ -204,9 +212,6 @@ static quern_real lacks_least(
 	const quern_real least = p->relief * p->bulk * (w->s->use[GATHER_CROWDING].real[0][c] - w->full);
 	return least > 0 && least > pressure ? fmin(1, p->answer * w->s->dt) * (least - pressure) : 0;
 }
-
-/* Of the stress-free density: a point less dense is open, its volume is the grid's. */
-static const quern_real dense = 0.98;
 
 /* Points do not feel that they lie one upon the other: as material is sheared, their density goes to their cell's, a part for each unit of
  * shear; if it went to the grid's at their own place it would take over that one's noise. A cell that bears nothing has no friction to lose,
