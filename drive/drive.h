@@ -116,6 +116,8 @@ typedef struct drive_point {
 bool quern_drive_point_begin(drive_point *, const drive_material *, const drive_path *, quern_text *why);
 void quern_drive_point_finish(drive_point *);
 void quern_drive_point_keep(drive_point *);
+/* To the state that was kept last. */
+void quern_drive_point_back(drive_point *);
 /* From what was kept, one step with these increments of strain. */
 void quern_drive_point_step(drive_point *, const drive_path *, const double *strain, double dt);
 double quern_drive_point_pressure(const drive_point *);

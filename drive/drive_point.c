@@ -119,6 +119,11 @@ void quern_drive_point_keep(drive_point *p) {
 	p->kept_volume = p->volume;
 }
 
+void quern_drive_point_back(drive_point *p) {
+	memcpy(p->memory, p->kept, p->size * sizeof *p->memory);
+	p->volume = p->kept_volume;
+}
+
 /* As a solver does it: V *= det(1 + dt L), and then the material is asked. Around a point alone the grid is as dense as its
  * deformation says, whatever the material makes of that. */
 void quern_drive_point_step(drive_point *p, const drive_path *path, const double *strain, double dt) {

@@ -272,7 +272,10 @@ static bool walk_leg(
 		set_step(w, from, to, k);
 		if (!step_is_small(w, time, why)) return false;
 		w->tries = 0;
-		if (!seek(w, g) || !is_finite(w->point)) return fail(w, g, time, why);
+		if (!seek(w, g) || !is_finite(w->point)) {
+			quern_drive_point_back(w->point); /* to what the last row has */
+			return fail(w, g, time, why);
+		}
 		r->most_tries = w->tries > r->most_tries ? w->tries : r->most_tries;
 		take(w, g);
 		put_row(r, w, time);

@@ -34,8 +34,8 @@ class Parser(argparse.ArgumentParser):
 def arguments(words: list[str] | None) -> argparse.Namespace:
     parser = Parser(prog="quern chart", usage=USAGE, add_help=False,
                     formatter_class=lambda prog: argparse.HelpFormatter(prog, max_help_position=30, width=200))
-    parser.add_argument("what", metavar="STUDY.yaml | RUN | FILE.csv", nargs="+",
-                        help="a study whose charts are drawn, folders of runs, or tables; docs/charts.md")
+    parser.add_argument("what", metavar="WHAT", nargs="+",
+                        help="a study (.yaml) whose charts are drawn, folders of runs, or tables (.csv); docs/charts.md")
     parser.add_argument("-o", "--output", metavar="PATH",
                         help="of a study its folder, default: out/NAME; of runs and tables the picture, .svg, .png or .pdf, default: chart.svg")
     parser.add_argument("--only", metavar="NAME", help="of a study: draw this chart alone")
