@@ -112,13 +112,15 @@ static bool read_number(quern_units *units, const char *option, const char *text
 static char *read_file(const char *path, size_t *length, quern_text *why) {
 	struct stat is;
 	const int fd = quern_open_file(path);
-	FILE *file = fd < 0 ? NULL : fdopen(fd, "rb");
-	if (!file || fstat(fd, &is)) return quern_text_add(why, "%s: %s", path, strerror(errno)), NULL;
+	if (fd < 0) return quern_text_add(why, "%s: %s", path, strerror(errno)), NULL;
 	char *data = NULL;
-	if (is.st_size > MOST_TABLE) quern_text_add(why, "%s: a table has at most %d bytes", path, MOST_TABLE);
+	if (fstat(fd, &is)) quern_text_add(why, "%s: %s", path, strerror(errno));
+	else if (is.st_size > MOST_TABLE)
+		quern_text_add(why, "%s: a table has at most %d bytes", path, MOST_TABLE);
 	else data = quern_take((size_t)is.st_size + 1, 1);
-	if (data) *length = fread(data, 1, (size_t)is.st_size, file);
-	fclose(file);
+	for (ssize_t n = 1; data && n > 0 && *length < (size_t)is.st_size; *length += n > 0 ? (size_t)n : 0)
+		n = read(fd, data + *length, (size_t)is.st_size - *length);
+	close(fd);
 	return data;
 }
 

@@ -34,24 +34,28 @@ static bool try_steps(quern_run *run) {
 	return true;
 }
 
+static double discrete_share(quern_run *run) {
+	const quern_account sums = quern_run_account(run);
+	return quern_account_of(&sums, "discrete") / quern_account_of(&sums, "mass");
+}
+
 quern_prospect quern_prospect_of(quern_run *run, const quern_estimate *before) {
 	quern_prospect p = {
 		.cell = quern_wish_cell(run->scene), .substeps = before->most_substeps, .who = who_takes_substeps(run)
 	};
 	const quern_own_steps *own = &before->own;
+	if (!(discrete_share(run) > 1 - 1e-9)) return p;
 	const double alone = quern_estimate_price(run, true, 1, 1), n = before->substeps;
 	if (!p.who || !(p.substeps > 0) || !(alone > 0) || STEPS * n * alone > patience || !try_steps(run))
 		return p;
-	const quern_account sums = quern_run_account(run);
-	const double mass = quern_account_of(&sums, "mass"), substep = quern_estimate_price(run, true, 1, 1);
-	if (!(mass > 0)) return p;
+	const double substep = quern_estimate_price(run, true, 1, 1);
 	quern_own_steps wide = *own;
 	wide.step *= 2; /* waves take as much longer through a cell */
 	p.wide_substeps = quern_run_most_substeps(&wide);
 	const double price[] = { quern_estimate_price(run, false, (uint32_t)n, 1),
 		quern_estimate_price(run, false, (uint32_t)p.substeps, 1),
 		quern_estimate_price(run, false, (uint32_t)p.wide_substeps, 2) };
-	p.discrete = quern_account_of(&sums, "discrete") / mass;
+	p.discrete = discrete_share(run);
 	p.ratio = quern_prospect_ratio(n, substep, price[0], own->substep, fmin(own->step, before->step), alone);
 	p.best = quern_prospect_ratio(p.substeps, substep, price[1], own->substep, own->step, alone);
 	p.wide = quern_prospect_ratio(p.wide_substeps, substep, price[2], own->substep, wide.step, alone);

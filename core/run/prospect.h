@@ -4,8 +4,9 @@
 #include "estimate.h"
 
 typedef struct quern_prospect {
-	bool
-		known; /* false: nobody takes long steps beside those who take substeps, or the two steps failed or would take half a minute */
+	/* False: nobody takes long steps beside those who take substeps, these do not carry all mass at the start, or the two steps
+	 * failed or would take half a minute. */
+	bool known;
 	const char *who; /* take substeps: what a scene calls the entries of the first set of those that do */
 	double discrete; /* share of the mass that they carry, after two steps */
 	double ratio;    /* cost over that of these alone: with the scene's own substeps, */
