@@ -118,7 +118,7 @@ static char *read_file(const char *path, size_t *length, quern_text *why) {
 	else if (is.st_size > MOST_TABLE)
 		quern_text_add(why, "%s: a table has at most %d bytes", path, MOST_TABLE);
 	else data = quern_take((size_t)is.st_size + 1, 1);
-	for (ssize_t n = 1; data && n > 0 && *length < (size_t)is.st_size; *length += n > 0 ? (size_t)n : 0)
+	for (ssize_t n = 1; data && n > 0 && *length<(size_t)is.st_size; *length += n> 0 ? (size_t)n : 0)
 		n = read(fd, data + *length, (size_t)is.st_size - *length);
 	close(fd);
 	return data;
