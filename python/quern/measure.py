@@ -19,6 +19,7 @@ SOURCES = {"series": "a column of series.csv", "summary": "a path in summary.jso
 RESULTS = ("steps", "substeps", "settle_steps", "time_end", "grains", "points", "mass_defect", "discrete_share", "energy")
 RESERVED = ("run", "point", "model", "seed", "status", "exit", "message", "scene_hash", "runs", "done", *RESULTS)
 COSTS = {"wall": "s", "processor": "s", "running": "s", "memory": "B"}  # columns cost.NAME of every table
+TIMES = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
 UNITS = {"time_end": "s", "time_step": "s", "energy": "J", "mass_initial": "kg", "mass_final": "kg", "mass_ledger": "kg",
          "momentum": "kg m/s", "peak_rss_bytes": "B"}
 
@@ -33,6 +34,8 @@ class Measure:
     norm: str = "rms"
     relative: bool = False
     per: str = ""  # the path in summary.json of the number that it is divided by
+    begin: float = -math.inf  # s, of a series: rows from this time on
+    end: float = math.inf  # s, up to this one
 
     @property
     def vector(self) -> bool:
@@ -101,6 +104,11 @@ def check_words(reader: Reader, found: dict, measure: Measure) -> None:
         reader.fault(found[key][0], f"measure.{key}: {text}")
     if "at" in found and measure.source in ("summary", "cost"):
         refuse("at", "a summary has one value; leave 'at' out")
+    for key in ("from", "until"):
+        if key in found and measure.source != "series":
+            refuse(key, f"only a series has rows over time; leave '{key}' out")
+    if measure.begin > measure.end:
+        refuse("until", "is before 'from'")
     if "of" in found and measure.source != "frame":
         refuse("of", "only what is taken from a frame is made of many; leave 'of' out")
     if "norm" in found and (measure.single or measure.distribution):
@@ -118,6 +126,14 @@ def check_words(reader: Reader, found: dict, measure: Measure) -> None:
         refuse("per", f"'{measure.per}' was measured with a clock, and this measure is a result; leave it out")
 
 
+def read_time(reader: Reader, node: yaml.Node, where: str) -> float:
+    got = reader.quantity(node, where)
+    if got and got[1] not in TIMES:
+        reader.fault(node, f"{where} must be a time in s, ms or us, not '{node.value}'")
+        return math.nan
+    return got[0] * TIMES[got[1]] if got else math.nan
+
+
 def read_name(reader: Reader, node: yaml.Node, source: str) -> str:
     name = reader.text(node, "measure.name", "a word")
     if name and (not re.fullmatch(r"[A-Za-z_]\w*", name) or name in RESERVED):
@@ -128,7 +144,7 @@ def read_name(reader: Reader, node: yaml.Node, source: str) -> str:
 
 
 def read_measure(reader: Reader, node: yaml.Node) -> Measure | None:
-    found = reader.mapping(node, "measure", ("name", *SOURCES, "at", "of", "norm", "relative", "per"))
+    found = reader.mapping(node, "measure", ("name", *SOURCES, "at", "from", "until", "of", "norm", "relative", "per"))
     reader.require(node, found, "measure: ", {"name": ""})
     source = read_source(reader, node, found)
     if not source:
@@ -143,8 +159,10 @@ def read_measure(reader: Reader, node: yaml.Node) -> Measure | None:
     check_path(reader, found[source][1], source, path)
     name = read_name(reader, found["name"][1], source) if "name" in found else ""
     per = reader.text(found["per"][1], "measure.per", "a path in summary.json such as grains") if "per" in found else ""
+    times = {key: read_time(reader, found[key][1], f"measure.{key}") for key in ("from", "until") if key in found}
     measure = Measure(name, source, path, choice("at", ("last", "first") if source == "frame" else AT, "last"), choice("of", OF, ""),
-                      choice("norm", NORMS, "rms"), choice("relative", ("yes", "no", "true", "false"), "no") in ("yes", "true"), per)
+                      choice("norm", NORMS, "rms"), choice("relative", ("yes", "no", "true", "false"), "no") in ("yes", "true"), per,
+                      times.get("from", -math.inf), times.get("until", math.inf))
     if len(reader.faults) == before:
         check_words(reader, found, measure)
     return measure
@@ -206,11 +224,13 @@ def of_series(measure: Measure, run: Run) -> Reading:
         found = sorted((int(match[1]), match[0]) for match in map(form.fullmatch, series) if match)
         names = [name for _, name in found] or names
     columns, unit = [series[name] for name in names], series.units[names[0]]
-    if not len(series):
-        raise ValueError("series.csv has no row")
+    within = (series["time"] >= measure.begin) & (series["time"] <= measure.end)
+    columns = [column[within] for column in columns]
+    if not within.any():
+        raise ValueError("series.csv has no row" + (" between 'from' and 'until'" if len(series) else ""))
     if measure.at != "every":
         return Reading(np.array([float(PICKS[measure.at](column)) for column in columns]), unit, None, tuple(names))
-    return Reading(np.column_stack(columns) if measure.vector else columns[0], unit, series["time"], tuple(names))
+    return Reading(np.column_stack(columns) if measure.vector else columns[0], unit, series["time"][within], tuple(names))
 
 
 def made_of(x: np.ndarray, of: str) -> float:

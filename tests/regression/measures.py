@@ -62,7 +62,9 @@ def check_two_grains(here):
                 {"name": "sum", "frame": "grain.velocity.x", "of": "sum"}, {"name": "spread", "frame": "grain.velocity.x", "of": "deviation", "at": "first"},
                 {"name": "speeds", "frame": "grain.velocity.x", "of": "all"}, {"name": "step_cost", "cost": "wall_seconds", "per": "grain_steps"},
                 {"name": "fill", "cost": "seconds_by_stage.dem.fill"}, {"name": "kinetic", "summary": "sums.kinetic"},
-                {"name": "last_energy", "summary": "observers.energy.grains.last"}]
+                {"name": "last_energy", "summary": "observers.energy.grains.last"},
+                {"name": "late", "series": "energy.grains", "at": "max", "from": "3 ms"}, {"name": "early", "series": "energy.grains", "at": "min", "until": "1 ms"},
+                {"name": "never", "series": "energy.grains", "from": "5 ms"}]
     e = "grains.contact.linear.restitution"
     path = write(here, "two", set={"time.end": "4 ms", "observe": ["energy", PROFILE]}, axes={"e": {"key": e, "list": [0.5, 0.8]}}, measure=measures,
                  repeats={"seeds": 2}, reference={"name": "full", "set": {e: 1}})
@@ -70,9 +72,11 @@ def check_two_grains(here):
     sweep(path, out)
     rows, units = table(out)
     points, point_units = table(out, "points")
-    assert not any(row["message"] for row in rows), rows
+    assert all(row["message"] == "never: series.csv has no row between 'from' and 'until'" for row in rows), rows
     for row in rows:
         run = out / "runs" / row["run"]
+        times, energies = column(run, "time"), column(run, "energy.grains")
+        assert float(row["late"]) == energies[times >= 3e-3].max() and float(row["early"]) == energies[times <= 1e-3].min() and len(set(energies)) > 1
         restitution = 1 if row["model"] else float(row["e"])
         near(row["radius"], 0.005, 1e-15, "mean radius")
         near(row["speed"], restitution, 0.005, "the faster grain's velocity is e")
