@@ -21,14 +21,15 @@ def rates(folder):
     """Widths in m and mean rates in kg/s, by method."""
     found = {}
     with open(folder / "table.csv") as file:
-        for row in csv.DictReader(file):
+        for line in csv.DictReader(file):
+            row = {key.split(" [")[0]: value for key, value in line.items()}
             if row["status"] == "done":
                 method = row["model"] or row["method"]
-                found.setdefault(method, {}).setdefault(float(row["opening"].split()[0]) * DIAMETER, []).append(float(row["rate [kg/s]"]))
+                found.setdefault(method, {}).setdefault(float(row["opening"]) * DIAMETER, []).append(float(row["rate"]))
     return {method: sorted((width, sum(w) / len(w)) for width, w in by.items()) for method, by in found.items()}
 
 
-def line(points):
+def straight(points):
     """Slope, zero and R^2 of y over x by least squares."""
     n = len(points)
     xm, ym = (sum(point[k] for point in points) / n for k in (0, 1))
@@ -39,7 +40,7 @@ def line(points):
 def table(found):
     rows = ["| method | C | k | R² |", "|---|---|---|---|"]
     for method, points in found.items():
-        slope, zero, square = line([(width, rate ** (2 / 3)) for width, rate in points])
+        slope, zero, square = straight([(width, rate ** (2 / 3)) for width, rate in points])
         rows.append(f"| {method} | {slope ** 1.5 / (DENSITY * math.sqrt(GRAVITY)):.3f} | {zero / DIAMETER:.2f} | {square:.5f} |")
     return "\n".join(rows) + "\n"
 
