@@ -108,20 +108,34 @@ static bool read_number(quern_units *units, const char *option, const char *text
 	return false;
 }
 
+/* All bytes that a file of `size` still has; -1 with errno. */
+static ssize_t read_bytes(int fd, char *data, size_t size) {
+	size_t length = 0;
+	while (length < size) {
+		const ssize_t n = read(fd, data + length, size - length);
+		if (n < 0 && errno != EINTR) return -1;
+		if (n == 0) break;
+		if (n > 0) length += (size_t)n;
+	}
+	return (ssize_t)length;
+}
+
 /* The file's bytes; NULL with one sentence. */
 static char *read_file(const char *path, size_t *length, quern_text *why) {
-	struct stat is;
-	const int fd = quern_open_file(path);
-	if (fd < 0) return quern_text_add(why, "%s: %s", path, strerror(errno)), NULL;
+	struct stat is = { 0 };
+	ssize_t found = -1;
 	char *data = NULL;
-	if (fstat(fd, &is)) quern_text_add(why, "%s: %s", path, strerror(errno));
-	else if (is.st_size > MOST_TABLE)
-		quern_text_add(why, "%s: a table has at most %d bytes", path, MOST_TABLE);
-	else data = quern_take((size_t)is.st_size + 1, 1);
-	for (ssize_t n = 1; data && n > 0 && *length<(size_t)is.st_size; *length += n> 0 ? (size_t)n : 0)
-		n = read(fd, data + *length, (size_t)is.st_size - *length);
-	close(fd);
-	return data;
+	const int fd = quern_open_file(path);
+	if (fd >= 0 && !fstat(fd, &is) && is.st_size <= MOST_TABLE) {
+		data = quern_take((size_t)is.st_size + 1, 1);
+		found = read_bytes(fd, data, (size_t)is.st_size);
+	}
+	if (is.st_size > MOST_TABLE) quern_text_add(why, "%s: a table has at most %d bytes", path, MOST_TABLE);
+	else if (found < 0) quern_text_add(why, "%s: %s", path, strerror(errno));
+	if (fd >= 0) close(fd);
+	if (found >= 0) return *length = (size_t)found, data;
+	free(data);
+	return NULL;
 }
 
 static bool read_table(
