@@ -150,17 +150,19 @@ static quern_real pressure_of(const gather_work *w, uint32_t i) {
 	return pressure;
 }
 
-/* On the grid in the middle of a cell: the mean of its corners. */
+/* On the grid in the middle of a cell: the mean of its corners, without those that bodies leave no room. */
 static quern_real centre_density(const gather_work *w, const gather_memory *m, uint32_t place) {
 	const uint32_t dim = w->s->dim, edge = w->g->edge;
 	const uint32_t at[3] = { place % edge, place / edge % edge, place / edge / edge };
 	quern_real sum = 0;
+	uint32_t n = 0;
 	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
 		uint32_t node = 0;
 		for (uint32_t k = dim; k-- > 0;) node = node * w->g->span + at[k] + 1 + (corner >> k & 1);
-		sum += m->tile[node][2 * dim];
+		sum += m->tile[node][motion_density(dim)];
+		n += m->tile[node][motion_density(dim)] > 0;
 	}
-	return sum / (1u << dim);
+	return n ? sum / n : 0;
 }
 
 /* Of a cell's density, what is measured in the cell itself, and not on the grid. */

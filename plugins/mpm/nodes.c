@@ -21,19 +21,25 @@ typedef struct {
 } grid_work;
 
 typedef struct {
-	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
+	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N],
+		room[3][N]; /* by axis: what faces and bodies that lie across it leave of a node's volume */
 } near_nodes;
 
-/* Volume of a node over that of one inside, along all axes but one: less at and next to a wall. */
-static quern_real node_share(const grid_work *w, const int32_t at[3], uint32_t but) {
-	quern_real share = 1;
-	for (uint32_t k = 0; k < w->g->dim; k++) {
-		if (w->g->periodic[k] || k == but) continue;
-		const int32_t from_wall = at[k] < w->g->cells[k] - at[k] ? at[k] : w->g->cells[k] - at[k];
-		if (from_wall == 0) share *= w->p->share_wall;
-		else if (from_wall == 1) share *= w->p->share_next;
-	}
-	return share;
+static int32_t cells_to_face(const quern_grid_view *g, const int32_t at[3], uint32_t k) {
+	return at[k] < g->cells[k] - at[k] ? at[k] : g->cells[k] - at[k];
+}
+
+/* Volume of a node over that of one inside: less at and next to a face. */
+static quern_real share_along(const grid_work *w, const int32_t at[3], uint32_t k) {
+	const int32_t away = cells_to_face(w->g, at, k);
+	return w->g->periodic[k] || away > 1 ? 1 : away == 1 ? w->p->share_next : w->p->share_wall;
+}
+
+static uint32_t axis_nearest(const near_nodes *n, uint32_t i, uint32_t dim) {
+	uint32_t axis = 0;
+	for (uint32_t k = 1; k < dim; k++)
+		if (fabs(n->normal[k][i]) > fabs(n->normal[axis][i])) axis = k;
+	return axis;
 }
 
 /* Sets a node's velocity and books the impulse that it takes. */
@@ -48,15 +54,13 @@ QUERN_INLINE void change_velocity(
 /* m^2 (2-D: m): the part of a body's surface that the node bears. Nodes of one column along the axis that the normal is
  * nearest to share the column's part; where more than one of them is in the body each is taken for the only one. */
 static quern_real node_area(const grid_work *w, const near_nodes *n, uint32_t b, uint32_t i) {
-	uint32_t axis = 0;
+	const uint32_t axis = axis_nearest(n, i, w->g->dim);
 	quern_real area = 1;
 	int32_t at[3];
 	quern_grid_cell_of(w->g, b * N + i, at);
-	for (uint32_t k = 1; k < w->g->dim; k++) {
-		if (fabs(n->normal[k][i]) > fabs(n->normal[axis][i])) axis = k;
-		area *= w->g->cell;
-	}
-	return area * node_share(w, at, axis) / fabs(n->normal[axis][i]);
+	for (uint32_t k = 0; k < w->g->dim; k++)
+		if (k != axis) area *= w->g->cell * share_along(w, at, k);
+	return area / fabs(n->normal[axis][i]);
 }
 
 /* Between slip and sticky: what presses the node on the body lets it rub. After a coupling that is what has come since;
@@ -120,8 +124,8 @@ static void touch_node(const grid_work *w, uint32_t j, const near_nodes *n, uint
 	booked[B_WORK] += quern_vec_dot(QUERN_VEC_OF(given), QUERN_VEC_AT(n->velocity, i, dim), 3);
 }
 
-static bool body_is_far(
-	const quern_bound *body, const near_nodes *n, quern_body_batch batch, quern_real extent) {
+static bool body_is_far(const quern_bound *body, const near_nodes *n, quern_body_batch batch, quern_real cell,
+	quern_real extent) {
 	near_nodes one;
 	for (uint32_t k = 0; k < batch.dim; k++) {
 		one.position[k][0] = n->position[k][0] + 0.5 * extent;
@@ -130,7 +134,8 @@ static bool body_is_far(
 		batch.normal[k] = one.normal[k];
 		batch.velocity[k] = one.velocity[k];
 	}
-	for (uint32_t i = 0; i < QUERN_LANES; i++) one.radius[i] = 0.9 * extent; /* sqrt(3)/2 and a little */
+	/* sqrt(3)/2 and a little, and the cell in which a body takes room */
+	for (uint32_t i = 0; i < QUERN_LANES; i++) one.radius[i] = 0.9 * extent + cell;
 	batch.n = 1;
 	batch.cap = QUERN_LANES;
 	batch.radius = one.radius;
@@ -145,6 +150,34 @@ static void bring_nodes(const body_pose *pose, uint32_t dim, near_nodes *n) {
 		(quern_real *const[3]) { n->own[0], n->own[1], n->own[2] });
 }
 
+/* Of the hat around a node, the part on this side of a plane in the distance `gap`: exact across an axis, within 0.013 elsewhere. */
+static quern_real share_before(quern_real gap, quern_real cell) {
+	const quern_real t = fmin(fabs(gap) / cell, 1), beyond = 0.5 * (1 - t) * (1 - t);
+	return gap > 0 ? 1 - beyond : beyond;
+}
+
+/* What bodies across the same axis leave is what the nearest one leaves; a plane on a face of the domain is that face. */
+static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
+	const quern_real cell = w->g->cell;
+	if (w->again || !(fabs(n->gap[i]) < cell || n->gap[i] < 0)) return;
+	int32_t at[3];
+	const uint32_t k = axis_nearest(n, i, w->g->dim);
+	quern_grid_cell_of(w->g, b * N + i, at);
+	if (!w->g->periodic[k] && fabs(n->gap[i] - cells_to_face(w->g, at, k) * cell) < 1e-6 * cell) return;
+	n->room[k][i] = fmin(n->room[k][i], share_before(n->gap[i], cell));
+}
+
+/* A node that has hardly any room of its own says nothing about how full that is: 0. */
+static void measure_densities(const grid_work *w, uint32_t b, const near_nodes *n) {
+	const quern_real least = 0.2, volume = quern_grid_cell_volume(w->g);
+	for (uint32_t i = 0; i < N; i++) {
+		quern_real room = 1;
+		for (uint32_t k = 0; k < w->g->dim; k++) room *= n->room[k][i];
+		w->motion[(size_t)b * N + i][motion_density(w->g->dim)] =
+			room > least ? w->node[(size_t)b * N + i][0] / (volume * room) : 0;
+	}
+}
+
 static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 	const quern_step *s = w->s;
 	quern_body_batch batch = { .n = N, .cap = N, .dim = s->dim, .radius = n->radius, .gap = n->gap };
@@ -155,7 +188,12 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 	for (uint32_t i = 0; i < N; i++) {
 		quern_real x[3];
 		quern_grid_corner(w->g, b * N + i, x);
-		for (uint32_t k = 0; k < s->dim; k++) n->position[k][i] = x[k];
+		int32_t at[3];
+		quern_grid_cell_of(w->g, b * N + i, at);
+		for (uint32_t k = 0; k < s->dim; k++) {
+			n->position[k][i] = x[k];
+			n->room[k][i] = share_along(w, at, k);
+		}
 		n->radius[i] = 0;
 	}
 	for (uint32_t j = 0; j < w->n_bodies; j++) {
@@ -166,12 +204,13 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 			continue;
 		batch.pose = &w->pose[j].pose;
 		if (w->pose[j].repeats) bring_nodes(&w->pose[j], s->dim, n);
-		else if (body_is_far(body, n, batch, w->g->cell * w->g->edge)) continue;
+		else if (body_is_far(body, n, batch, w->g->cell, w->g->cell * w->g->edge)) continue;
 		for (uint32_t k = 0; k < s->dim; k++)
 			batch.position[k] = w->pose[j].repeats ? n->own[k] : n->position[k];
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 		for (uint32_t i = 0; i < N; i++) {
 			const quern_real mass = w->node[(size_t)b * N + i][0];
+			if (mass > 0) take_room(w, b, i, n);
 			if (mass > 0 && n->gap[i] <= 1e-9 * w->g->cell)
 				touch_node(w, j, n, b, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
 		}
@@ -206,6 +245,7 @@ static void meet_walls(void *arg, uint32_t b, uint32_t worker) {
 	for (uint32_t i = 0; i < N && !any; i++) any = w->node[(size_t)b * N + i][0] > 0;
 	if (!any || !n) return;
 	meet_bodies(w, b, n);
+	if (!w->again) measure_densities(w, b, n);
 	close_faces(w, b, body_booked(&w->books, b, w->n_bodies));
 }
 
@@ -221,8 +261,6 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 		quern_row out = { 0 };
 		const quern_real mass = row[0], one_over = mass > 0 ? 1 / mass : 0,
 						 limited = mass > cut ? one_over : 1 / cut;
-		int32_t at[3];
-		quern_grid_cell_of(w->g, b * N + i, at);
 		for (uint32_t k = 0; k < dim && mass > 0; k++) {
 			const quern_real force = row[node_force(dim) + k],
 							 change = s->dt * (force * limited + s->gravity[k]);
@@ -230,7 +268,6 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 			out[motion_change(dim) + k] = change;
 			left[k] -= mass > cut ? 0 : s->dt * force * (1 - mass * limited);
 		}
-		out[motion_density(dim)] = mass > 0 ? mass / (volume * node_share(w, at, 3)) : 0;
 		w->motion[(size_t)b * N + i] = out;
 	}
 	meet_walls(arg, b, worker);

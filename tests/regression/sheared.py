@@ -9,6 +9,7 @@ import numpy
 import lab
 
 THRESHOLD = 10  # 1/s
+SURFACE = 0.1  # m, two cells below the top of the bed
 # A small form of configs/shear.yaml: a bed of continuum around a square rotor.
 ROTOR = """
 quern: 1
@@ -63,6 +64,7 @@ observe: [discrete_share]
 
 def band(folder):
     """The band are the cells that begin as continuum and shear half as fast again as the threshold, on average over the last five frames.
+    Those of the free surface are none: what lies loose there bears nothing, and the oracle leaves it out.
     By frame: time, mean shear rate of the band, share of it that is discrete."""
     frames = []
     for path in lab.frames(folder)[1:]:
@@ -71,7 +73,7 @@ def band(folder):
             frames.append((float(file.attrs["time"]), {tuple(numpy.round(at, 6)): (r, z) for at, r, z in zip(x, rate, zone)}))
     last = [cells for _, cells in frames[-5:]]
     mean = {at: numpy.mean([cells.get(at, (0, 0))[0] for cells in last]) for at in frames[0][1]}
-    fast = [at for at, (_, zone) in frames[0][1].items() if zone == 2 and mean[at] > 1.5 * THRESHOLD]
+    fast = [at for at, (_, zone) in frames[0][1].items() if zone == 2 and mean[at] > 1.5 * THRESHOLD and at[1] < SURFACE]
     print(f"rotor: a band of {len(fast)} cells")
     return [(time, numpy.mean([cells[at][0] for at in fast]), numpy.mean([cells[at][1] == 0 for at in fast])) for time, cells in frames]
 

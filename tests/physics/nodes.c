@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: MIT */
+/* Nodes at bodies: what is full beside a wall is full on the grid too, however the wall stands to the nodes, since a node's volume is
+ * what the body leaves of it; and a node that has none of its own says nothing. docs/theory/mpm.md, section 3 */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <math.h>
+#include <stdio.h>
+
+static const double cell = 0.1, filled = 1000;
+
+typedef struct wall {
+	const char *name;
+	int dim;
+	double point[3], normal[3];
+	bool corner;      /* another wall stands on x = 0.425 */
+	double tolerance; /* of the density: of the hat's share, and of points that the wall cuts off or leaves */
+} wall;
+
+static quern_run *open_wall(const wall *w) {
+	char point[80], normal[80], corner[100] = "";
+	const char *form = w->dim == 3 ? "[%.17g, %.17g, %.17g]" : "[%.17g, %.17g]";
+	snprintf(point, sizeof point, form, w->point[0], w->point[1], w->point[2]);
+	snprintf(normal, sizeof normal, form, w->normal[0], w->normal[1], w->normal[2]);
+	if (w->corner)
+		snprintf(corner, sizeof corner, ", {plane: {point: %s, normal: %s, boundary: slip}}",
+			w->dim == 2 ? "[0.425, 0]" : "[0.425, 0, 0]", w->dim == 2 ? "[1, 0]" : "[1, 0, 0]");
+	return harness_open(1,
+		"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
+		"time: {end: 1e-6, step: 1e-9}, output: {fields: [motion.density]},\n"
+		"bodies: [{plane: {point: %s, normal: %s, boundary: slip}}%s],\n"
+		"continuum: {cell: %g, points: %d, material: {elastic: {bulk_modulus: 1, density: %g}},\n"
+		"  fill: [{region: {box: {lower: %s, upper: %s}}}]}}\n",
+		w->dim, w->dim == 2 ? "[0, 0]" : "[0, 0, 0]", w->dim == 2 ? "[0, 0]" : "[0, 0, 0]",
+		w->dim == 2 ? "[1, 1]" : "[1, 1, 1]", point, normal, corner, cell, w->dim == 2 ? 8 : 4, filled,
+		w->dim == 2 ? "[0, 0]" : "[0, 0, 0]", w->dim == 2 ? "[1, 1]" : "[1, 1, 1]");
+}
+
+/* Over the cell's size: how far a node stands before the nearest wall. */
+static double before(const wall *w, const double x[3]) {
+	double gap = 0;
+	for (int k = 0; k < w->dim; k++) gap += (x[k] - w->point[k]) * w->normal[k] / cell;
+	return w->corner ? fmin(gap, (x[0] - 0.425) / cell) : gap;
+}
+
+typedef struct found {
+	double worst,
+		silent; /* |density over the points' less 1|; how far before the wall a node without a density stands */
+	int nodes;
+} found;
+
+/* Of nodes inside the domain that a wall may reach. */
+static found look(quern_run *run, const wall *w) {
+	const quern_column row = harness_field(run, "motion.density");
+	const quern_grid_view *g = quern_host_table.grid(run);
+	const int edge = (int)g->edge;
+	found f = { 0, -INFINITY, 0 };
+	for (uint32_t i = 0; i < g->n_blocks * 64; i++) {
+		const int k = (int)i % 64, at[3] = { g->at[i / 64][0] * edge + k % edge,
+			g->at[i / 64][1] * edge + k / edge % edge, g->at[i / 64][2] * edge + k / (edge * edge) };
+		const double x[3] = { at[0] * cell, at[1] * cell, at[2] * cell }, gap = before(w, x),
+					 density = row.real[0][8 * i];
+		bool inside = gap < 2 && gap > -1;
+		for (int a = 0; a < w->dim; a++) inside = inside && at[a] >= 2 && at[a] <= 8;
+		if (!inside) continue;
+		if (density > 0) f.worst = fmax(f.worst, fabs(density / filled - 1)), f.nodes++;
+		else f.silent = fmax(f.silent, gap);
+	}
+	return f;
+}
+
+static void full_at_walls(void **state) {
+	static const double c20 = 0.9396926207859084, s20 = 0.3420201433256687, half = 0.7071067811865476,
+						third = 0.5773502691896258;
+	static const wall walls[] = {
+		{ "2-D, on nodes", 2, { 0, 0.3, 0 }, { 0, 1, 0 }, false, 1e-12 },
+		{ "a quarter of a cell behind them", 2, { 0, 0.325, 0 }, { 0, 1, 0 }, false, 1e-12 },
+		{ "three quarters", 2, { 0, 0.375, 0 }, { 0, 1, 0 }, false, 1e-12 },
+		{ "20 degrees", 2, { 0, 0.2, 0 }, { -s20, c20, 0 }, false, 0.01 },
+		{ "45 degrees, nearly through nodes", 2, { 0, 0.1 + 0.1 / 16, 0 }, { -half, half, 0 }, false, 0.01 },
+		{ "a corner", 2, { 0, 0.325, 0 }, { 0, 1, 0 }, true, 1e-12 },
+		{ "3-D, on nodes", 3, { 0, 0.3, 0 }, { 0, 1, 0 }, false, 1e-12 },
+		{ "between nodes", 3, { 0, 0, 0.375 }, { 0, 0, 1 }, false, 1e-12 },
+		{ "along no axis", 3, { 0.45, 0.45, 0.45 }, { third, third, third }, false, 0.03 },
+		{ "a corner", 3, { 0, 0.325, 0 }, { 0, 1, 0 }, true, 1e-12 },
+	};
+	bool good = true;
+	(void)state;
+	table_head("density on the grid at walls over that of the points, less 1: worst node");
+	for (size_t k = 0; k < sizeof walls / sizeof *walls; k++) {
+		quern_run *run = open_wall(&walls[k]);
+		harness_steps(run, 1);
+		const found f = look(run, &walls[k]);
+		good &= table_row(walls[k].name, f.worst, 0, walls[k].tolerance);
+		table_note("  farthest node that says nothing, cells before the wall", f.silent);
+		good &= f.silent < 0 && f.nodes > 10;
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(full_at_walls) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
