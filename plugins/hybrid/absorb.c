@@ -123,11 +123,14 @@ static void pass_from(const absorbing *a, uint32_t c) {
 	int32_t cell[3], to[6];
 	if (d->u[U_OWED].real[0][c] == 0 || d->zone[c] == QUERN_DISCRETE || !quern_grid_cell_of(d->g, c, cell))
 		return;
+	quern_hybrid_open_place(d, c, cell, from);
 	for (uint32_t k = 0; k < 2 * d->s->dim; k++) {
+		int32_t beside[3] = { cell[0], cell[1], cell[2] };
 		to[k] = cell_beside(d, c, k / 2, k % 2 ? 1 : -1);
-		quern_hybrid_centre(d, cell, from);
-		quern_hybrid_centre(d, cell, there);
-		there[k / 2] += k % 2 ? d->g->cell : -d->g->cell;
+		beside[k / 2] += k % 2 ? 1 : -1; /* not brought back into a periodic domain: the line goes straight */
+		part[k] = 0;
+		if (to[k] < 0) continue;
+		quern_hybrid_open_place(d, (uint32_t)to[k], beside, there);
 		part[k] = slope_to(d, c, to[k], quern_hybrid_walled(d, NULL, c, from, there));
 		sum += part[k];
 	}

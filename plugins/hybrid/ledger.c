@@ -79,17 +79,37 @@ void quern_hybrid_weigh(update *d) {
 	}
 }
 
-/* Grains are only placed where the continuum is near: a discrete cell gives its entry to the nearest hybrid one. */
+/* Points reach behind walls that are not across an axis: what such a one held in a cell without any room is owed by the cell before the
+ * wall. */
+static void bring_out(const update *d, uint32_t c) {
+	int32_t cell[3];
+	quern_real x[3];
+	if (!quern_grid_cell_of(d->g, c, cell)) return;
+	quern_hybrid_open_place(d, c, cell, x);
+	for (uint32_t k = 0; k < d->s->dim; k++) cell[k] = (int32_t)floor((x[k] - d->g->lower[k]) / d->g->cell);
+	const int32_t to = quern_grid_entry_back(d->g, cell);
+	if (to >= 0 && d->open[to] > 0) quern_hybrid_pass(d, c, (uint32_t)to);
+}
+
+/* Grains are only placed where the continuum is near: a discrete cell gives its entry to the nearest hybrid one that is not behind a
+ * body; where there is none the entry waits. */
 quern_status quern_hybrid_hand_over(update *d) {
 	bool *source = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1), any = false;
+	bool *open = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1);
 	int32_t *nearest = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(int32_t));
-	if (!source || !nearest) return QUERN_E_MEMORY;
+	if (!source || !open || !nearest) return QUERN_E_MEMORY;
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
+		if (d->zone[c] == QUERN_DISCRETE && !(d->open[c] > 0) && quern_hybrid_is_owed(d->u, c, d->s->dim))
+			bring_out(d, c);
+	}
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		source[c] = d->zone[c] == QUERN_HYBRID;
+		open[c] = d->open[c] > 0;
 		any = any || (d->zone[c] == QUERN_DISCRETE && quern_hybrid_is_owed(d->u, c, d->s->dim));
 	}
 	if (!any) return QUERN_OK;
-	const quern_status status = quern_hybrid_nearest(d, source, nearest);
+	const quern_status status = quern_hybrid_nearest(d, source, open, nearest);
 	if (status != QUERN_OK) return status;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		const uint32_t c = nth_cell(d, q);

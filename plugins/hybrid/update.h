@@ -85,6 +85,8 @@ quern_status quern_hybrid_rates(update *);
 quern_status quern_hybrid_walls(update *);
 /* By cell: m from its centre to the nearest of the bodies that are `meant`, by their number; NULL: of all. */
 quern_status quern_hybrid_gaps(const update *, const bool *meant, quern_real *gap);
+/* A place in the open part of a cell: its centre, or before the surface behind which that lies. */
+void quern_hybrid_open_place(const update *, uint32_t entry, const int32_t cell[3], quern_real x[3]);
 /* Whether one of these bodies stands between two places, one of them in that cell and the other in it or in one beside
  * it, be it ever so thin. */
 bool quern_hybrid_walled(
@@ -92,8 +94,8 @@ bool quern_hybrid_walled(
 
 /* ---- zones.c ---- */
 quern_status quern_hybrid_zones(update *);
-/* By cell: the nearest cell with `source` set, by centres, -1 if there is none. */
-quern_status quern_hybrid_nearest(update *, const bool *source, int32_t *nearest);
+/* By cell: the nearest cell with `source` set, by centres, from cell to cell with `through`; -1 if there is none. */
+quern_status quern_hybrid_nearest(update *, const bool *source, const bool *through, int32_t *nearest);
 /* By cell with `through` set: m from its centre to the nearest cell with `source` set, from cell to cell with
  * `through`. */
 quern_status quern_hybrid_distance(update *, const bool *source, const bool *through, quern_real *distance);

@@ -3,6 +3,7 @@
  * between two cells. docs/theory/hybrid.md, section 3 */
 #include "update.h"
 #include <math.h>
+#include <string.h>
 
 enum { N = QUERN_BLOCK_CELLS }; /* cells of a block, and places in a cell */
 
@@ -109,16 +110,30 @@ quern_status quern_hybrid_walls(update *d) {
 	return status == QUERN_OK ? each_block(&w, open_block) : status;
 }
 
-/* Gap of a place to the nearest body that is meant and there now. */
-static quern_real gap_at(const update *d, const bool *meant, const quern_real x[3]) {
+/* Gap of a place to the nearest body that is meant and there now, and that one's normal if it is asked for. */
+static quern_real gap_at(const update *d, const bool *meant, const quern_real x[3], quern_real normal[3]) {
 	quern_real least = INFINITY;
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
+		quern_real n[3] = { 0 };
 		if (!quern_body_is_there(body, d->s->settling) || (meant && !meant[b])) continue;
-		const quern_real gap = quern_body_gap(body, &d->pose[b], d->s->dim, x, 0, NULL);
-		least = gap < least ? gap : least;
+		const quern_real gap = quern_body_gap(body, &d->pose[b], d->s->dim, x, 0, normal ? n : NULL);
+		if (!(gap < least)) continue;
+		least = gap;
+		if (normal) memcpy(normal, n, sizeof n);
 	}
 	return least;
+}
+
+/* Of a cell's size: from so far before a surface on, a place is in the open. */
+static const quern_real clear = 0.1;
+
+void quern_hybrid_open_place(const update *d, uint32_t c, const int32_t cell[3], quern_real x[3]) {
+	quern_real normal[3] = { 0 };
+	quern_hybrid_centre(d, cell, x);
+	if (d->wall[c] >= clear * d->g->cell) return;
+	const quern_real out = clear * d->g->cell - gap_at(d, NULL, x, normal);
+	for (uint32_t k = 0; k < d->s->dim && out > 0; k++) x[k] += out * normal[k];
 }
 
 /* Goes along the line by steps as long as nothing can be in the way, so that no wall is too thin. */
@@ -132,7 +147,7 @@ bool quern_hybrid_walled(
 	for (int i = 0; i < 64 && way < length; i++) {
 		quern_real x[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) x[k] = from[k] + way / length * (to[k] - from[k]);
-		const quern_real gap = gap_at(d, meant, x);
+		const quern_real gap = gap_at(d, meant, x, NULL);
 		if (gap <= near) return true;
 		way += gap;
 	}

@@ -115,13 +115,13 @@ static bool spreading_init(spreading *p, update *d, bool boxes, quern_real *dist
 	return true;
 }
 
-quern_status quern_hybrid_nearest(update *d, const bool *source, int32_t *nearest) {
+quern_status quern_hybrid_nearest(update *d, const bool *source, const bool *through, int32_t *nearest) {
 	spreading p;
 	quern_real *distance = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	if (!spreading_init(&p, d, false, distance)) return QUERN_E_MEMORY;
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
-	spread(&p, NULL);
+	spread(&p, through);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
 		nearest[c] = -1;
