@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """quern calibrate - constants of the continuum from the grains that a scene has: docs/calibration.md.
 
-The grains of the scene, nothing else of it, are settled on a floor, pressed, and sent down chutes. The runs are those of a study: what was
+The grains of the scene, nothing else of it, are settled on a floor, pressed, sent down chutes and let slide on a plane. The runs are those of a study: what was
 made before is not made again, and a command that was killed goes on."""
 import argparse
 import json
@@ -16,7 +16,7 @@ from . import calibrate_page, rheology, sweep
 from .points import Job, jobs_of
 from .program import QuernError, call, sentence_of, set_options, spelt
 from .reader import StudyError
-from .rheology import Grains, Rows
+from .rheology import Grains, Rows, Slide
 from .runs import Run, open as open_run, read_scene
 from .study import Axis, Study, Value
 from .workers import recorded, save
@@ -27,6 +27,7 @@ HEAVIER = 1.2  # times gravity, under which the bed is pressed: more makes it pa
 CHUTE, EVERY, LAST = 300, 4, 1 / 3  # length and interval of output, times sqrt(d/g); share that is measured
 HOLD = 6  # time for which a load is held, over sqrt(height/g)
 FIRST = {2: (15.0, 19.0, 23.0), 3: (20.0, 22.0, 24.0)}  # degrees
+LEANING, SLIDE = (10.0, 13.0, 16.0, 20.0, 25.0, 30.0, 36.0, 42.0), 80  # degrees of a smooth plane, one after the other; length times sqrt(d/g)
 GENTLEST, STEEPEST, NEAREST = 3.0, 45.0, 0.8  # degrees, of chutes that are tried, and between two of them
 WANTED = 3  # angles
 KEPT = ("material", "contact", "skin", "overlap", "settle", "neighbours", "integrator", "settling")  # of the section grains
@@ -157,6 +158,13 @@ def pressed(given: Given, size: float) -> Value:
     return Value("bed", (f"time.end={3 * hold!r}", f"output.every={hold!r}", f"stages={spelt(stages)}"))
 
 
+def leaning(given: Given, size: float, angle: float) -> Value:
+    """Grains settled on a smooth plane, which then leans."""
+    tick = math.sqrt(given.of.diameter / given.of.gravity)
+    return Value(f"plane at {angle:g} degrees", (f"grains.fill={spelt(scene_of(given, size)['grains']['fill'][1:])}", f"time.end={SLIDE * size * tick!r}",
+                                                 f"stages={spelt([{'set': {'gravity': turned(given, angle)}}])}"))
+
+
 # ---- runs ----
 
 @dataclass
@@ -183,6 +191,23 @@ class Work:
     def chute(self, angle: float, seed: int) -> Rows | str:
         run = self.runs[case_of(self.given, angle).label, seed]
         return run if isinstance(run, str) else rheology.chute(run, math.radians(angle), LAST, self.given.of)
+
+
+def find_slides(work: Work, seeds: list[int]) -> list[Slide]:
+    """Of the gentlest angle at which the layer slides with every seed; none where it never does."""
+    for angle in LEANING:
+        case = leaning(work.given, work.options.size, angle)
+        slides: list[Slide] = []
+        for some in (seeds[:1], seeds[1:]):
+            if some and all(one.slides for one in slides):
+                work.make([case], some)
+                runs = [work.runs[case.label, seed] for seed in some]
+                if any(isinstance(run, str) for run in runs):
+                    raise QuernError("\n".join(f"{case.label}: {run}" for run in runs if isinstance(run, str)), 3)
+                slides += [rheology.slide(run, math.radians(angle), work.given.of) for run in runs]
+        if len(slides) == len(seeds) and all(one.slides for one in slides):
+            return slides
+    return []
 
 
 class Interrupted(Exception):
@@ -233,7 +258,7 @@ def find_angles(work: Work) -> list[float]:
 
 
 def measure(work: Work) -> calibrate_page.Found:
-    """All of it: the bed, the angles, the chutes of every seed."""
+    """All of it: the bed, the angles, the chutes of every seed, a smooth plane."""
     seeds, given = list(range(1, work.options.seeds + 1)), work.given
     press = pressed(given, work.options.size)
     work.make([press], seeds)
@@ -250,7 +275,7 @@ def measure(work: Work) -> calibrate_page.Found:
         print(f"quern calibrate: warning: the flow at {angle:g} degrees is left out: {words}", file=sys.stderr)
     if len(moving) < WANTED:
         raise QuernError(f"{len(moving)} of the chutes flow steadily with every seed, and mu(I) takes {WANTED}; give others by --angles", 3)
-    return calibrate_page.Found(given.name, given.dimension, given.of, beds, {angle: chutes[angle] for angle in moving})
+    return calibrate_page.Found(given.name, given.dimension, given.of, beds, {angle: chutes[angle] for angle in moving}, find_slides(work, seeds))
 
 
 def float_of(case: str) -> float | None:

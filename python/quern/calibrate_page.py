@@ -14,7 +14,7 @@ import yaml
 
 from .chart_data import Curve, Picture
 from .program import call
-from .rheology import Bed, Grains, Law, Rows, law_of, slip_of
+from .rheology import Bed, Grains, Law, Rows, Slide, law_of, slip_of
 from .workers import save
 
 AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is told
@@ -22,12 +22,13 @@ AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is tol
 
 @dataclass(frozen=True)
 class Found:
-    """What was measured: a bed for each seed, and for each angle a chute for each seed."""
+    """What was measured: a bed for each seed, for each angle a chute for each seed, and slides on a smooth plane, none if nothing slid."""
     name: str
     dimension: int
     grains: Grains
     beds: list[Bed]
     chutes: dict[float, list[Rows]]  # by angle in degrees
+    slides: list[Slide]
 
     def law(self) -> Law:
         return law_of([one for rows in self.chutes.values() for one in rows])
@@ -69,6 +70,13 @@ def slip_length(found: Found) -> tuple[float, float]:
     return mean([np.mean([slip_of(rows[k]).length for rows in found.chutes.values()]) / found.grains.diameter for k in range(len(found.beds))])
 
 
+def about_walls(found: Found) -> str:
+    if not found.slides:
+        return "on a smooth wall nothing slid: give continuum's walls boundary: sticky"
+    friction, speed = (mean([getattr(one, name) for one in found.slides]) for name in ("friction", "speed"))
+    return f"on a smooth wall, boundary: {{frictional: {plain(friction[0], 3)}}}, ± {plain(friction[1], 2)}, sliding at up to {plain(speed[0], 2)} m/s"
+
+
 def plain(value: float, figures: int = 4) -> str:
     return f"{value:.{figures}g}" if value < 10 ** figures else f"{float(f'{value:.{figures}g}'):.0f}"
 
@@ -98,7 +106,8 @@ def block(found: Found, command: str) -> str:
     length, off = slip_length(found)
     lines = [f"# {command}",
              f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
-             f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate", "continuum:", "  material:", "    mu_i:"]
+             f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate",
+             f"# {about_walls(found)}", "continuum:", "  material:", "    mu_i:"]
     return "\n".join(lines + [f"      {key}: {value}".ljust(40) + f"# {note}" for key, (value, note) in rows.items()]) + "\n"
 
 
@@ -188,10 +197,18 @@ def about_bed(found: Found) -> str:
             f"comes back with {told(unloaded)} Pa.")
 
 
+def about_slides(found: Found) -> str:
+    if not found.slides:
+        return "No layer slid on a smooth plane, however far it leant."
+    told = [with_spread(*mean([getattr(one, name) for one in found.slides])) for name in ("friction", "speed")]
+    return (f"On a smooth plane that leans, a layer of these grains slides with a friction of {told[0]}, as its acceleration says; its lowest row came to "
+            f"{told[1]} m/s. Grains roll on a wall as well as slide, so that this is less than the friction of a contact.")
+
+
 def page(found: Found, command: str, drawn: list[str]) -> str:
     pictures_of = [f"![{name}]({name}.svg)" for name in drawn]
     parts = [f"# Calibration of {found.name}", f"`{command}`", "± is the standard error over seeds.", "\n".join(constants_table(found)),
-             *about_law(found), about_bed(found), "\n".join(chutes_table(found)), *pictures_of, "For a scene:", f"```yaml\n{block(found, command)}```"]
+             *about_law(found), about_bed(found), about_slides(found), "\n".join(chutes_table(found)), *pictures_of, "For a scene:", f"```yaml\n{block(found, command)}```"]
     return "\n\n".join(parts) + "\n"
 
 

@@ -67,6 +67,14 @@ class Slip:
 
 
 @dataclass(frozen=True)
+class Slide:
+    """A layer on a smooth plane that leans: friction between both from what the layer gains, and how fast its lowest row was at the end."""
+    friction: float
+    speed: float  # m/s
+    slides: bool
+
+
+@dataclass(frozen=True)
 class Bed:
     """Of settled grains: density of the rows in the bulk, as they lie and with no stress on them; constrained moduli, loaded and relieved
     again."""
@@ -131,6 +139,17 @@ def chute(run: Run, angle: float, last: float, grains: Grains) -> Rows:
     y, times, density, velocity = profiles(run)
     late = times > (1 - last) * times[-1]
     return rows_of(angle, y, times[late], density[late], velocity[late], grains)
+
+
+def slide(run: Run, angle: float, grains: Grains) -> Slide:
+    """But for the first fifth of its time, in which the layer starts. All of it is in balance with the plane, however it moves within."""
+    _, times, density, velocity = profiles(run)
+    mean = (density * velocity).sum(axis=1) / density.sum(axis=1)
+    late = times > times[-1] / 5
+    gain = float(np.polyfit(times[late], mean[late], 1)[0])
+    across = grains.gravity * math.cos(angle)
+    moves = bool(mean[-1] > math.sqrt(grains.gravity * grains.diameter) and gain > 0)
+    return Slide(math.tan(angle) - gain / across, float(velocity[-1, 0]), moves)
 
 
 def fit_law(inertia: np.ndarray, friction: np.ndarray) -> Law:

@@ -13,6 +13,7 @@ LAYER = lab.sets(time__end="20 ms", output__every="5 ms")
 # sixth place; scene.yaml has one number for both.
 TURNED = [*LAYER, *lab.sets(continuum__transfer__picflip__rate=11.7, hybrid__continuum__rest=0.35)]
 SHORT = {"bed": LAYER, "chute": TURNED, "strip": TURNED, "shear": LAYER, "silo": lab.sets(time__end="4 ms", output__every="2 ms"),
+         "hourglass": lab.sets(time__end="4 ms", output__every="2 ms"),
          "two_grains": lab.sets(time__end="5 ms"), "mixture": lab.sets(time__end="20 ms", output__every="5 ms"),
          "incline": lab.sets(time__end="50 ms"),
          "elastic_bar": lab.sets(time__end="2"),
