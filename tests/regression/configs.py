@@ -83,7 +83,8 @@ def drum(place):
         with h5py.File(path) as file:
             x, r = file["grains/position"][:], file["grains/radius"][:]
         assert len(x) == rows[0]["grains"]
-        assert max(math.hypot(*x[i, :2]) + r[i] for i in range(len(x))) < 0.0501
+        # a chain of contacts may rest on one grain: with these contacts 0.2 mm are 40 N, half of what all grains weigh
+        assert max(math.hypot(*x[i, :2]) + r[i] for i in range(len(x))) < 0.0502
         weight += sum(2500 * math.pi * r**2 * 9.81 * x[:, 0])
         torque += row["wall_torque.z"]
     near("drum: torque on the drum over the moment of the grains' weight", torque, -weight, 0.1)
