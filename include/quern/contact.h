@@ -37,6 +37,10 @@ typedef struct quern_contact_batch {
 	quern_real *rubbed;     /* J, ADDed: lost in this step other than by `dashpot`: to sliding, to yielding */
 	quern_real
 		*drag_couple[3]; /* N m on first, ADDed: the part of `couple` that damps; NULL without couples too */
+	/* m/s, rad/s; NULL unless the table says `means`: the mean of `velocity` and of `spin` over the time dt since the last
+	 * evaluation, which is the way by which springs are stretched, and no other column may be taken for it: an integrator
+	 * evaluates dashpots at the step's end (docs/theory/grains.md, section 3). `turn` is such a mean too. */
+	const quern_real *mean_velocity[3], *mean_spin[3];
 } quern_contact_batch;
 
 typedef struct quern_contact_ops {
@@ -52,6 +56,8 @@ typedef struct quern_contact_ops {
 	/* [setup] damping ratio gamma/(2 sqrt(k m)) of the mode that is damped most, at the stiffness that `period` is of: an
 	 * explicit dashpot has a limit of its own; NULL: 0 */
 	quern_real (*damping)(const void *self, uint32_t dim);
+	uint32_t means,
+		pad; /* means 1: the law asks for mean_velocity and mean_spin; one with springs or a first touch does */
 } quern_contact_ops;
 
 QUERN_KIND(contact, quern_contact_ops, "A force between two grains in contact.",
@@ -79,19 +85,25 @@ QUERN_INLINE quern_real quern_damping_ratio(quern_real e) {
 	return wanted > 0 ? 0.5 * (low + high) : 0;
 }
 
-/* A dashpot jumps at first touch, which would make any scheme first order. In the first evaluation of a contact, when
- * the pair was still apart one step ago, it acts for the time since touching alone. */
+/* A dashpot jumps at first touch, which would make any scheme first order. In the first two evaluations of a contact it is
+ * weighted so that together they act for the time since touching. docs/theory/contacts.md, section 1 */
 typedef struct quern_onset {
-	quern_real time; /* s, that the pair has touched within this step: dt, or less in the first evaluation */
-	quern_real weight; /* of the dashpot */
+	quern_real
+		time; /* s, that the pair has touched within this step: dt, or less in the first evaluation; 0 apart */
+	quern_real weight; /* of the dashpot; 0 apart */
 } quern_onset;
 
-/* `approach` is the rate at which the overlap grows; `power` p of a dashpot ~ overlap^p: 0 linear, 1/4 Hertz. */
+/* `approach` is the mean rate at which the overlap has grown over the step; `power` p of a dashpot ~ overlap^p: 0 linear, 1/4
+ * Hertz. The weight is steep in an eighth of a step on both sides of where the first evaluation becomes the second, but does not
+ * jump: else round-off would decide which of two it is. Least and largest of two numbers are what gcc makes vectors of. */
 QUERN_INLINE quern_onset quern_first_touch(
 	quern_real overlap, quern_real approach, quern_real dt, quern_real power) {
-	const bool first = (overlap > 0) & (overlap < approach * dt); /* a pair that is apart has not touched */
-	const quern_real time = first ? overlap / (approach > 0 ? approach : 1) : dt;
-	return QUERN_VALUE(quern_onset, time, first ? 0.5 + time / ((1 + power) * dt) : 1);
+	const quern_real way = approach * dt, over = overlap > 0 ? overlap : 0, one_over = 1 / (1 + power);
+	const quern_real of = way > 0.5 * over ? way : 0.5 * over;
+	const quern_real steps = over / (of > 0 ? of : 1); /* since touching, 2 at most */
+	const quern_real first = steps < 1 ? steps : 1, second = steps > 1 ? steps - 1 : 0;
+	const quern_real in = 8 * first < 1 ? 8 * first : 1, out = 8 * second < 1 ? 8 * second : 1;
+	return QUERN_VALUE(quern_onset, first * dt, 0.5 * in + one_over * first + (1 - (0.5 + one_over)) * out);
 }
 
 /* What the Coulomb cone leaves of an elastic force a and a dashpot's b: spring a + damper b, of size cap at most. */

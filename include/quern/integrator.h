@@ -18,7 +18,7 @@ typedef struct quern_integrator_batch {
 	const quern_real *position[3], *velocity[3], *spin[3];
 	quern_real *new_position[3], *new_velocity[3], *new_spin[3];
 	quern_real *mean_velocity[3],
-		*mean_spin[3]; /* over the kick, so that force . mean * dt is the change of kinetic
+		*mean_spin[3]; /* in `close` over the kick, so that force . mean * dt is the change of kinetic
 	                                                energy; NULL unless energy is observed, and in `open` */
 	const quern_column *use;
 } quern_integrator_batch;
@@ -28,10 +28,22 @@ typedef struct quern_integrator_ops {
 	uint32_t damps; /* 1: takes energy away on purpose, for settling; what it takes stands in no budget */
 	void (*close[2])(const void *self, const quern_integrator_batch *); /* [batch] */
 	void (*open[2])(const void *self, const quern_integrator_batch *);  /* [batch] may be NULL */
+	/* [batch] may be NULL: the velocities and spins, new_velocity and new_spin, that dashpots act on, for one whose `open` leaves those
+	 * by which the grains have moved. Called between `open` and the forces, with the state, with the rows of QUERN_INTEGRATOR_OPEN
+	 * in `use`, and with no force, mass or mean. NULL: dashpots act on the state. */
+	void (*predict[2])(const void *self, const quern_integrator_batch *);
+	/* For one with `open`: after which share of the step forces are evaluated; 0 counts as 1. `open` moves a grain by at * dt * the
+	 * velocity that it leaves, and springs are stretched from one evaluation to the next by dt times that. Below 1 `close` gives
+	 * the whole impulse of these forces, as one without `open` does; at 1 half of it, and `open` of the next step the other. */
+	quern_real at;
+	/* By which factor a damping ratio counts in the limit of the step, omega dt < 2 (sqrt(1 + zeta^2) - zeta) for dashpots that
+	 * see the velocity of the step's beginning: 2 for one predicted by half a step; 0 counts as 1. docs/theory/grains.md, section 2 */
+	quern_real damping;
 } quern_integrator_ops;
 
 QUERN_KIND(integrator, quern_integrator_ops, "Grains moved on by forces.",
-	QUERN_EACH(quern_integrator_ops, close), QUERN_EITHER(quern_integrator_ops, open));
+	QUERN_EACH(quern_integrator_ops, close), QUERN_EITHER(quern_integrator_ops, open),
+	QUERN_EITHER(quern_integrator_ops, predict));
 
 #ifdef __cplusplus
 }

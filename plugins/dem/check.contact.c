@@ -21,6 +21,8 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	QUERN_CHECK_VECTOR(batch.velocity, k, b, VELOCITY, dim);
 	QUERN_CHECK_VECTOR(batch.spin, k, b, SPIN, turns);
 	QUERN_CHECK_VECTOR(batch.turn, k, b, TURN, dim == 3 ? 3u : 0u);
+	QUERN_CHECK_VECTOR(batch.mean_velocity, k, b, MEAN_VELOCITY, dim);
+	QUERN_CHECK_VECTOR(batch.mean_spin, k, b, MEAN_SPIN, turns);
 	QUERN_CHECK_VECTOR(batch.force, k, b, FORCE, dim);
 	QUERN_CHECK_VECTOR(batch.couple, k, b, COUPLE, turns);
 	QUERN_CHECK_VECTOR(batch.dashpot, k, b, DASHPOT, dim);
@@ -62,6 +64,7 @@ static void fill_pairs(const quern_check_kernel *k, uint64_t key) {
 		for (uint32_t c = 0; c < k->dim; c++) quern_check_given(k, NORMAL, c)[i] = n[c];
 	}
 	k->host->fill(k, VELOCITY, k->dim, key + 3, -0.1, 0.1);
+	if (k->at[MEAN_VELOCITY] >= 0) k->host->fill(k, MEAN_VELOCITY, k->dim, key + 4, -0.1, 0.1);
 }
 
 static quern_real *row_given(const quern_check_kernel *k, int32_t first, uint32_t component) {
@@ -83,6 +86,7 @@ static void fill_spins(const quern_check_kernel *k, uint64_t key) {
 				row_given(k, k->use_second[r], c)[i] = second;
 			}
 			quern_check_given(k, SPIN, c)[i] = first - second;
+			if (k->at[MEAN_SPIN] >= 0) quern_check_given(k, MEAN_SPIN, c)[i] = 0.9 * (first - second);
 			if (k->dim == 3) quern_check_given(k, TURN, c)[i] = 0.5 * (first + second);
 		}
 }
@@ -112,10 +116,13 @@ static quern_check_kernel *create(
 	c->host->add(k, RADIUS, "radius", QUERN_CHECK_IN, 1);
 	c->host->add(k, MASS, "mass", QUERN_CHECK_IN, 1);
 	c->host->add(k, FORCE, "force", QUERN_CHECK_CHANGED, dim);
+	const bool means = ((const quern_contact_ops *)c->ops)->means;
+	if (means) c->host->add(k, MEAN_VELOCITY, "mean_velocity", QUERN_CHECK_IN, dim);
 	add_uses(k, variant & WITH_SPIN);
 	if (variant & WITH_SPIN || uses_field(c, it, "grain.spin")) {
 		c->host->add(k, SPIN, "spin", QUERN_CHECK_IN, turns);
 		if (dim == 3) c->host->add(k, TURN, "turn", QUERN_CHECK_IN, 3);
+		if (means) c->host->add(k, MEAN_SPIN, "mean_spin", QUERN_CHECK_IN, turns);
 		fill_spins(k, 40);
 	}
 	if (uses_field(c, it, "contact.couple")) c->host->add(k, COUPLE, "couple", QUERN_CHECK_CHANGED, turns);
@@ -199,6 +206,8 @@ static void exchange(quern_check_kernel *k) {
 	negate(k, NORMAL, k->dim);
 	negate(k, VELOCITY, k->dim);
 	negate(k, SPIN, quern_check_axial(k->dim));
+	negate(k, MEAN_VELOCITY, k->dim);
+	negate(k, MEAN_SPIN, quern_check_axial(k->dim));
 	for (int r = 0; r < QUERN_MOST_USES; r++)
 		if (k->use[r] >= 0 && k->use_second[r] >= 0) {
 			const int32_t first = k->use[r];

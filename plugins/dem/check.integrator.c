@@ -21,7 +21,7 @@ enum {
 	MEAN_SPEED,
 	MEAN_SPIN
 };
-enum { WITH_SPIN = 1, WITH_MEAN = 2, OPENS = 4, VARIANTS = 8 };
+enum { WITH_SPIN = 1, WITH_MEAN = 2, OPENS = 4, BETWEEN = 8, VARIANTS = 10 }; /* BETWEEN: `predict` */
 static const double gravity[3] = { 0, -9.81, 0 };
 
 static void call(const quern_check_kernel *k, const quern_check_batch *b) {
@@ -43,7 +43,28 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	QUERN_CHECK_VECTOR(batch.mean_velocity, k, b, MEAN_SPEED, dim);
 	QUERN_CHECK_VECTOR(batch.mean_spin, k, b, MEAN_SPIN, turns);
 	k->host->columns(k, b, k->use, use);
-	(k->hook == QUERN_INTEGRATOR_OPEN ? ops->open : ops->close)[dim - 2](k->self, &batch);
+	if (k->pass == BETWEEN) ops->predict[dim - 2](k->self, &batch);
+	else (k->hook == QUERN_INTEGRATOR_OPEN ? ops->open : ops->close)[dim - 2](k->self, &batch);
+}
+
+/* The velocities that dashpots act on. */
+static quern_check_kernel *create_between(
+	const quern_check *c, const quern_check_instance *it, bool spin, uint32_t n) {
+	const uint32_t dim = it->dim, turns = quern_check_axial(dim);
+	quern_check_kernel *k = c->host->kernel_create(c, it, "predict", n);
+	k->call = call;
+	k->pass = BETWEEN;
+	k->dt = 1e-4;
+	c->host->add(k, POSITION, "position", QUERN_CHECK_IN, dim);
+	c->host->add(k, SPEED, "velocity", QUERN_CHECK_IN, dim);
+	c->host->add(k, NEW_SPEED, "new_velocity", QUERN_CHECK_OUT, dim);
+	if (spin) c->host->add(k, SPIN, "spin", QUERN_CHECK_IN, turns);
+	if (spin) c->host->add(k, NEW_SPIN, "new_spin", QUERN_CHECK_OUT, turns);
+	c->host->add_uses(k, QUERN_INTEGRATOR_OPEN, spin);
+	c->host->fill(k, POSITION, dim, 122, -1, 1);
+	c->host->fill(k, SPEED, dim, 123, -1, 1);
+	if (spin) c->host->fill(k, SPIN, turns, 124, -10, 10);
+	return k;
 }
 
 static quern_check_kernel *create(
@@ -80,6 +101,8 @@ static quern_check_kernel *make(
 	const quern_check *c, const quern_check_instance *it, uint32_t variant, uint32_t n) {
 	const quern_integrator_ops *ops = c->ops;
 	if (variant >= VARIANTS || (variant & OPENS && !ops->open[it->dim - 2])) return NULL;
+	if (variant & BETWEEN)
+		return ops->predict[it->dim - 2] ? create_between(c, it, variant & WITH_SPIN, n) : NULL;
 	quern_check_kernel *k = create(c, it, variant, n);
 	k->more = gravity;
 	if (variant & OPENS) return k;
@@ -92,6 +115,7 @@ static quern_check_kernel *make(
 
 typedef struct {
 	quern_check_kernel *open, *close; /* open: NULL if the integrator has none */
+	quern_check_tally *way;
 } flight;
 
 static void copy_state(const quern_check_kernel *from, quern_check_kernel *to) {
@@ -103,16 +127,33 @@ static void copy_state(const quern_check_kernel *from, quern_check_kernel *to) {
 				from->n * sizeof(quern_real));
 }
 
-static void begin_flight(const quern_check *c, const quern_check_instance *it, uint32_t n, flight *f) {
+static void begin_flight(
+	const quern_check *c, const quern_check_instance *it, uint32_t n, quern_check_tally *way, flight *f) {
 	const bool opens = ((const quern_integrator_ops *)c->ops)->open[it->dim - 2] != NULL;
+	f->way = way;
 	f->close = create(c, it, WITH_SPIN, n);
 	f->open = opens ? create(c, it, WITH_SPIN | OPENS, n) : NULL;
+}
+
+/* Springs are stretched by dt times the velocity that `open` leaves: it has moved the grains by that. */
+static void compare_way(flight *f) {
+	const quern_check_kernel *k = f->open;
+	const quern_real at = ((const quern_integrator_ops *)k->ops)->at;
+	for (uint32_t a = 0; a < k->dim && at > 0; a++)
+		for (uint32_t i = 0; i < k->n; i++) {
+			const double from = quern_check_given(k, POSITION, a)[i],
+						 to = quern_check_found(k, NEW_POSITION, a)[i];
+			const double left = quern_check_found(k, NEW_SPEED, a)[i];
+			k->host->measure(f->way, fabs(to - from - at * k->dt * left), 1e-15 * (1 + fabs(from) + fabs(to)),
+				"%u-D: open moves by %.15g m and leaves %.15g m/s", k->dim, to - from, left);
+		}
 }
 
 static void before_forces(flight *f) {
 	if (!f->open) return;
 	f->open->host->carry(f->close, f->open);
 	f->open->host->run(f->open, 128, false);
+	compare_way(f);
 	copy_state(f->open, f->close);
 }
 
@@ -141,9 +182,10 @@ enum { BODIES = 64, STEPS = 200 };
 static bool damps(const quern_check *c) { return ((const quern_integrator_ops *)c->ops)->damps != 0; }
 
 /* What damps may be slower than Newton's law, never faster, and goes where the force points: from rest. */
-static void damped(const quern_check *c, const quern_check_instance *it, double force, quern_check_tally *t) {
+static void damped(const quern_check *c, const quern_check_instance *it, double force, quern_check_tally *t,
+	quern_check_tally *way) {
 	flight f;
-	begin_flight(c, it, BODIES, &f);
+	begin_flight(c, it, BODIES, way, &f);
 	const quern_check_kernel *k = f.close;
 	for (uint32_t a = 0; a < k->dim; a++)
 		for (uint32_t i = 0; i < BODIES; i++)
@@ -161,10 +203,10 @@ static void damped(const quern_check *c, const quern_check_instance *it, double 
 	end_flight(&f);
 }
 
-static void constant(
-	const quern_check *c, const quern_check_instance *it, double force, quern_check_tally *t) {
+static void constant(const quern_check *c, const quern_check_instance *it, double force, quern_check_tally *t,
+	quern_check_tally *way) {
 	flight f;
-	begin_flight(c, it, BODIES, &f);
+	begin_flight(c, it, BODIES, way, &f);
 	const quern_check_kernel *k = f.close;
 	quern_real *start = c->host->memory(3 * 3 * BODIES, sizeof *start);
 	for (uint32_t a = 0; a < k->dim; a++)
@@ -207,10 +249,11 @@ static void constant(
 }
 
 /* Ten periods on a spring, 100 steps each. */
-static void spring(const quern_check *c, const quern_check_instance *it, quern_check_tally *t) {
+static void spring(
+	const quern_check *c, const quern_check_instance *it, quern_check_tally *t, quern_check_tally *way) {
 	flight f;
 	double before = 0, after = 0;
-	begin_flight(c, it, 1, &f);
+	begin_flight(c, it, 1, way, &f);
 	const quern_check_kernel *k = f.close;
 	const double m = quern_check_given(k, MASS, 0)[0],
 				 stiffness = m * pow(2 * 3.141592653589793 / (100 * k->dt), 2);
@@ -235,19 +278,20 @@ static void spring(const quern_check *c, const quern_check_instance *it, quern_c
 
 static void law(const quern_check *c) {
 	quern_check_tally drift = { .name = "no force" }, push = { .name = "constant force" },
-					  ring = { .name = "a spring" };
+					  ring = { .name = "a spring" }, way = { .name = "moved by the velocity" };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it) {
-			(damps(c) ? damped : constant)(c, it, 0, &drift);
-			(damps(c) ? damped : constant)(c, it, 3, &push);
-			spring(c, it, &ring);
+			(damps(c) ? damped : constant)(c, it, 0, &drift, &way);
+			(damps(c) ? damped : constant)(c, it, 3, &push, &way);
+			spring(c, it, &ring, &way);
 		}
 		c->host->instance_destroy(it);
 	}
 	c->host->tell(c, &drift, NULL);
 	c->host->tell(c, &push, NULL);
 	c->host->tell(c, &ring, NULL);
+	if (way.tried) c->host->tell(c, &way, NULL);
 }
 
 static const quern_param params[] = { QUERN_END_PARAMS };

@@ -19,7 +19,9 @@ enum {
 	STORED,
 	SHEARED,
 	RUBBED,
-	DRAG_COUPLE
+	DRAG_COUPLE,
+	MEAN_VELOCITY,
+	MEAN_SPIN
 };
 
 typedef struct {
@@ -76,10 +78,12 @@ QUERN_INLINE void give_impact(
 	for (uint32_t c = 0; c < k->dim; c++) {
 		quern_check_given(k, NORMAL, c)[i] = n[c];
 		quern_check_given(k, VELOCITY, c)[i] = p->v[c] + drift[c];
+		if (k->at[MEAN_VELOCITY] >= 0) quern_check_given(k, MEAN_VELOCITY, c)[i] = p->v[c] + drift[c];
 	}
 	const uint32_t from = k->dim == 3 ? 0 : 2;
 	for (uint32_t c = from; c < 3 && k->at[SPIN] >= 0; c++) {
 		quern_check_given(k, SPIN, c - from)[i] = p->w[0][c] - p->w[1][c];
+		if (k->at[MEAN_SPIN] >= 0) quern_check_given(k, MEAN_SPIN, c - from)[i] = p->w[0][c] - p->w[1][c];
 		if (k->dim == 3) quern_check_given(k, TURN, c)[i] = 0.5 * (p->w[0][c] + p->w[1][c]);
 	}
 }

@@ -57,13 +57,16 @@ QUERN_INLINE quern_real integral(quern_real low, quern_real high) {
 	return 2 * one_over * angle_of((b - a) / (1 + a * b));
 }
 
-/* A pull that jumps is weighted as dashpots are at first touch, where it begins, and likewise where it ends within the next step. */
+/* A pull that jumps acts for the time on its side of the jump: in the first evaluation with liquid, and in the last before it breaks. */
 QUERN_INLINE quern_real share_of_step(
-	quern_real overlap, quern_real apart, quern_real left, quern_real dt, bool first) {
+	quern_real overlap, quern_real parted, quern_real apart, quern_real left, quern_real dt, bool first) {
 	const quern_real way = apart * dt;
 	const bool leaves = way > left;
 	const quern_real last = 0.5 + left / (leaves ? way : 1);
-	return first ? quern_first_touch(overlap, -apart, dt, 0).weight : leaves ? last : 1;
+	/* half a step more than the way of one: a pair that was apart by a rounding has come no farther */
+	const bool comes = first & (overlap < 1.5 * -parted * dt);
+	const quern_real begun = 0.5 + quern_first_touch(overlap, -parted, dt, 0).time / dt;
+	return comes ? begun : leaves ? last : 1;
 }
 
 QUERN_INLINE void kernel(
@@ -74,14 +77,15 @@ QUERN_INLINE void kernel(
 	const quern_real broken = law.rupture * law.steep;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim);
+		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim),
+						mean = QUERN_VEC_AT(b->mean_velocity, i, dim);
 		const quern_real r = 2 * radius[i], d = overlap[i], gap = d < 0 ? -d : 0;
 		const quern_real left = law.rupture * r - gap, was = bridge[i];
 		const quern_real there = d > 0 ? 1 : (left > 0 ? was : 0);
 		/* f = 2 pi R gamma cos theta/(1 + 1.05 s + 2.5 s^2), s = gap sqrt(R/V) */
 		const quern_real s = gap * law.steep / r, full = law.pull * r / (1 + s * (1.05 + 2.5 * s));
-		const quern_real weight =
-			share_of_step(d, quern_vec_dot(v, n, dim), left, b->dt, (d > 0) & (was <= 0));
+		const quern_real weight = share_of_step(
+			d, quern_vec_dot(mean, n, dim), quern_vec_dot(v, n, dim), left, b->dt, (d > 0) & (was <= 0));
 		const quern_real f = there > 0 ? weight * full : 0; /* what is broken may have any weight */
 		bridge[i] = there;
 		b->force[0][i] -= f * n.x;
@@ -112,7 +116,7 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 }
 
 static const quern_contact_ops ops = {
-	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .reach = reach
+	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .reach = reach, .means = 1
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,

@@ -49,13 +49,14 @@ QUERN_INLINE void kernel(
 	quern_real *const *history = rough ? b->use[SHEAR].real : NULL;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim);
-		const quern_real vn = quern_vec_dot(v, n, dim);
+		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim),
+						mean = QUERN_VEC_AT(b->mean_velocity, i, dim);
+		const quern_real vn = quern_vec_dot(v, n, dim), mean_n = quern_vec_dot(mean, n, dim);
 		/* "touches" is written d > 0 below: one truth value for all of it is what gcc does not vectorise */
 		const bool touching = overlap[i] > 0;
 		const quern_real d = touching ? overlap[i] : 0, root = __builtin_sqrt(d);
 		const quern_real r = __builtin_sqrt(radius[i]), k = 4.0 / 3 * law.modulus * r, elastic = k * d * root;
-		const quern_onset onset = quern_first_touch(overlap[i], -vn, dt, 0.25);
+		const quern_onset onset = quern_first_touch(overlap[i], -mean_n, dt, 0.25);
 		/* f_n = max(0, k d^(3/2) - sqrt 5 zeta sqrt(m k) d^(1/4) v_n) */
 		const quern_real damping = normal_loss * __builtin_sqrt(mass[i] * k * root) * onset.weight;
 		const quern_real pushed = elastic - damping * vn, fn = pushed > 0 ? pushed : 0;
@@ -63,8 +64,8 @@ QUERN_INLINE void kernel(
 		quern_real sheared = 0, rubbed = 0;
 		if (rough) {
 			/* k_t = 8 G* sqrt(r d); what is kept is the force, which an unloading contact gives up in proportion */
-			const quern_vec vt = quern_vec_axpy(-vn, n, v);
-			const quern_real before = d + vn * onset.time,
+			const quern_vec vt = quern_vec_axpy(-vn, n, v), mean_t = quern_vec_axpy(-mean_n, n, mean);
+			const quern_real before = d + mean_n * onset.time,
 							 root_before = __builtin_sqrt(before > 0 ? before : 0);
 			const quern_real kt = 8 * law.shear * r * root, kt_before = 8 * law.shear * r * root_before;
 			const quern_real one_over = kt > 0 ? 1 / (kt > 0 ? kt : 1) : 0;
@@ -77,7 +78,8 @@ QUERN_INLINE void kernel(
 								old = { history[0][i], history[1][i], history[2][i] };
 				was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
 			} else was = (quern_vec) { -n.y * history[0][i], n.x * history[0][i], 0 };
-			const quern_vec trial = quern_vec_axpy(onset.time * stiffness, vt, quern_vec_scale(shrink, was));
+			const quern_vec trial =
+				quern_vec_axpy(onset.time * stiffness, mean_t, quern_vec_scale(shrink, was));
 			const quern_vec g = quern_vec_scale(loss, vt);
 			const quern_cone cone = quern_cone_shares(trial, g, law.friction * fn);
 			now = quern_vec_scale(d > 0 ? cone.spring : 0, trial);
@@ -89,7 +91,7 @@ QUERN_INLINE void kernel(
 			sheared = 0.5 * quern_vec_dot(now, now, 3) * one_over;
 			const quern_real held =
 				0.5 * quern_vec_dot(was, was, 3) * (kt_before > 0 ? 1 / (kt_before > 0 ? kt_before : 1) : 0);
-			const quern_real work = 0.5 * onset.time * quern_vec_dot(quern_vec_add(was, now), vt, 3);
+			const quern_real work = 0.5 * onset.time * quern_vec_dot(quern_vec_add(was, now), mean_t, 3);
 			rubbed = d > 0 ? work + held - sheared : 0;
 		}
 		b->force[0][i] += f.x;
@@ -146,7 +148,8 @@ static const quern_contact_ops ops = { .size = sizeof ops,
 	.force = { force_2d, force_3d },
 	.period = period,
 	.stiffness = stiffness,
-	.damping = damping };
+	.damping = damping,
+	.means = 1 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -52,10 +52,11 @@ QUERN_INLINE void kernel(
 	quern_real *const *slip = rough ? b->use[SLIP].real : NULL;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim);
-		const quern_real d = overlap[i], vn = quern_vec_dot(v, n, dim);
+		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim),
+						mean = QUERN_VEC_AT(b->mean_velocity, i, dim);
+		const quern_real d = overlap[i], vn = quern_vec_dot(v, n, dim), mean_n = quern_vec_dot(mean, n, dim);
 		const bool touching = d > 0;
-		const quern_onset onset = quern_first_touch(d, -vn, dt, 0);
+		const quern_onset onset = quern_first_touch(d, -mean_n, dt, 0);
 		const quern_real damping = law.loss * __builtin_sqrt(kn * mass[i]) * onset.weight;
 		/* f_n = max(0, k_n d - gamma_n v_n) */
 		const quern_real pushed = kn * d - damping * vn, fn = (touching & (pushed > 0)) ? pushed : 0;
@@ -63,10 +64,10 @@ QUERN_INLINE void kernel(
 		quern_real sheared = 0, rubbed = 0;
 		if (rough && dim == 3) {
 			/* xi' = v_t in the tangent plane; |k_t s xi + gamma_t v_t| = mu f_n */
-			const quern_vec vt = quern_vec_axpy(-vn, n, v);
+			const quern_vec vt = quern_vec_axpy(-vn, n, v), mean_t = quern_vec_axpy(-mean_n, n, mean);
 			const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { slip[0][i], slip[1][i], slip[2][i] };
 			const quern_vec was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
-			const quern_vec trial = quern_vec_axpy(onset.time, vt, was);
+			const quern_vec trial = quern_vec_axpy(onset.time, mean_t, was);
 			const quern_vec a = quern_vec_scale(kt, trial),
 							g = quern_vec_scale(law.tangential_damping * damping, vt);
 			const quern_cone cone = quern_cone_shares(a, g, law.friction * fn);
@@ -80,7 +81,8 @@ QUERN_INLINE void kernel(
 			rubbed = touching ? 0.5 * kt * quern_vec_dot(quern_vec_add(was, now), slid, 3) : 0;
 		}
 		if (rough && dim == 2) { /* the same along the one tangent (-n_y, n_x) */
-			const quern_real vt = n.x * v.y - n.y * v.x, was = slip[0][i], trial = was + onset.time * vt;
+			const quern_real vt = n.x * v.y - n.y * v.x, was = slip[0][i];
+			const quern_real trial = was + onset.time * (n.x * mean.y - n.y * mean.x);
 			quern_real spring;
 			const quern_real total = quern_cone_planar(
 				kt * trial, law.tangential_damping * damping * vt, law.friction * fn, &spring);
@@ -143,7 +145,8 @@ static const quern_contact_ops ops = { .size = sizeof ops,
 	.force = { force_2d, force_3d },
 	.period = period,
 	.stiffness = stiffness,
-	.damping = damping };
+	.damping = damping,
+	.means = 1 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -53,7 +53,7 @@ QUERN_INLINE void kernel(
 	quern_real *const *slip = rough ? b->use[SLIP].real : NULL;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim);
+		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->mean_velocity, i, dim);
 		const quern_real d = overlap[i], vn = quern_vec_dot(v, n, dim), before = deepest[i];
 		const bool touching = d > 0;
 		const quern_real deeper = d > before ? d : before, most = touching ? deeper : 0;
@@ -131,7 +131,7 @@ static quern_real stiffness(const void *self, uint32_t dim, quern_real radius, q
 }
 
 static const quern_contact_ops ops = {
-	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .stiffness = stiffness
+	.size = sizeof ops, .force = { force_2d, force_3d }, .period = period, .stiffness = stiffness, .means = 1
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,

@@ -53,12 +53,13 @@ QUERN_INLINE void kernel_2d(const bool energy, const rolling *self, const quern_
 	quern_real *const *roll = b->use[ROLL].real;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_vec n = QUERN_VEC_AT(b->normal, i, 2), u = QUERN_VEC_AT(b->velocity, i, 2);
+		const quern_vec n = QUERN_VEC_AT(b->normal, i, 2), u = QUERN_VEC_AT(b->mean_velocity, i, 2);
 		const quern_real pushed = b->force[0][i] * n.x + b->force[1][i] * n.y;
 		const bool touching = overlap[i] > 0;
 		const quern_onset onset = quern_first_touch(overlap[i], -quern_vec_dot(u, n, 2), dt, 0);
 		const quern_real damping = law.loss * __builtin_sqrt(k * mass[i]) * onset.weight;
-		const quern_real v = radius[i] * b->spin[0][i], was = roll[0][i], trial = was + onset.time * v;
+		const quern_real v = radius[i] * b->spin[0][i], was = roll[0][i];
+		const quern_real trial = was + onset.time * radius[i] * b->mean_spin[0][i];
 		quern_real spring;
 		const quern_real total =
 			quern_cone_planar(k * trial, damping * v, law.friction * (pushed > 0 ? pushed : 0), &spring);
@@ -81,18 +82,20 @@ QUERN_INLINE void kernel_3d(const bool rolls, const bool twists, const bool ener
 	quern_real *const *roll = b->use[ROLL].real, *const *twist = b->use[TWIST].real;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const quern_vec n = QUERN_VEC_AT(b->normal, i, 3), u = QUERN_VEC_AT(b->velocity, i, 3);
-		const quern_vec f = QUERN_VEC_AT(b->force, i, 3), spin = QUERN_VEC_AT(b->spin, i, 3);
+		const quern_vec n = QUERN_VEC_AT(b->normal, i, 3), u = QUERN_VEC_AT(b->mean_velocity, i, 3);
+		const quern_vec f = QUERN_VEC_AT(b->force, i, 3), spin = QUERN_VEC_AT(b->spin, i, 3),
+						mean = QUERN_VEC_AT(b->mean_spin, i, 3);
 		const quern_real r = radius[i], pushed = quern_vec_dot(f, n, 3), normal = pushed > 0 ? pushed : 0;
 		const bool touching = overlap[i] > 0;
 		const quern_onset onset = quern_first_touch(overlap[i], -quern_vec_dot(u, n, 3), dt, 0);
 		quern_vec couple = { 0, 0, 0 }, drag_couple = { 0, 0, 0 };
 		quern_real sheared = 0, rubbed = 0;
 		if (rolls) {
-			const quern_vec v = quern_vec_scale(r, quern_vec_cross(spin, n));
+			const quern_vec v = quern_vec_scale(r, quern_vec_cross(spin, n)),
+							mean_v = quern_vec_scale(r, quern_vec_cross(mean, n));
 			const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { roll[0][i], roll[1][i], roll[2][i] };
 			const quern_vec was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
-			const quern_vec trial = quern_vec_axpy(onset.time, v, was), a = quern_vec_scale(k, trial);
+			const quern_vec trial = quern_vec_axpy(onset.time, mean_v, was), a = quern_vec_scale(k, trial);
 			const quern_vec g = quern_vec_scale(law.loss * __builtin_sqrt(k * mass[i]) * onset.weight, v);
 			const quern_cone cone = quern_cone_shares(a, g, law.friction * normal);
 			const quern_vec now = quern_vec_scale(touching ? cone.spring : 0, trial);
@@ -106,7 +109,7 @@ QUERN_INLINE void kernel_3d(const bool rolls, const bool twists, const bool ener
 		}
 		if (twists) { /* the same about the normal: v_o = r (w_i - w_j).n */
 			const quern_real v = r * quern_vec_dot(spin, n, 3), was = twist[0][i],
-							 trial = was + onset.time * v;
+							 trial = was + onset.time * r * quern_vec_dot(mean, n, 3);
 			quern_real spring;
 			const quern_real total =
 				quern_cone_planar(ko * trial, law.loss * __builtin_sqrt(ko * mass[i]) * onset.weight * v,
@@ -165,9 +168,12 @@ static quern_real damping(const void *self, uint32_t dim) {
 	return ((const rolling *)self)->damping;
 }
 
-static const quern_contact_ops ops = {
-	.size = sizeof ops, .follows = 1, .force = { force_2d, force_3d }, .period = period, .damping = damping
-};
+static const quern_contact_ops ops = { .size = sizeof ops,
+	.follows = 1,
+	.force = { force_2d, force_3d },
+	.period = period,
+	.damping = damping,
+	.means = 1 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

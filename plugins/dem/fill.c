@@ -447,13 +447,15 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 	return store(f);
 }
 
-/* The hybrid books an impulse for each force; an integrator that acts in two steps gives half of it later. */
+/* The hybrid books the impulse of each force in its step, and changes weights between steps; an integrator that evaluates forces at
+ * the step's end gives half of it in the next. */
 static quern_status refuse_two_steps(const quern_step *s) {
 	const quern_bound *integrator = &s->slot[SLOT_INTEGRATOR][0];
-	if (!s->host->has(s->run, "hybrid") || !((const quern_integrator_ops *)integrator->ops)->open[s->dim - 2])
-		return QUERN_OK;
+	if (!s->host->has(s->run, "hybrid") || dem_ahead(integrator->ops, s->dim) < 1) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_PARAM, "integrator", -1,
-		"%s acts in two steps, and the books of a hybrid take one: use symplectic_euler", integrator->id);
+		"%s gives half of each kick in the next step, and the books of a hybrid take one: use position_verlet or "
+		"symplectic_euler",
+		integrator->id);
 }
 
 /* Grains stand for stiff ones: where their weight alone presses them into each other, the bed is too dense and too

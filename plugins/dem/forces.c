@@ -42,6 +42,16 @@ static void carve_rows(const forces_shared *sh, forces_work *w, carver *c) {
 	}
 }
 
+static void carve_means(const forces_shared *sh, forces_work *w, carver *c) {
+	const uint32_t dim = sh->s->dim;
+	memcpy(w->mean_velocity, w->velocity,
+		sizeof w->velocity); /* where they are not made apart they are the same */
+	memcpy(w->mean_spin, w->spin, sizeof w->spin);
+	if (!sh->means) return;
+	carve_columns(c, w->mean_velocity, dim, sh->cap);
+	if (sh->spin) carve_columns(c, w->mean_spin, dim == 3 ? 3 : 1, sh->cap);
+}
+
 /* Lays the columns out from `base`; with base NULL it only measures. Returns the bytes. */
 static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	carver c = { base, 0 };
@@ -61,6 +71,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 		carve_columns(&c, w->torque, dim == 3 ? 3 : 1, cap);
 		if (dim == 3) carve_columns(&c, w->turn, 3, cap);
 	}
+	carve_means(sh, w, &c);
 	if (sh->couple) carve_columns(&c, w->couple, dim == 3 ? 3 : 1, cap);
 	if (sh->books || sh->looks) {
 		if (sh->couple) carve_columns(&c, w->drag_couple, dim == 3 ? 3 : 1, cap);
@@ -118,18 +129,19 @@ static bool pack_grains(forces_shared *sh, const quern_set_view grains) {
 	const quern_step *s = sh->s;
 	forces_work w;
 	const size_t own = (lay_out(sh, &w, NULL) + 63) & ~(size_t)63, row = sizeof *sh->place,
-				 motions = packed_motions((int)s->dim);
-	char *base = s->host->scratch(s->run, 0, own + (1 + motions) * row * grains.n);
+				 motions = packed_motions((int)s->dim), means = sh->means ? motions : 0;
+	char *base = s->host->scratch(s->run, 0, own + (1 + motions + means) * row * grains.n);
 	if (!base) return false;
 	sh->motion = (lanes4 *)(void *)(base + own);
 	sh->place = sh->motion + motions * (size_t)grains.n;
+	sh->mean = means ? sh->place + grains.n : NULL;
 	s->host->parallel(s->run, grains.n_blocks, pack_block, sh);
 	return true;
 }
 
 /* All blocks: the same whether they move or are looked at. */
 static bool act_on_blocks(forces_shared *sh, const quern_set_view grains) {
-	if (sh->contact && !pack_grains(sh, grains)) return false;
+	if ((sh->contact || sh->predicts) && !pack_grains(sh, grains)) return false;
 	sh->s->host->parallel(sh->s->run, grains.n_blocks, move_block, sh);
 	return true;
 }
@@ -141,17 +153,28 @@ static bool any_couples(const quern_step *s) {
 	return false;
 }
 
+static bool asks_for_means(const quern_step *s) {
+	for (uint32_t l = 0; l < s->n_slot[SLOT_CONTACT]; l++)
+		if (((const quern_contact_ops *)s->slot[SLOT_CONTACT][l].ops)->means) return true;
+	return false;
+}
+
 static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	const quern_step *s = sh->s;
 	const quern_set_view contacts = s->host->set(s->run, "contact"), touches = s->host->set(s->run, "touch");
 	const quern_integrator_ops *integrator = dem_integrator(s)->ops;
 	sh->use = s->use;
-	/* an integrator in two parts leaves positions to which it has moved the springs already */
-	sh->dt = sh->looks && integrator->open[s->dim - 2] ? NO_TIME : s->dt;
+	/* springs are where the last forces were, grains have gone on since */
+	const quern_real ahead = dem_ahead(integrator, s->dim), left = 1 - ahead;
+	sh->dt = !sh->looks ? s->dt : left > 0 ? fmax(left * s->dt, NO_TIME) : NO_TIME;
+	sh->waits =
+		ahead < 1 ? 0 : 1; /* the half of a kick that `open` of the next step gives is as large as this one */
 	sh->cap = s->batch;
 	sh->n_bodies = s->n_slot[SLOT_BODIES];
 	sh->n_laws = s->n_slot[SLOT_CONTACT];
 	sh->couple = any_couples(s);
+	sh->predicts = !sh->looks && integrator->predict[s->dim - 2];
+	sh->means = sh->predicts && asks_for_means(s);
 	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
 	sh->books = !sh->looks && !s->settling && (s->use[FORCE_DAMPED].real[0] || s->use[FORCE_RUBBED].real[0]);
 	sh->starts = sh->looks && s->step == 0;
@@ -166,10 +189,10 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	}
 	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
 	/* an integrator in two parts has moved the grains on already: bodies are where they will be then */
-	const quern_real ahead = !sh->looks && integrator->open[s->dim - 2] ? 1 : 0;
-	const quern_real now = s->time + ((quern_real)s->within + ahead) * s->dt;
+	const quern_real now = s->time + ((quern_real)s->within + (sh->looks ? 0 : ahead)) * s->dt;
 	sh->pose = quern_body_poses(s, SLOT_BODIES, now, now);
-	if (!sh->pose) return false;
+	sh->mean_pose = sh->means ? quern_body_poses(s, SLOT_BODIES, now, now - 0.5 * s->dt) : NULL;
+	if (!sh->pose || (sh->means && !sh->mean_pose)) return false;
 	sh->works = !sh->looks && s->use[FORCE_WORK].real[0];
 	sh->twists = !sh->looks && s->use[FORCE_TWIST].real[0];
 	sh->sums = s->host->memory(s->run, (size_t)grains.n_blocks * N_ENERGIES * sizeof(quern_real));

@@ -47,7 +47,10 @@ typedef struct forces_shared {
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
 	bool spin, couple;
-	bool works, twists;    /* what bodies do, and their torques, are booked */
+	quern_real waits;   /* 1: as much of the kick again is given in the next step; 0: all of it in this one */
+	bool predicts;      /* dashpots act on other velocities than those by which grains have moved */
+	bool means;         /* it does, and a law asks for the latter */
+	bool works, twists; /* what bodies do, and their torques, are booked */
 	const body_pose *pose; /* by body */
 	quern_real dt;         /* s, by which springs move */
 	bool books;            /* losses of this step are booked */
@@ -60,9 +63,11 @@ typedef struct forces_shared {
 	body_books books_of_bodies;              /* the last one of a block: by fixed grains */
 	quern_real *sums;                        /* [block][N_ENERGIES] */
 	quern_real *farthest;                    /* [block] square of the way since the last list */
-	quern_real *turned;            /* [block][2] sums of m v.v', of old and new velocity, and of m */
-	int32_t *bad;                  /* [block] first grain that is lost, or -1 */
-	lanes4 *place, *motion;        /* rows by grain: packed.h */
+	quern_real *turned;     /* [block][2] sums of m v.v', of old and new velocity, and of m */
+	int32_t *bad;           /* [block] first grain that is lost, or -1 */
+	lanes4 *place, *motion; /* rows by grain: packed.h */
+	lanes4 *mean;           /* of the motion since the last forces; NULL: that is `motion`, or no law asks */
+	const body_pose *mean_pose;    /* by body, with the velocities of the middle of that time */
 	bool checks, deep;             /* grains are checked in this step; contacts are */
 	int32_t *outside;              /* [block] first grain out of the domain, or -1 */
 	deep_contact *worst, *watched; /* [block] */
@@ -76,7 +81,8 @@ typedef struct law_row {
 /* A worker's columns: `cap` pairs, then a block's sums. */
 typedef struct forces_work {
 	quern_real *overlap, *normal[3], *velocity[3], *spin[3], *turn[3], *radius, *mass, *weight, *arm[2];
-	quern_real *wall[3]; /* velocity of a body that moves, where it is touched */
+	quern_real *mean_velocity[3], *mean_spin[3]; /* those of `velocity` and `spin` where they are the same */
+	quern_real *wall[3];                         /* velocity of a body that moves, where it is touched */
 	quern_real *force[3], *couple[3], *dashpot[3], *drag_couple[3], *stored, *sheared, *rubbed, *torque[3],
 		*drag_torque[3];
 	law_row *rows; /* of all laws, one after the other */

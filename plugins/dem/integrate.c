@@ -22,8 +22,8 @@ static quern_real most_of(quern_real *restrict column, uint32_t n) {
 	return column[0];
 }
 
-/* The square of the way since the last list; how much of the old velocity the new one keeps; and 1 where a grain is lost: what
- * leaves this stage must be finite, and slower than a radius per step. */
+/* The square of the way since the last list; how much of the velocity on the way of this step is kept on that of the next; and 1
+ * where a grain is lost: what leaves this stage must be finite, and slower than a radius per step. */
 QUERN_INLINE void compare(
 	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n, const int dim) {
 	const quern_column *u = sh->use;
@@ -41,17 +41,18 @@ QUERN_INLINE void compare(
 							   *restrict oz = dim == 3 ? u[FORCE_OLD_VELOCITY].real[2] + begin : NULL;
 	const quern_real *restrict mass = u[FORCE_MASS].real[0] + begin, *restrict radius =
 																		 u[FORCE_RADIUS].real[0] + begin;
-	const quern_real dt = sh->s->dt;
+	const quern_real dt = sh->s->dt, waits = sh->waits;
 	quern_real *restrict way = w->grains[G_WAY], *restrict kept = w->grains[G_KEPT],
 						 *restrict whole = w->grains[G_WHOLE], *restrict lost = w->grains[G_LOST];
 	QUERN_SIMD
 	for (uint32_t i = 0; i < n; i++) {
 		const quern_vec d = { x[i] - ax[i], y[i] - ay[i], dim == 3 ? z[i] - az[i] : 0 };
 		const quern_vec now = { vx[i], vy[i], dim == 3 ? vz[i] : 0 },
-						old = { ox[i], oy[i], dim == 3 ? oz[i] : 0 };
+						old = { ox[i], oy[i], dim == 3 ? oz[i] : 0 },
+						next = quern_vec_axpy(waits, quern_vec_sub(now, old), now);
 		const quern_real step = quern_vec_dot(now, now, dim) * dt * dt, most = radius[i] * radius[i];
 		way[i] = quern_vec_dot(d, d, dim);
-		kept[i] = mass[i] * quern_vec_dot(old, now, dim);
+		kept[i] = mass[i] * quern_vec_dot(old, next, dim);
 		whole[i] = mass[i];
 		lost[i] = step <= most ? 0 : 1; /* an unordered comparison finds a NaN too */
 	}
@@ -159,6 +160,20 @@ static void integrate(const forces_shared *sh, const forces_work *w, uint32_t be
 	((const quern_integrator_ops *)bound->ops)->close[dim - 2](bound->self, &batch);
 }
 
+/* Who looks between steps wants velocities in the middle of a kick. An integrator that moves a part of the way after it leaves such. */
+static void look_at_motion(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n) {
+	const quern_column *u = sh->use;
+	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
+	if (!(dem_ahead(dem_integrator(sh->s)->ops, dim) > 0)) {
+		integrate(sh, w, begin, n);
+		return;
+	}
+	for (uint32_t k = 0; k < dim; k++)
+		memcpy(w->grains[G_MEAN + k], u[FORCE_OLD_VELOCITY].real[k] + begin, n * sizeof(quern_real));
+	for (uint32_t k = 0; k < n_spin; k++)
+		memcpy(w->grains[G_MEAN_SPIN + k], u[FORCE_OLD_SPIN].real[k] + begin, n * sizeof(quern_real));
+}
+
 void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums) {
 	const quern_column *sum = &sh->use[FORCE_SUM];
 	for (uint32_t begin = sh->grain[b], end = sh->grain[b + 1]; begin < end; begin += GRAINS) {
@@ -166,11 +181,12 @@ void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, qu
 		load_grains(sh, w, begin, row, n);
 		for (uint32_t k = 0; k < sh->s->dim && sum->real[0]; k++)
 			memcpy(sum->real[k] + begin, w->grains[G_FORCE + k], n * sizeof(quern_real));
-		integrate(sh, w, begin, n);
 		if (sh->looks) {
+			look_at_motion(sh, w, begin, n);
 			quern_dem_have(sh, w, begin, n, sums);
 			continue;
 		}
+		integrate(sh, w, begin, n);
 		hold_fixed(sh, w, b, begin, n);
 		if (sh->books) quern_dem_lose(sh, w, begin, row, n, sums);
 		check_grains(sh, b, begin, n, w);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* integrator.velocity_verlet - second order, also with dashpots: forces see v + dt a, the velocity that the old
- * acceleration predicts. docs/theory/grains.md, section 3 */
+/* integrator.velocity_verlet - second order, also with dashpots, which see v + dt a, the velocity that the old acceleration
+ * predicts. docs/theory/grains.md, section 3 */
 #include <quern/integrator.h>
 
 typedef struct {
@@ -23,29 +23,29 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 QUERN_USE_ENUM(USES);
 static const quern_use uses[] = QUERN_USE_ROWS(USES);
 
-/* x += dt v + dt^2 a / 2; v becomes the prediction v + dt a. */
+/* v becomes that of the middle of the step, v + dt a / 2, by which x moves. */
 QUERN_INLINE void open(const int dim, const quern_integrator_batch *b) {
-	const quern_real dt = b->dt;
+	const quern_real dt = b->dt, half = 0.5 * dt;
 	for (int k = 0; k < dim; k++) {
 		const quern_real *restrict a = b->use[OPEN_ACCELERATION].real[k], *restrict x = b->position[k];
 		const quern_real *restrict v = b->velocity[k];
 		quern_real *restrict nx = b->new_position[k], *restrict nv = b->new_velocity[k];
 		QUERN_SIMD
 		for (uint32_t i = 0; i < b->n; i++) {
-			const quern_real known = a[i] == a[i] ? a[i] : 0;
-			nx[i] = x[i] + dt * (v[i] + 0.5 * dt * known);
-			nv[i] = v[i] + dt * known;
+			const quern_real middle = v[i] + (a[i] == a[i] ? half * a[i] : 0);
+			nv[i] = middle;
+			nx[i] = x[i] + dt * middle;
 		}
 	}
 	for (int k = 0; k < (dim == 3 ? 3 : 1) && b->spin[0]; k++) {
 		const quern_real *restrict a = b->use[OPEN_SPIN_ACCELERATION].real[k], *restrict w = b->spin[k];
 		quern_real *restrict nw = b->new_spin[k];
 		QUERN_SIMD
-		for (uint32_t i = 0; i < b->n; i++) nw[i] = w[i] + (a[i] == a[i] ? dt * a[i] : 0);
+		for (uint32_t i = 0; i < b->n; i++) nw[i] = w[i] + (a[i] == a[i] ? half * a[i] : 0);
 	}
 }
 
-/* v = prediction + dt (a_new - a_old) / 2, which is v_old + dt (a_old + a_new) / 2. */
+/* The other half of the kick. */
 QUERN_INLINE void close(const int dim, const quern_integrator_batch *b) {
 	const quern_real dt = b->dt;
 	const quern_real *restrict m = b->mass;
@@ -58,7 +58,7 @@ QUERN_INLINE void close(const int dim, const quern_integrator_batch *b) {
 		QUERN_SIMD
 		for (uint32_t i = 0; i < b->n; i++) {
 			const quern_real now = f[i] / m[i] + g;
-			nv[i] = v[i] + (a[i] == a[i] ? 0.5 * dt * (now - a[i]) : dt * now);
+			nv[i] = v[i] + (a[i] == a[i] ? 0.5 * dt * now : dt * now);
 			nx[i] = x[i];
 			a[i] = now;
 		}
@@ -71,11 +71,28 @@ QUERN_INLINE void close(const int dim, const quern_integrator_batch *b) {
 		QUERN_SIMD
 		for (uint32_t i = 0; i < b->n; i++) {
 			const quern_real now = t[i] / moment[i];
-			nw[i] = w[i] + (a[i] == a[i] ? 0.5 * dt * (now - a[i]) : dt * now);
+			nw[i] = w[i] + (a[i] == a[i] ? 0.5 * dt * now : dt * now);
 			a[i] = now;
 		}
 		if (b->mean_spin[0])
 			for (uint32_t i = 0; i < b->n; i++) b->mean_spin[k][i] = nw[i];
+	}
+}
+
+/* v + dt a, half a step on from where `open` has left it. */
+QUERN_INLINE void predict(const int dim, const quern_integrator_batch *b) {
+	const quern_real half = 0.5 * b->dt;
+	for (int k = 0; k < dim; k++) {
+		const quern_real *restrict a = b->use[OPEN_ACCELERATION].real[k], *restrict v = b->velocity[k];
+		quern_real *restrict nv = b->new_velocity[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < b->n; i++) nv[i] = v[i] + (a[i] == a[i] ? half * a[i] : 0);
+	}
+	for (int k = 0; k < (dim == 3 ? 3 : 1) && b->spin[0]; k++) {
+		const quern_real *restrict a = b->use[OPEN_SPIN_ACCELERATION].real[k], *restrict w = b->spin[k];
+		quern_real *restrict nw = b->new_spin[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < b->n; i++) nw[i] = w[i] + (a[i] == a[i] ? half * a[i] : 0);
 	}
 }
 
@@ -84,15 +101,23 @@ static void open_3d(const void *self, const quern_integrator_batch *b) { (void)s
 static void close_2d(const void *self, const quern_integrator_batch *b) { (void)self, close(2, b); }
 static void close_3d(const void *self, const quern_integrator_batch *b) { (void)self, close(3, b); }
 
-static const quern_integrator_ops ops = {
-	.size = sizeof ops, .close = { close_2d, close_3d }, .open = { open_2d, open_3d }
-};
+static void predict_2d(const void *self, const quern_integrator_batch *b) { (void)self, predict(2, b); }
+static void predict_3d(const void *self, const quern_integrator_batch *b) { (void)self, predict(3, b); }
+
+static const quern_integrator_ops ops = { .size = sizeof ops,
+	.close = { close_2d, close_3d },
+	.open = { open_2d, open_3d },
+	.predict = { predict_2d, predict_3d },
+	.damping = 2,
+	.at = 1 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "integrator.velocity_verlet",
 	.brief = "Second order, with one evaluation a step.",
-	.doc = "Dashpots act on the predicted velocity, which keeps the order. Remembers the last acceleration.",
+	.doc =
+		"Dashpots act on the predicted velocity and springs move by the mean one, which keeps the order. Remembers the last "
+		"acceleration.",
 	.cite = "Swope et al. 1982",
 	.instance_size = sizeof(verlet),
 	.params = params,

@@ -93,6 +93,13 @@ static quern_contact_batch batch_of(const forces_shared *sh, const forces_work *
 	return b;
 }
 
+static void give_means(const forces_work *w, bool asks, quern_contact_batch *b) {
+	for (uint32_t k = 0; k < 3; k++) {
+		b->mean_velocity[k] = asks ? w->mean_velocity[k] : NULL;
+		b->mean_spin[k] = asks ? w->mean_spin[k] : NULL;
+	}
+}
+
 void quern_dem_call_laws(const forces_shared *sh, forces_work *w, const contact_chunk *c) {
 	quern_column use[QUERN_MOST_USES], use_second[QUERN_MOST_USES];
 	quern_contact_batch b = batch_of(sh, w, c->n);
@@ -103,8 +110,10 @@ void quern_dem_call_laws(const forces_shared *sh, forces_work *w, const contact_
 	for (uint32_t l = 0; l < sh->n_laws; l++) {
 		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
 		const void *self = dem_law(law, c->item, c->body);
+		const quern_contact_ops *ops = law->ops;
 		gather_rows(sh, w, c, law, rows, use, use_second);
-		if (c->n) ((const quern_contact_ops *)law->ops)->force[sh->s->dim - 2](self, &b);
+		give_means(w, ops->means, &b);
+		if (c->n) ops->force[sh->s->dim - 2](self, &b);
 		if (!sh->looks) scatter_rows(sh, w, c, law, rows);
 		rows += law->n_uses;
 	}

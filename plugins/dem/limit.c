@@ -40,11 +40,17 @@ static contact_limit all_laws(
 	return c;
 }
 
+/* A dashpot that sees a predicted velocity counts more than one that sees the present one. */
+static quern_real damping_factor(const quern_step *s) {
+	const quern_integrator_ops *ops = dem_integrator(s)->ops;
+	return ops->damping > 0 ? ops->damping : 1;
+}
+
 /* 0.2 of the half-period, or the limit of explicit dashpots in a packing, omega dt < 2 (sqrt(1 + zeta^2) - zeta). */
 static contact_limit limit_of(
 	const quern_step *s, quern_real mass, quern_real radius, int32_t item, int32_t body) {
 	contact_limit c = all_laws(s, mass, radius, item, body);
-	const quern_real crowd = crowding(s->dim), zeta = crowd * c.damping;
+	const quern_real crowd = crowding(s->dim), zeta = damping_factor(s) * crowd * c.damping;
 	const quern_real damped = 2 * (sqrt(1 + zeta * zeta) - zeta) / crowd * c.period / 3.141592653589793;
 	c.hard = damped < 0.2 * c.period ? damped : 0.2 * c.period;
 	if (body >= 0)

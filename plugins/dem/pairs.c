@@ -4,30 +4,80 @@
 
 /* ---- rows of grains ---- */
 
+QUERN_INLINE quern_real mass_of(const forces_shared *sh, uint32_t i) {
+	const int32_t *fixed = sh->use[FORCE_FIXED].index;
+	const quern_real mass = sh->use[FORCE_MASS].real[0][i];
+	return fixed && fixed[i] ? -mass : mass;
+}
+
+/* Velocity v and spin s of entry k, of a grain of mass m. */
+QUERN_INLINE void pack_motion(lanes4 *motion, quern_real *const *v, quern_real *const *s, uint32_t k,
+	quern_real m, const int dim, const bool spin) {
+	motion[0] = dim == 3 ? (lanes4) { v[0][k], v[1][k], v[2][k], m }
+						 : (lanes4) { v[0][k], v[1][k], spin ? s[0][k] : 0, 0 };
+	if (dim == 3 && spin) motion[1] = (lanes4) { s[0][k], s[1][k], s[2][k], 0 };
+}
+
+/* `to`: rows of motion by the state, which are those that dashpots see unless these are predicted. */
 QUERN_INLINE void pack(
-	const forces_shared *sh, uint32_t begin, uint32_t end, const int dim, const bool spin) {
+	const forces_shared *sh, uint32_t begin, uint32_t end, lanes4 *to, const int dim, const bool spin) {
 	quern_real *const *x = sh->use[FORCE_OLD_POSITION].real, *const *v = sh->use[FORCE_OLD_VELOCITY].real,
 					  *const *s = sh->use[FORCE_OLD_SPIN].real;
-	const quern_real *radius = sh->use[FORCE_RADIUS].real[0], *mass = sh->use[FORCE_MASS].real[0];
-	const int32_t *fixed = sh->use[FORCE_FIXED].index;
+	const quern_real *radius = sh->use[FORCE_RADIUS].real[0];
 	for (uint32_t i = begin; i < end; i++) {
-		const quern_real m = fixed && fixed[i] ? -mass[i] : mass[i];
-		lanes4 *motion = &sh->motion[packed_motions(dim) * (size_t)i];
+		const quern_real m = mass_of(sh, i);
 		sh->place[i] = dim == 3 ? (lanes4) { x[0][i], x[1][i], x[2][i], radius[i] }
 								: (lanes4) { x[0][i], x[1][i], radius[i], m };
-		motion[0] = dim == 3 ? (lanes4) { v[0][i], v[1][i], v[2][i], m }
-							 : (lanes4) { v[0][i], v[1][i], spin ? s[0][i] : 0, 0 };
-		if (dim == 3 && spin) motion[1] = (lanes4) { s[0][i], s[1][i], s[2][i], 0 };
+		if (to) pack_motion(&to[packed_motions(dim) * (size_t)i], v, s, i, m, dim, spin);
 	}
+}
+
+/* What dashpots see, as the integrator says. A fixed grain has no acceleration, whatever its forces are. */
+QUERN_INLINE void pack_predicted(
+	const forces_shared *sh, uint32_t begin, uint32_t n, const int dim, const bool spin) {
+	const quern_bound *bound = dem_integrator(sh->s);
+	const quern_column *u = sh->use, *velocity = &u[FORCE_OLD_VELOCITY], *turning = &u[FORCE_OLD_SPIN];
+	const int32_t *fixed = u[FORCE_FIXED].index;
+	_Alignas(64) quern_real then[6][GRAINS];
+	quern_real *const v[3] = { then[0], then[1], then[2] }, *const s[3] = { then[3], then[4], then[5] };
+	quern_column own[QUERN_MOST_USES];
+	quern_integrator_batch batch = { .n = n, .cap = GRAINS, .dt = sh->s->dt, .use = own };
+	for (uint32_t r = 0; r < bound->n_uses; r++)
+		own[r] = quern_column_from(bound->column[r], bound->uses[r].shape, begin);
+	for (int k = 0; k < dim; k++) {
+		batch.gravity[k] = sh->s->gravity[k];
+		batch.position[k] = u[FORCE_OLD_POSITION].real[k] + begin;
+		batch.velocity[k] = velocity->real[k] + begin;
+		batch.new_velocity[k] = v[k];
+	}
+	for (int k = 0; k < (dim == 3 ? 3 : 1) && spin; k++) {
+		batch.spin[k] = turning->real[k] + begin;
+		batch.new_spin[k] = s[k];
+	}
+	((const quern_integrator_ops *)bound->ops)->predict[dim - 2](bound->self, &batch);
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t g = begin + i;
+		lanes4 *motion = &sh->motion[packed_motions(dim) * (size_t)g];
+		if (fixed && fixed[g])
+			pack_motion(motion, velocity->real, turning->real, g, mass_of(sh, g), dim, spin);
+		else pack_motion(motion, v, s, i, mass_of(sh, g), dim, spin);
+	}
+}
+
+QUERN_INLINE void pack_all(
+	const forces_shared *sh, uint32_t begin, uint32_t end, const int dim, const bool spin) {
+	pack(sh, begin, end, sh->predicts ? sh->mean : sh->motion, dim, spin);
+	for (uint32_t i = begin; i < end && sh->predicts; i += GRAINS)
+		pack_predicted(sh, i, end - i < GRAINS ? end - i : GRAINS, dim, spin);
 }
 
 void quern_dem_pack(const forces_shared *sh, uint32_t b) {
 	const uint32_t begin = sh->grain[b], end = sh->grain[b + 1];
 	if (sh->s->dim == 2) {
-		if (sh->spin) pack(sh, begin, end, 2, true);
-		else pack(sh, begin, end, 2, false);
-	} else if (sh->spin) pack(sh, begin, end, 3, true);
-	else pack(sh, begin, end, 3, false);
+		if (sh->spin) pack_all(sh, begin, end, 2, true);
+		else pack_all(sh, begin, end, 2, false);
+	} else if (sh->spin) pack_all(sh, begin, end, 3, true);
+	else pack_all(sh, begin, end, 3, false);
 }
 
 /* ---- who is near ---- */
@@ -133,46 +183,46 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	}
 }
 
-/* Leaves v_i - v_j in `velocity`, w_i in `spin`; w_j in `turn`, in 2-D in `torque`; in 3-D the masses in `mass` and
- * `force`. */
-QUERN_INLINE void load_motion(
-	const forces_shared *sh, const forces_work *w, uint32_t n, const int dim, const bool spin) {
+/* Of rows of motion: leaves v_i - v_j in `velocity`, w_i in `spin`; w_j in `turn`, in 2-D in `torque`; in 3-D the masses in `mass`
+ * and `force`. */
+QUERN_INLINE void load_motion(const lanes4 *rows, const forces_work *w, quern_real *const velocity[3],
+	quern_real *const turning[3], uint32_t n, const int dim, const bool spin) {
 	for (uint32_t q = 0; q < n; q += 4) {
 		lanes4 i[4], j[4], d[4], mine[4], other[4];
-		packed_rows(sh->motion, packed_motions(dim), w->first + q, i);
-		packed_rows(sh->motion, packed_motions(dim), w->second + q, j);
+		packed_rows(rows, packed_motions(dim), w->first + q, i);
+		packed_rows(rows, packed_motions(dim), w->second + q, j);
 		for (int k = 0; k < 4; k++) d[k] = i[k] - j[k];
 		packed_turn(d, d);
 		packed_turn(i, mine);
 		packed_turn(j, other);
-		for (int k = 0; k < dim; k++) packed_put(w->velocity[k] + q, &d[k]);
+		for (int k = 0; k < dim; k++) packed_put(velocity[k] + q, &d[k]);
 		if (dim == 2 && spin) {
-			packed_put(w->spin[0] + q, &mine[2]);
+			packed_put(turning[0] + q, &mine[2]);
 			packed_put(w->torque[0] + q, &other[2]);
 		}
 		if (dim == 2) continue;
 		packed_put(w->mass + q, &mine[3]);
 		packed_put(w->force[0] + q, &other[3]);
 		if (!spin) continue;
-		packed_columns(sh->motion + 1, 2, w->first + q, mine);
-		packed_columns(sh->motion + 1, 2, w->second + q, other);
+		packed_columns(rows + 1, 2, w->first + q, mine);
+		packed_columns(rows + 1, 2, w->second + q, other);
 		for (int k = 0; k < 3; k++) {
-			packed_put(w->spin[k] + q, &mine[k]);
+			packed_put(turning[k] + q, &mine[k]);
 			packed_put(w->turn[k] + q, &other[k]);
 		}
 	}
 }
 
 /* v_c = v_i - v_j + w_i x b_i - w_j x b_j with b_i = -arm_i n, b_j = arm_j n */
-QUERN_INLINE void motion(
-	const forces_shared *sh, const forces_work *w, uint32_t n, const int dim, const bool spin) {
+QUERN_INLINE void motion(const lanes4 *rows, const forces_work *w, quern_real *const velocity[3],
+	quern_real *const turning[3], uint32_t n, const int dim, const bool spin) {
 	const quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
 	const quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
-	quern_real *restrict vx = w->velocity[0], *restrict vy = w->velocity[1], *restrict vz = w->velocity[2];
-	quern_real *restrict sx = w->spin[0], *restrict sy = w->spin[1], *restrict sz = w->spin[2];
+	quern_real *restrict vx = velocity[0], *restrict vy = velocity[1], *restrict vz = velocity[2];
+	quern_real *restrict sx = turning[0], *restrict sy = turning[1], *restrict sz = turning[2];
 	quern_real *restrict tx = w->turn[0], *restrict ty = w->turn[1], *restrict tz = w->turn[2];
 	const quern_real *restrict planar = w->torque[0];
-	load_motion(sh, w, n, dim, spin);
+	load_motion(rows, w, velocity, turning, n, dim, spin);
 	if (spin && dim == 2) {
 		QUERN_SIMD
 		for (uint32_t q = 0; q < n; q++) {
@@ -252,7 +302,8 @@ QUERN_INLINE void block(
 			.held = quern_dem_held(sh, FORCE_CONTACT_SHEARED, begin) };
 		c.n = compact(sh, w, begin, c.n_slots, c.held, dim);
 		geometry(sh, w, c.n, dim);
-		motion(sh, w, c.n, dim, spin);
+		motion(sh->motion, w, w->velocity, w->spin, c.n, dim, spin);
+		if (sh->mean) motion(sh->mean, w, w->mean_velocity, w->mean_spin, c.n, dim, spin);
 		masses(sh, w, c.n);
 		quern_dem_act(sh, w, &c, sums);
 	}

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* touches - grains of one block on bodies: geometry and motion, with the body for a second grain that never moves */
-#include "forces.h"
+#include "packed.h"
 #include <string.h>
 
 /* The same grain stands for both, since whatever a law asks of the second it gets from the first. */
@@ -26,6 +26,25 @@ static void to_the_middle(const forces_work *w, const quern_pose *pose, uint32_t
 		const quern_vec v = quern_vec_axpy(-0.5 * overlap,
 			quern_vec_cross(spin, QUERN_VEC_AT(w->normal, q, dim)), QUERN_VEC_AT(w->velocity, q, dim));
 		QUERN_VEC_PUT(w->velocity, q, v, dim);
+	}
+}
+
+/* Of the surface's velocity since the last forces, which is that in the middle of that time; x are the grains' centres. */
+static void surface_means(
+	const forces_shared *sh, const forces_work *w, const contact_chunk *c, quern_real *const x[3]) {
+	const quern_pose *now = &sh->pose[c->body].pose, *middle = &sh->mean_pose[c->body].pose;
+	const uint32_t dim = sh->s->dim;
+	for (uint32_t k = 0; k < dim; k++) memcpy(w->mean_velocity[k], w->velocity[k], c->n * sizeof(quern_real));
+	if (!sh->pose[c->body].moves) return;
+	const quern_vec drift = quern_vec_sub(QUERN_VEC_OF(middle->velocity), QUERN_VEC_OF(now->velocity)),
+					turn = quern_vec_sub(QUERN_VEC_OF(middle->spin), QUERN_VEC_OF(now->spin));
+	for (uint32_t q = 0; q < c->n; q++) {
+		const quern_vec at =
+			quern_vec_axpy(-w->arm[0][q], QUERN_VEC_AT(w->normal, q, dim), QUERN_VEC_AT(x, q, dim));
+		const quern_vec more =
+			quern_vec_add(drift, quern_vec_cross(turn, quern_vec_sub(at, QUERN_VEC_OF(now->position))));
+		const quern_vec mean = quern_vec_add(QUERN_VEC_AT(w->mean_velocity, q, dim), more);
+		QUERN_VEC_PUT(w->mean_velocity, q, mean, dim);
 	}
 }
 
@@ -61,48 +80,72 @@ static void geometry(const forces_shared *sh, forces_work *w, const contact_chun
 	if (at->moves) to_the_middle(w, &at->pose, c->n, sh->s->dim);
 	for (uint32_t k = 0; k < sh->s->dim && at->moves && w->wall[0]; k++)
 		memcpy(w->wall[k], w->velocity[k], c->n * sizeof(quern_real));
+	if (sh->mean) surface_means(sh, w, c, x);
 }
 
-/* v_c = v_i - v_body + w_i x b_i with b_i = -arm_i n */
-QUERN_INLINE void motion(
-	const forces_shared *sh, const forces_work *w, uint32_t n, const int dim, const bool spin) {
-	quern_real *const *v = sh->use[FORCE_OLD_VELOCITY].real, *const *s = sh->use[FORCE_OLD_SPIN].real;
+/* Of a grain, by `rows` of motion (packed.h), or as it is where there are none. */
+QUERN_INLINE void motion_of(const forces_shared *sh, const lanes4 *rows, int32_t i, quern_vec *v,
+	quern_vec *spin, const int dim, const bool spins) {
+	const quern_column *u = sh->use;
+	*spin = (quern_vec) { 0, 0, 0 };
+	if (!rows) {
+		*v = QUERN_VEC_AT(u[FORCE_OLD_VELOCITY].real, i, dim);
+		if (spins && dim == 2) spin->z = u[FORCE_OLD_SPIN].real[0][i];
+		if (spins && dim == 3) *spin = QUERN_VEC_AT(u[FORCE_OLD_SPIN].real, i, 3);
+		return;
+	}
+	const lanes4 *row = &rows[packed_motions(dim) * (size_t)i];
+	*v = (quern_vec) { row[0][0], row[0][1], dim == 3 ? row[0][2] : 0 };
+	if (spins && dim == 2) spin->z = row[0][2];
+	if (spins && dim == 3) *spin = (quern_vec) { row[1][0], row[1][1], row[1][2] };
+}
+
+/* v_c = v_i - v_body + w_i x b_i with b_i = -arm_i n; `velocity` comes with v_body. */
+QUERN_INLINE void motion(const forces_shared *sh, const lanes4 *rows, const forces_work *w,
+	quern_real *const velocity[3], quern_real *const turning[3], uint32_t n, const int dim,
+	const bool spins) {
 	for (uint32_t q = 0; q < n; q++) {
-		const int32_t i = w->first[q];
 		const quern_real arm = w->arm[0][q];
 		const quern_vec normal = QUERN_VEC_AT(w->normal, q, dim);
-		quern_vec at = quern_vec_sub(QUERN_VEC_AT(v, i, dim), QUERN_VEC_AT(w->velocity, q, dim));
-		if (spin && dim == 2) {
-			at.x += arm * s[0][i] * normal.y;
-			at.y -= arm * s[0][i] * normal.x;
-			w->spin[0][q] = s[0][i];
+		quern_vec own, spin;
+		motion_of(sh, rows, w->first[q], &own, &spin, dim, spins);
+		quern_vec at = quern_vec_sub(own, QUERN_VEC_AT(velocity, q, dim));
+		if (spins && dim == 2) {
+			at.x += arm * spin.z * normal.y;
+			at.y -= arm * spin.z * normal.x;
+			turning[0][q] = spin.z;
 		}
-		if (spin && dim == 3) {
-			const quern_vec own = QUERN_VEC_AT(s, i, 3), half = quern_vec_scale(0.5, own);
-			at = quern_vec_sub(at, quern_vec_scale(arm, quern_vec_cross(own, normal)));
-			QUERN_VEC_PUT(w->spin, q, own, 3);
+		if (spins && dim == 3) {
+			const quern_vec half = quern_vec_scale(0.5, spin);
+			at = quern_vec_sub(at, quern_vec_scale(arm, quern_vec_cross(spin, normal)));
+			QUERN_VEC_PUT(turning, q, spin, 3);
 			QUERN_VEC_PUT(w->turn, q, half, 3);
 		}
-		QUERN_VEC_PUT(w->velocity, q, at, dim);
+		QUERN_VEC_PUT(velocity, q, at, dim);
 	}
 }
 
 /* A law sees how a grain turns against what it touches. */
-static void turn_with(const forces_work *w, const quern_pose *pose, uint32_t n, uint32_t dim) {
+static void turn_with(
+	const forces_work *w, quern_real *const turning[3], const quern_pose *pose, uint32_t n, uint32_t dim) {
 	for (uint32_t q = 0; q < n; q++)
 		for (uint32_t k = 0; k < (dim == 3 ? 3u : 1u); k++) {
 			const quern_real of = pose->spin[dim == 3 ? k : 2];
-			w->spin[k][q] -= of;
+			turning[k][q] -= of;
 			if (dim == 3) w->turn[k][q] += 0.5 * of;
 		}
 }
 
-static void move(const forces_shared *sh, const forces_work *w, uint32_t n) {
-	if (sh->s->dim == 2) {
-		if (sh->spin) motion(sh, w, n, 2, true);
-		else motion(sh, w, n, 2, false);
-	} else if (sh->spin) motion(sh, w, n, 3, true);
-	else motion(sh, w, n, 3, false);
+/* By rows of motion, or NULL, and against a body in this pose. */
+static void move(const forces_shared *sh, const lanes4 *rows, const forces_work *w,
+	quern_real *const velocity[3], quern_real *const turning[3], const body_pose *pose, uint32_t n) {
+	const uint32_t dim = sh->s->dim;
+	if (dim == 2) {
+		if (sh->spin) motion(sh, rows, w, velocity, turning, n, 2, true);
+		else motion(sh, rows, w, velocity, turning, n, 2, false);
+	} else if (sh->spin) motion(sh, rows, w, velocity, turning, n, 3, true);
+	else motion(sh, rows, w, velocity, turning, n, 3, false);
+	if (sh->spin && pose->moves) turn_with(w, turning, &pose->pose, n, dim);
 }
 
 /* ---- what the body gives ---- */
@@ -186,8 +229,8 @@ void quern_dem_touches(const forces_shared *sh, forces_work *w, uint32_t b, quer
 			quern_dem_held(sh, FORCE_TOUCH_SHEARED, begin) };
 		load(sh, w, &c);
 		geometry(sh, w, &c);
-		move(sh, w, n);
-		if (sh->spin && sh->pose[c.body].moves) turn_with(w, &sh->pose[c.body].pose, n, sh->s->dim);
+		move(sh, sh->predicts ? sh->motion : NULL, w, w->velocity, w->spin, &sh->pose[c.body], n);
+		if (sh->mean) move(sh, NULL, w, w->mean_velocity, w->mean_spin, &sh->mean_pose[c.body], n);
 		quern_dem_act(sh, w, &c, sums);
 		book(sh, w, &c, sums);
 	}

@@ -127,12 +127,12 @@ static outcome collide(const bounce *c, double asked) {
 static void bounces_lose_the_bridge(void **unused) {
 	(void)unused;
 	static const char *const names[] = { "equal grains", "grains of radius 1 and 2", "a grain and a wall" };
-	static const char *const integrators[] = { "symplectic_euler", "velocity_verlet" };
+	static const char *const integrators[] = { "symplectic_euler", "velocity_verlet", "position_verlet" };
 	static const double shares[] = { 0, 0.1, 0.5, 0.9 }; /* of the energy of approach, that a bridge takes */
 	bool good = true;
 	char what[80];
 	for (uint32_t dim = 2; dim <= 3; dim++)
-		for (int with = 0; with < 2; with++) {
+		for (int with = 0; with < (dim == 2 ? 3 : 2); with++) {
 			snprintf(what, sizeof what, "energy left, %s, %uD, worst of %d phases", integrators[with], dim,
 				PHASES);
 			table_head(what);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Restitution measured against restitution asked: pairs of equal and of unequal grains and grains on a wall, with both
- * laws, both integrators and in both dimensions, at the default step and in every phase of it in which a pair may
+ * laws, all integrators and in both dimensions, at the default step and in every phase of it in which a pair may
  * happen to touch. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,6 +12,8 @@
 #include "harness.h"
 #include "scene_text.h"
 #include "table.h"
+#include <math.h>
+#include <string.h>
 
 enum { PHASES = 32 };
 static const double radius = 5e-3, speed = 1; /* m, m/s: of approach */
@@ -91,45 +93,40 @@ static double worst_restitution(const collision *c) {
 	return worst;
 }
 
-static bool collide(const char *title, collision c) {
+/* Within 0.01 of what is asked by the scheme of first order, within 0.005 by those of second. */
+static bool collide(collision c) {
 	static const double asked[] = { 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1 };
 	static const char *const names[] = { "equal grains", "grains of mass 1 and 10", "a grain and a wall" };
+	const double within = strcmp(c.integrator, "symplectic_euler") == 0 ? 0.01 : 0.005;
+	double worst = 0;
 	bool good = true;
 	char what[80];
 	for (c.dim = 2; c.dim <= 3; c.dim++) {
-		snprintf(what, sizeof what, "%s, %uD, worst of %d phases", title, c.dim, PHASES);
+		snprintf(what, sizeof what, "%s, %s, %uD, worst of %d phases", c.hertz ? "hertz" : "linear",
+			c.integrator, c.dim, PHASES);
 		table_head(what);
 		for (c.with = EQUAL; c.with <= WALL; c.with++)
 			for (size_t k = 0; k < sizeof asked / sizeof *asked; k++) {
 				c.restitution = asked[k];
-				good &= table_row(names[c.with], worst_restitution(&c), asked[k], 0.01);
+				const double found = worst_restitution(&c);
+				worst = fmax(worst, fabs(found - asked[k]));
+				good &= table_row(names[c.with], found, asked[k], within);
 			}
 	}
+	table_note("farthest from what is asked", worst);
 	return good;
 }
 
-static void linear_with_euler(void **unused) {
-	(void)unused;
-	assert_true(collide("linear, symplectic_euler", (collision) { .integrator = "symplectic_euler" }));
+static bool with(const char *integrator) {
+	const bool linear = collide((collision) { .integrator = integrator });
+	return collide((collision) { .hertz = true, .integrator = integrator }) && linear;
 }
-static void linear_with_verlet(void **unused) {
-	(void)unused;
-	assert_true(collide("linear, velocity_verlet", (collision) { .integrator = "velocity_verlet" }));
-}
-static void hertz_with_euler(void **unused) {
-	(void)unused;
-	assert_true(
-		collide("hertz, symplectic_euler", (collision) { .hertz = true, .integrator = "symplectic_euler" }));
-}
-static void hertz_with_verlet(void **unused) {
-	(void)unused;
-	assert_true(
-		collide("hertz, velocity_verlet", (collision) { .hertz = true, .integrator = "velocity_verlet" }));
-}
+static void with_euler(void **unused) { (void)unused, assert_true(with("symplectic_euler")); }
+static void with_velocity_verlet(void **unused) { (void)unused, assert_true(with("velocity_verlet")); }
+static void with_position_verlet(void **unused) { (void)unused, assert_true(with("position_verlet")); }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(linear_with_euler),
-		cmocka_unit_test(linear_with_verlet), cmocka_unit_test(hertz_with_euler),
-		cmocka_unit_test(hertz_with_verlet) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(with_euler), cmocka_unit_test(with_velocity_verlet),
+		cmocka_unit_test(with_position_verlet) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -39,7 +39,7 @@ static void press(contact *c, uint32_t dim, double overlap) {
 		.sheared = &sheared,
 		.rubbed = &rubbed };
 	for (uint32_t k = 0; k < dim; k++) {
-		b.normal[k] = &normal[k], b.velocity[k] = &velocity[k];
+		b.normal[k] = &normal[k], b.velocity[k] = b.mean_velocity[k] = &velocity[k];
 		b.force[k] = &force[k], b.dashpot[k] = &dashpot[k];
 	}
 	ops->force[dim - 2](c->law->self, &b);

@@ -106,11 +106,11 @@ static void gives_back_what_is_asked(void **unused) {
 	(void)unused;
 	static const double asked[] = { 0.05, 0.2, 0.5, 0.8, 1 };
 	static const char *const names[] = { "equal grains", "grains of mass 1 and 10", "a grain and a wall" };
-	static const char *const integrators[] = { "symplectic_euler", "velocity_verlet" };
+	static const char *const integrators[] = { "symplectic_euler", "velocity_verlet", "position_verlet" };
 	bool good = true;
 	char what[80];
 	for (uint32_t dim = 2; dim <= 3; dim++)
-		for (int with = 0; with < 2; with++) {
+		for (int with = 0; with < 3; with++) {
 			snprintf(what, sizeof what, "%s, %uD, worst of %d phases", integrators[with], dim, PHASES);
 			table_head(what);
 			for (int p = EQUAL; p < PARTNERS; p++)

@@ -27,10 +27,13 @@ typedef enum {
 } law; /* cohesive: with a linear spring that has no dashpot */
 static const char *const law_names[] = { "linear", "hertz", "plastic", "cohesive" };
 
+typedef enum { EULER, VELOCITY, POSITION, INTEGRATORS } integrator;
+static const char *const integrator_names[] = { "symplectic_euler", "velocity_verlet", "position_verlet" };
+
 typedef struct heap {
 	uint32_t dim;
 	law by;
-	bool verlet;
+	integrator with;
 	double width, height; /* m, of the column */
 	const char *step;
 } heap;
@@ -46,7 +49,6 @@ static quern_run *open_scene(const heap *h) {
 	/* a bridge pulls twice as much as a grain weighs, or a quarter of that in 3-D */
 	const double tension = h->dim == 2 ? 120 : 0.1;
 	snprintf(words, sizeof words, laws[h->by], h->by == HERTZ ? young(h->dim) : stiffness(h->dim), tension);
-	const char *integrator = h->verlet ? "velocity_verlet" : "symplectic_euler";
 	const double top = h->height + 0.1;
 	if (h->dim == 2)
 		return harness_open(1,
@@ -60,7 +62,7 @@ static quern_run *open_scene(const heap *h) {
 			"  contact: %s, integrator: %s,\n"
 			"  fill: [{region: {box: {lower: [0, 0], upper: [1, 0]}}, fixed: true},\n"
 			"    {region: {box: {lower: [0, 0.01], upper: [%.17g, %.17g]}}}]}}\n",
-			top, h->step, words, integrator, h->width, h->height);
+			top, h->step, words, integrator_names[h->with], h->width, h->height);
 	return harness_open(1,
 		"{quern: 1, dimension: 3, gravity: [0, -9.81, 0], domain: {lower: [0, 0, 0], upper: [2, %.17g, "
 		"0.05]},\n"
@@ -76,7 +78,7 @@ static quern_run *open_scene(const heap *h) {
 		"  contact: %s, integrator: %s,\n"
 		"  fill: [{region: {box: {lower: [0, 0, 0.005], upper: [0.6, 0, 0.045]}}, fixed: true},\n"
 		"    {region: {box: {lower: [0, 0.01, 0.005], upper: [%.17g, %.17g, 0.045]}}}]}}\n",
-		top, h->step, words, integrator, h->width, h->height);
+		top, h->step, words, integrator_names[h->with], h->width, h->height);
 }
 
 /* ==== one step ==== */
@@ -204,7 +206,7 @@ static double kinetic(const look *l, const state *s) {
 	return sum;
 }
 
-/* Verlet's kicks are centred on the step's end: half a kick leads to the state that lasts until the next. */
+/* Velocity Verlet's kicks are centred on the step's end: half a kick leads to the state that lasts until the next. */
 static void half_kick(look *l, state *s, double dt) {
 	const quern_column a = harness_field(l->run, "grain.acceleration"),
 					   t = harness_field(l->run, "grain.spin_acceleration");
@@ -215,13 +217,21 @@ static void half_kick(look *l, state *s, double dt) {
 	}
 }
 
+/* Position Verlet's forces are those of the middle of the way: half a step from the last state. */
+static void half_a_way(const look *l, state *s, double dt) {
+	for (uint32_t i = 0; i < harness_count(l->run, "grain"); i++) {
+		const int64_t k = l->id.id[i];
+		s->x[k] = quern_vec_axpy(0.5 * dt, s->v[k], s->x[k]);
+	}
+}
+
 typedef struct gap {
 	double work, damped; /* the worst of all steps, over the kinetic energy */
 } gap;
 
 /* One step: `before` holds the last one's outcome, and gets this one's. */
 static gap follow_step(quern_run *run, const heap *h, state *before, bool compare) {
-	static state now, mean;
+	static state now, mean, middle;
 	const double damped = harness_field(run, "total.damped").real[0][0];
 	harness_steps(run, 1);
 	const double dt = run->clock.dt;
@@ -232,17 +242,19 @@ static gap follow_step(quern_run *run, const heap *h, state *before, bool compar
 	l.fixed = harness_field(run, "grain.fixed");
 	read_state(run, h->dim, &now);
 	mean = now;
-	if (h->verlet) half_kick(&l, &now, dt);
+	if (h->with == VELOCITY) half_kick(&l, &now, dt);
 	for (uint32_t i = 0; i < harness_count(run, "grain"); i++) {
 		const int64_t k = l.id.id[i];
-		if (!h->verlet) {
+		if (h->with != VELOCITY) {
 			mean.v[k] = quern_vec_scale(0.5, quern_vec_add(before->v[k], now.v[k]));
 			mean.w[k] = quern_vec_scale(0.5, quern_vec_add(before->w[k], now.w[k]));
 		}
 		if (l.fixed.index[i]) mean.v[k] = mean.w[k] = (quern_vec) { 0, 0, 0 };
 		else l.work -= l.mass.real[0][i] * gravity * mean.v[k].y * dt;
 	}
-	l.at = h->verlet ? &now : before;
+	middle = *before;
+	if (h->with == POSITION) half_a_way(&l, &middle, dt);
+	l.at = h->with == VELOCITY ? &now : &middle;
 	l.mean = &mean;
 	gap g = { 0, 0 };
 	if (compare) {
@@ -263,9 +275,10 @@ static void every_step(void **unused) {
 	char what[80];
 	table_head("work of a step, worst gap of 500 steps over kinetic energy");
 	for (uint32_t dim = 2; dim <= 3; dim++)
-		for (int which = 0; which < 2 * LAWS; which++) {
-			const heap h = { dim, (law)(which % LAWS), which >= LAWS, dim == 2 ? 0.2 : 0.08,
+		for (int which = 0; which < INTEGRATORS * LAWS; which++) {
+			const heap h = { dim, (law)(which % LAWS), (integrator)(which / LAWS), dim == 2 ? 0.2 : 0.08,
 				dim == 2 ? 0.2 : 0.1, "auto" };
+			if (dim == 3 && h.with == POSITION && h.by != LINEAR) continue;
 			gap worst = { 0, 0 };
 			quern_run *run = open_scene(&h);
 			harness_until(run, 0.1);
@@ -277,7 +290,7 @@ static void every_step(void **unused) {
 				worst.damped = fmax(worst.damped, g.damped);
 			}
 			snprintf(what, sizeof what, "%s, %s, %uD, %u grains: kinetic", law_names[h.by],
-				h.verlet ? "verlet" : "euler", dim, harness_count(run, "grain"));
+				integrator_names[h.with], dim, harness_count(run, "grain"));
 			good &= table_row(what, worst.work, 0, 1e-12);
 			good &= table_row("  booked as damped", worst.damped, 0, 1e-12);
 			harness_close(run);
@@ -316,23 +329,22 @@ static double collapse(const heap *h, double by_kind[KINDS], uint32_t *grains) {
 	return (end[KINDS] - begin[KINDS]) / released;
 }
 
-/* With velocity Verlet, whose tangential springs are half a step ahead (docs/theory/grains.md, section 3), laws with dashpots alone. */
 static void whole_collapse(void **unused) {
 	(void)unused;
 	bool good = true;
 	char what[80];
 	table_head("a collapse of 0.5 s: change over the potential energy released");
 	for (uint32_t dim = 2; dim <= 3; dim++)
-		for (int which = 0; which < 2 * LAWS; which++) {
-			if (which >= LAWS + PLASTIC) continue;
-			const heap h = { dim, (law)(which % LAWS), which >= LAWS, dim == 2 ? 0.2 : 0.08,
+		for (int which = 0; which < INTEGRATORS * LAWS; which++) {
+			const heap h = { dim, (law)(which % LAWS), (integrator)(which / LAWS), dim == 2 ? 0.2 : 0.08,
 				dim == 2 ? 0.26 : 0.13, "auto" };
+			if (dim == 3 && h.with != EULER && h.by != LINEAR) continue;
 			double by_kind[KINDS];
 			uint32_t grains;
 			const double sum = collapse(&h, by_kind, &grains);
 			snprintf(what, sizeof what, "%s, %s, %uD, %u grains: sum", law_names[h.by],
-				h.verlet ? "verlet" : "euler", dim, grains);
-			good &= table_row(what, sum, 0, h.verlet ? 0.005 : 0.0005);
+				integrator_names[h.with], dim, grains);
+			good &= table_row(what, sum, 0, 0.0005);
 			for (int k = 0; k < KINDS; k++) {
 				snprintf(what, sizeof what, "  %s", kinds[k]);
 				table_note(what, by_kind[k]);
@@ -351,7 +363,7 @@ static void budget_converges(void **unused) {
 	table_head("the same, discs, linear, euler, over the step");
 	for (int k = 0; k < 4; k++) {
 		snprintf(step, sizeof step, "%.17g", 8e-5 / (1 << k));
-		const heap h = { 2, LINEAR, false, 0.2, 0.26, step };
+		const heap h = { 2, LINEAR, EULER, 0.2, 0.26, step };
 		sum[k] = collapse(&h, NULL, &grains);
 		snprintf(what, sizeof what, "step %.3g s", 8e-5 / (1 << k));
 		table_note(what, sum[k]);
