@@ -93,11 +93,11 @@ static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool l
 	}
 }
 
-/* The impulse is spread over the substeps: the path of a grain is moved by (n + 1)/(2 n) dt dv. With the whole dt dv
- * the scheme is unstable: docs/theory/hybrid.md, section 2. */
+/* The impulse is spread over the substeps: the path of a grain is moved by (n + 1 - 2 a)/(2 n) dt dv, if it gets the impulse of a
+ * substep after the share a of that. With the whole dt dv the scheme is unstable: docs/theory/hybrid.md, section 2. */
 quern_real quern_hybrid_move(const hybrid *h, const quern_step *s, int32_t i, const quern_real velocity[3]) {
 	const quern_column *u = s->use;
-	const quern_real share = 0.5 * (h->substeps + 1) / h->substeps * s->dt;
+	const quern_real share = (0.5 * (h->substeps + 1) - h->ahead) / h->substeps * s->dt;
 	quern_real way = 0;
 	for (uint32_t a = 0; a < s->dim; a++) {
 		const quern_real jump = velocity[a] - u[B_VELOCITY].real[a][i];

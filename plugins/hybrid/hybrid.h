@@ -8,6 +8,7 @@
 #include "rows.h"
 #include <quern/coupling.h>
 #include <quern/grid.h>
+#include <quern/integrator.h>
 #include <quern/material.h>
 #include <quern/oracle.h>
 #include <quern/packer.h>
@@ -23,6 +24,7 @@ typedef struct hybrid {
 	radius_law radii;                  /* of grains that enrich cells: a stream of their own */
 	uint32_t dim, every, sample_every; /* steps */
 	bool affine, solves; /* of the coupling: both clouds send their gradient; it sees all at once */
+	quern_real ahead;    /* after which share of a substep the grains' integrator gives its impulse */
 	quern_real rest;     /* 1/s: shear rate of what is at rest */
 	quern_real cell;     /* m: of the grid */
 	bool moving;         /* some bodies do */
@@ -39,7 +41,16 @@ typedef struct hybrid {
 enum { WEIGHTS_HALF, WEIGHTS_RAMP };
 
 /* slots, in the order of the solver's table */
-enum { SLOT_ORACLE, SLOT_PACKER, SLOT_COUPLING, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
+enum {
+	SLOT_ORACLE,
+	SLOT_PACKER,
+	SLOT_COUPLING,
+	SLOT_MATERIAL,
+	SLOT_SHAPE,
+	SLOT_TRANSFER,
+	SLOT_BODIES,
+	SLOT_INTEGRATOR
+};
 
 /* Lanes of a mixture row: mass, momentum, change of velocity. */
 QUERN_INLINE uint32_t mixture_change(uint32_t dim) { return 1 + dim; }

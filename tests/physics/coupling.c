@@ -229,8 +229,57 @@ static void affine_keeps_strain_and_rotation(void **state) {
 	assert_true(good);
 }
 
+/* Points are given another velocity, and grains that carry a half are pulled along: as if each of the n substeps had given them an n-th of
+ * that. The share of dt dv by which their paths are moved is (n + 1)/(2 n), or one half where the kick is in the middle of a step. */
+static void paths_have_the_impulse(void **state) {
+	static const char *const integrators[] = { "symplectic_euler", "position_verlet" };
+	static const double shares[] = { 5.0 / 8, 0.5 };
+	static double x0[4096], v0[4096];
+	bool good = true;
+	(void)state;
+	table_head("4 substeps: shift of a grain's path over dt dv");
+	for (int with = 0; with < 2; with++) {
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.2, 0.12]}\n"
+			"time: {end: 0.1, step: 0.2 ms}\n"
+			"grains: {material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}}, integrator: %s,\n"
+			"  contact: {linear: {stiffness: 1e-12, restitution: 1, friction: 0}},\n"
+			"  fill: {region: {box: {lower: [0.02, 0.02], upper: [0.1, 0.08]}}, velocity: [0.3, 0.1]}}\n"
+			"continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e-9, critical_density: 1900}}}\n"
+			"hybrid: {oracle: [{packing_fraction: {depth: 7 mm, half_width: 4 mm}}], substeps: 4, update: 16}\n",
+			integrators[with]);
+		harness_steps(run, 2);
+		const quern_column u = harness_field(run, "point.velocity");
+		for (uint32_t i = 0; i < harness_count(run, "point"); i++) u.real[0][i] += 0.2;
+		harness_field(run, "total.audits").index[0] = 0; /* the books begin anew */
+		const int64_t *id = harness_field(run, "grain.id").id;
+		for (uint32_t i = 0; i < harness_count(run, "grain"); i++) {
+			assert_true(id[i] < 4096);
+			x0[id[i]] = harness_field(run, "grain.position").real[0][i];
+			v0[id[i]] = harness_field(run, "grain.velocity").real[0][i];
+		}
+		harness_steps(run, 1);
+		const double dt = run->clock.dt;
+		uint32_t pulled = 0;
+		double worst = shares[with];
+		id = harness_field(run, "grain.id").id;
+		for (uint32_t i = 0; i < harness_count(run, "grain"); i++) {
+			const double dv = harness_field(run, "grain.velocity").real[0][i] - v0[id[i]],
+						 dx = harness_field(run, "grain.position").real[0][i] - x0[id[i]] - dt * v0[id[i]];
+			if (!(dv > 0.01)) continue;
+			pulled++;
+			if (!(fabs(dx / (dt * dv) - shares[with]) <= fabs(worst - shares[with]))) worst = dx / (dt * dv);
+		}
+		assert_true(pulled > 50);
+		good = table_row(integrators[with], worst, shares[with], 1e-9) && good;
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(uniform_motion_is_unchanged),
-		cmocka_unit_test(seams_leak_nothing), cmocka_unit_test(affine_keeps_strain_and_rotation) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(paths_have_the_impulse),
+		cmocka_unit_test(uniform_motion_is_unchanged), cmocka_unit_test(seams_leak_nothing),
+		cmocka_unit_test(affine_keeps_strain_and_rotation) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
