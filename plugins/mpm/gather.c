@@ -187,15 +187,15 @@ static bool surrounded(const gather_work *w, const gather_memory *m, uint32_t b,
 	const uint32_t dim = w->s->dim, edge = g->edge, at[3] = { c % edge, c / edge % edge, c / edge / edge };
 	for (uint32_t near = 0; near < 1u << 2 * dim; near++) {
 		uint32_t node = 0;
+		for (uint32_t k = dim; k-- > 0;) node = node * g->span + at[k] + (near >> 2 * k & 3);
+		if (m->tile[node][motion_density(dim)] > 0) continue;
 		bool outside = false;
-		for (uint32_t k = dim; k-- > 0;) {
-			const uint32_t local =
-				at[k] + (near >> 2 * k & 3); /* in the tile, which begins a cell before the block */
-			const int32_t place = g->at[b][k] * (int32_t)edge + (int32_t)local - 1;
+		for (uint32_t k = 0; k < dim; k++) {
+			/* the tile begins a cell before the block */
+			const int32_t place = g->at[b][k] * (int32_t)edge + (int32_t)(at[k] + (near >> 2 * k & 3)) - 1;
 			outside = outside || (!g->periodic[k] && (place < 0 || place > g->cells[k]));
-			node = node * g->span + local;
 		}
-		if (!outside && !(m->tile[node][motion_density(dim)] > 0)) return false;
+		if (!outside) return false;
 	}
 	return true;
 }
