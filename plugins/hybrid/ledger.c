@@ -79,16 +79,33 @@ void quern_hybrid_weigh(update *d) {
 	}
 }
 
+/* The open neighbour with most in it, -1 if there is none. */
+static int32_t fullest_beside(const update *d, const int32_t cell[3]) {
+	const int depth = d->s->dim == 3 ? 1 : 0;
+	int32_t best = -1;
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -1; y <= 1; y++)
+			for (int x = -1; x <= 1; x++) {
+				int32_t at[3] = { cell[0] + x, cell[1] + y, cell[2] + z };
+				const int32_t c = quern_grid_entry_back(d->g, at);
+				if (c >= 0 && d->open[c] > 0 && d->mass[c] > 0 && (best < 0 || d->mass[c] > d->mass[best]))
+					best = c;
+			}
+	return best;
+}
+
 /* Points reach behind walls that are not across an axis: what such a one held in a cell without any room is owed by the cell before the
- * wall. */
+ * wall, or, where nothing is there, by the fullest one beside it. */
 static void bring_out(const update *d, uint32_t c) {
-	int32_t cell[3];
+	int32_t cell[3], before[3];
 	quern_real x[3];
 	if (!quern_grid_cell_of(d->g, c, cell)) return;
 	quern_hybrid_open_place(d, c, cell, x);
-	for (uint32_t k = 0; k < d->s->dim; k++) cell[k] = (int32_t)floor((x[k] - d->g->lower[k]) / d->g->cell);
-	const int32_t to = quern_grid_entry_back(d->g, cell);
-	if (to >= 0 && d->open[to] > 0) quern_hybrid_pass(d, c, (uint32_t)to);
+	for (uint32_t k = 0; k < 3; k++)
+		before[k] = k < d->s->dim ? (int32_t)floor((x[k] - d->g->lower[k]) / d->g->cell) : 0;
+	int32_t to = quern_grid_entry_back(d->g, before);
+	if (to < 0 || !(d->open[to] > 0 && d->mass[to] > 0)) to = fullest_beside(d, cell);
+	if (to >= 0) quern_hybrid_pass(d, c, (uint32_t)to);
 }
 
 /* Grains are only placed where the continuum is near: a discrete cell gives its entry to the nearest hybrid one that is not behind a
@@ -104,7 +121,7 @@ quern_status quern_hybrid_hand_over(update *d) {
 			bring_out(d, c);
 	}
 	for (uint32_t c = 0; c < d->n_cells; c++) {
-		source[c] = d->zone[c] == QUERN_HYBRID;
+		source[c] = d->zone[c] == QUERN_HYBRID && d->open[c] > 0;
 		open[c] = d->open[c] > 0;
 		any = any || (d->zone[c] == QUERN_DISCRETE && quern_hybrid_is_owed(d->u, c, d->s->dim));
 	}

@@ -128,12 +128,15 @@ static quern_real gap_at(const update *d, const bool *meant, const quern_real x[
 /* Of a cell's size: from so far before a surface on, a place is in the open. */
 static const quern_real clear = 0.1;
 
+/* Out of one body it may come into another, so it is tried a few times. */
 void quern_hybrid_open_place(const update *d, uint32_t c, const int32_t cell[3], quern_real x[3]) {
-	quern_real normal[3] = { 0 };
 	quern_hybrid_centre(d, cell, x);
-	if (d->wall[c] >= clear * d->g->cell) return;
-	const quern_real out = clear * d->g->cell - gap_at(d, NULL, x, normal);
-	for (uint32_t k = 0; k < d->s->dim && out > 0; k++) x[k] += out * normal[k];
+	for (int tries = 0; tries < 4 && d->wall[c] < clear * d->g->cell; tries++) {
+		quern_real normal[3] = { 0 };
+		const quern_real out = clear * d->g->cell - gap_at(d, NULL, x, normal);
+		if (!(out > 0)) return;
+		for (uint32_t k = 0; k < d->s->dim; k++) x[k] += out * normal[k];
+	}
 }
 
 /* Goes along the line by steps as long as nothing can be in the way, so that no wall is too thin. */

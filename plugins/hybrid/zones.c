@@ -23,6 +23,7 @@ typedef struct {
 	int32_t (*way)[3];    /* by cell: to its source, in cells */
 	uint32_t *place;      /* by block, in the order of places; NULL: as they come */
 	bool boxes;           /* the source is a whole cell, not its centre */
+	bool walls;           /* nothing goes through a body */
 	quern_real most;      /* m: what is farther away nobody asks for */
 	bool failed;
 } spreading;
@@ -77,6 +78,16 @@ static void offer(spreading *p, uint32_t cell, const int32_t way[3]) {
 	push(p, (heap_entry) { distance, cell, p->place ? p->place[cell / N] * N + cell % N : cell });
 }
 
+/* Whether a body stands between two cells beside each other. */
+static bool is_walled(
+	const update *d, uint32_t from, const int32_t cell[3], uint32_t to, const int32_t beside[3]) {
+	quern_real a[3], b[3];
+	if (d->wall[from] >= 2 * d->g->cell) return false;
+	quern_hybrid_open_place(d, from, cell, a);
+	quern_hybrid_open_place(d, to, beside, b);
+	return quern_hybrid_walled(d, NULL, from, a, b);
+}
+
 /* `open` NULL: through every cell; otherwise only through those that are set. */
 static void spread(spreading *p, const bool *open) {
 	const int depth = p->d->g->dim == 3 ? 1 : 0;
@@ -91,16 +102,18 @@ static void spread(spreading *p, const bool *open) {
 			for (int y = -1; y <= 1; y++)
 				for (int x = -1; x <= 1; x++) {
 					const int step[3] = { x, y, z };
-					int32_t to[3];
+					int32_t to[3], beside[3];
 					int32_t way[3];
 					for (uint32_t k = 0; k < 3; k++) {
-						to[k] = cell[k] + step[k];
+						to[k] = beside[k] = cell[k] + step[k];
 						way[k] = p->way[e.cell][k] - step[k];
 					}
 					quern_grid_cursor near = home;
 					if (!quern_grid_bring_back(p->d->g, to)) continue;
 					const int32_t c = quern_grid_entry_near(p->d->g, &near, to);
-					if (c >= 0 && (!open || open[c])) offer(p, (uint32_t)c, way);
+					if (c < 0 || (open && !open[c])) continue;
+					if (p->walls && is_walled(p->d, e.cell, cell, (uint32_t)c, beside)) continue;
+					offer(p, (uint32_t)c, way);
 				}
 	}
 }
@@ -119,6 +132,7 @@ quern_status quern_hybrid_nearest(update *d, const bool *source, const bool *thr
 	spreading p;
 	quern_real *distance = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	if (!spreading_init(&p, d, false, distance)) return QUERN_E_MEMORY;
+	p.walls = true;
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
 	spread(&p, through);

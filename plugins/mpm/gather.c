@@ -31,8 +31,39 @@ typedef struct {
 	 * are not open */
 	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
 		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
-	fit_memory fit; /* where the transfer asks for it */
+	fit_memory fit;                   /* where the transfer asks for it */
+	quern_real said[QUERN_TILE_MOST]; /* kg/m^3 at the tile's nodes */
+	bool silent[QUERN_TILE_MOST];     /* those that bodies leave no room */
 } gather_memory;
+
+/* For a node that says nothing those around it speak, if there are any that hold something. */
+static quern_real said_around(const gather_work *w, const gather_memory *m, uint32_t node) {
+	const int32_t span = (int32_t)w->g->span, deep = w->s->dim == 3 ? span : 1;
+	const int32_t at[3] = { (int32_t)node % span, (int32_t)node / span % span,
+		(int32_t)node / (span * span) };
+	quern_real sum = 0;
+	uint32_t n = 0;
+	for (int32_t z = at[2] ? at[2] - 1 : 0; z < deep && z <= at[2] + 1; z++)
+		for (int32_t y = at[1] ? at[1] - 1 : 0; y < span && y <= at[1] + 1; y++)
+			for (int32_t x = at[0] ? at[0] - 1 : 0; x < span && x <= at[0] + 1; x++) {
+				const quern_real one = m->tile[(z * span + y) * span + x][motion_density(w->s->dim)];
+				if (one > 0) sum += one, n++;
+			}
+	return n ? sum / n : -m->tile[node][motion_density(w->s->dim)];
+}
+
+static void speak_for_others(const gather_work *w, gather_memory *m) {
+	const uint32_t lane = motion_density(w->s->dim), nodes = w->g->tile_size;
+	bool any = false;
+	for (uint32_t k = 0; k < nodes; k++) {
+		m->silent[k] = m->tile[k][lane] < 0;
+		any = any || m->silent[k];
+	}
+	if (!any) return;
+	for (uint32_t k = 0; k < nodes; k++)
+		m->said[k] = m->tile[k][lane] < 0 ? said_around(w, m, k) : m->tile[k][lane];
+	for (uint32_t k = 0; k < nodes; k++) m->tile[k][lane] = m->said[k];
+}
 
 /* What the nodes say at the points of a chunk. */
 QUERN_INLINE void collect_chunk(
@@ -165,19 +196,17 @@ static quern_real pressure_of(const gather_work *w, uint32_t i) {
 	return pressure;
 }
 
-/* On the grid in the middle of a cell: the mean of its corners, without those that bodies leave no room. */
+/* On the grid in the middle of a cell: the mean of its corners. */
 static quern_real centre_density(const gather_work *w, const gather_memory *m, uint32_t place) {
 	const uint32_t dim = w->s->dim, edge = w->g->edge;
 	const uint32_t at[3] = { place % edge, place / edge % edge, place / edge / edge };
 	quern_real sum = 0;
-	uint32_t n = 0;
 	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
 		uint32_t node = 0;
 		for (uint32_t k = dim; k-- > 0;) node = node * w->g->span + at[k] + 1 + (corner >> k & 1);
 		sum += m->tile[node][motion_density(dim)];
-		n += m->tile[node][motion_density(dim)] > 0;
 	}
-	return n ? sum / n : 0;
+	return sum / (1u << dim);
 }
 
 /* Whether every node of the domain that hats around the cell's centre reach up to knows a density: at a surface or a body some do not, and what
@@ -188,7 +217,7 @@ static bool surrounded(const gather_work *w, const gather_memory *m, uint32_t b,
 	for (uint32_t near = 0; near < 1u << 2 * dim; near++) {
 		uint32_t node = 0;
 		for (uint32_t k = dim; k-- > 0;) node = node * g->span + at[k] + (near >> 2 * k & 3);
-		if (m->tile[node][motion_density(dim)] > 0) continue;
+		if (m->tile[node][motion_density(dim)] > 0 && !m->silent[node]) continue;
 		bool outside = false;
 		for (uint32_t k = 0; k < dim; k++) {
 			/* the tile begins a cell before the block */
@@ -406,6 +435,7 @@ QUERN_INLINE void gather_block(
 	const uint32_t begin = w->point[b], end = w->point[b + 1];
 	if (begin == end) return;
 	quern_tile_load(w->g, w->motion, b, m->tile);
+	speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
 	if (last && (w->answers || w->counts)) level_block(w, m, b);
 	for (uint32_t i = begin; i < end; i += STENCIL) {

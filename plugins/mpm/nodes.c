@@ -6,7 +6,7 @@
 #include <quern/vec.h>
 #include <string.h>
 
-enum { N = QUERN_BLOCK_CELLS };
+enum { N = QUERN_BLOCK_CELLS, SURFACES = 2 };
 
 typedef struct {
 	const mpm *p;
@@ -21,8 +21,10 @@ typedef struct {
 } grid_work;
 
 typedef struct {
-	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N],
-		room[3][N]; /* by axis: what faces and bodies that lie across it leave of a node's volume */
+	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
+	quern_real room[SURFACES][N],
+		facing[SURFACES][3][N]; /* what bodies leave of a node, and which way they face */
+	uint32_t surfaces[N];
 } near_nodes;
 
 static int32_t cells_to_face(const quern_grid_view *g, const int32_t at[3], uint32_t k) {
@@ -156,25 +158,48 @@ static quern_real share_before(quern_real gap, quern_real cell) {
 	return gap > 0 ? 1 - beyond : beyond;
 }
 
-/* What bodies across the same axis leave is what the nearest one leaves; a plane on a face of the domain is that face. */
-static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
-	const quern_real cell = w->g->cell;
-	if (w->again || !(fabs(n->gap[i]) < cell || n->gap[i] < 0)) return;
+/* A plane on a face of the domain is that face. */
+static bool is_face(const grid_work *w, const near_nodes *n, uint32_t b, uint32_t i) {
 	int32_t at[3];
 	const uint32_t k = axis_nearest(n, i, w->g->dim);
 	quern_grid_cell_of(w->g, b * N + i, at);
-	if (!w->g->periodic[k] && fabs(n->gap[i] - cells_to_face(w->g, at, k) * cell) < 1e-6 * cell) return;
-	n->room[k][i] = fmin(n->room[k][i], share_before(n->gap[i], cell));
+	return !w->g->periodic[k] &&
+		   fabs(n->gap[i] - cells_to_face(w->g, at, k) * w->g->cell) < 1e-6 * w->g->cell;
 }
 
-/* A node that has hardly any room of its own says nothing about how full that is: 0. */
+/* Surfaces that face the same way are one, of which the nearest counts; two that face each other both take; what stands across multiplies. */
+static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
+	const quern_real alike = 0.7, share = share_before(n->gap[i], w->g->cell);
+	uint32_t q = 0;
+	if (w->again || !(n->gap[i] < w->g->cell) || is_face(w, n, b, i)) return;
+	for (; q < n->surfaces[i]; q++) {
+		quern_real along = 0;
+		for (uint32_t k = 0; k < w->g->dim; k++) along += n->facing[q][k][i] * n->normal[k][i];
+		if (fabs(along) < alike) continue;
+		n->room[q][i] = along > 0 ? fmin(n->room[q][i], share) : fmax(0, n->room[q][i] + share - 1);
+		return;
+	}
+	if (q == SURFACES) {
+		n->room[q - 1][i] *= share;
+		return;
+	}
+	n->surfaces[i] = q + 1;
+	n->room[q][i] = share;
+	for (uint32_t k = 0; k < w->g->dim; k++) n->facing[q][k][i] = n->normal[k][i];
+}
+
+/* A node to which bodies leave hardly any room does not say how full that is; its density is marked by a sign, and its size is that of a node
+ * with the least room that says something. */
 static void measure_densities(const grid_work *w, uint32_t b, const near_nodes *n) {
 	const quern_real least = 0.2, volume = quern_grid_cell_volume(w->g);
 	for (uint32_t i = 0; i < N; i++) {
-		quern_real room = 1;
-		for (uint32_t k = 0; k < w->g->dim; k++) room *= n->room[k][i];
-		w->motion[(size_t)b * N + i][motion_density(w->g->dim)] =
-			room > least ? w->node[(size_t)b * N + i][0] / (volume * room) : 0;
+		quern_real faces = 1, bodies = 1;
+		int32_t at[3];
+		quern_grid_cell_of(w->g, b * N + i, at);
+		for (uint32_t k = 0; k < w->g->dim; k++) faces *= share_along(w, at, k);
+		for (uint32_t q = 0; q < n->surfaces[i]; q++) bodies *= n->room[q][i];
+		const quern_real density = w->node[(size_t)b * N + i][0] / (volume * faces * fmax(bodies, least));
+		w->motion[(size_t)b * N + i][motion_density(w->g->dim)] = bodies > least ? density : -density;
 	}
 }
 
@@ -188,13 +213,9 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 	for (uint32_t i = 0; i < N; i++) {
 		quern_real x[3];
 		quern_grid_corner(w->g, b * N + i, x);
-		int32_t at[3];
-		quern_grid_cell_of(w->g, b * N + i, at);
-		for (uint32_t k = 0; k < s->dim; k++) {
-			n->position[k][i] = x[k];
-			n->room[k][i] = share_along(w, at, k);
-		}
+		for (uint32_t k = 0; k < s->dim; k++) n->position[k][i] = x[k];
 		n->radius[i] = 0;
+		n->surfaces[i] = 0;
 	}
 	for (uint32_t j = 0; j < w->n_bodies; j++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][j];

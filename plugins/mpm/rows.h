@@ -95,7 +95,7 @@ QUERN_USE_ENUM(SCATTER_USES);
 	X(NODES_WORK, WORK_USE) \
 	X(NODES_CHANGE, "motion.change", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity gained in this step.") \
 	X(NODES_DENSITY, "motion.density", "kg/m^3", QUERN_WRITE, QUERN_SCALAR, \
-		.doc = "Mass of a node over its volume.") \
+		.doc = "Mass of a node over the volume that faces and bodies leave it; below 0 where bodies leave hardly any.") \
 	X(NODES_NODE_MOMENTUM, "node.momentum", "kg m/s", QUERN_READ, QUERN_VECTOR) \
 	X(NODES_NODE_FORCE, "node.force", "N", QUERN_READ, QUERN_VECTOR) \
 	X(NODES_GRIP, "motion.grip", "m/s", QUERN_WRITE, QUERN_SCALAR, .when = "rough", \

@@ -22,13 +22,13 @@ AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is tol
 
 @dataclass(frozen=True)
 class Found:
-    """What was measured: a bed for each seed, for each angle a chute for each seed, and slides on a smooth plane, none if nothing slid."""
+    """What was measured: a bed for each seed, for each angle a chute for each seed, and slides on a smooth plane: none if nothing slid, None if that is not known."""
     name: str
     dimension: int
     grains: Grains
     beds: list[Bed]
     chutes: dict[float, list[Rows]]  # by angle in degrees
-    slides: list[Slide]
+    slides: list[Slide] | None
 
     def law(self) -> Law:
         return law_of([one for rows in self.chutes.values() for one in rows])
@@ -71,10 +71,12 @@ def slip_length(found: Found) -> tuple[float, float]:
 
 
 def about_walls(found: Found) -> str:
+    if found.slides is None:
+        return "friction of a smooth wall: not measured"
     if not found.slides:
-        return "on a smooth wall nothing slid: give continuum's walls boundary: sticky"
-    friction, speed = (mean([getattr(one, name) for one in found.slides]) for name in ("friction", "speed"))
-    return f"on a smooth wall, boundary: {{frictional: {plain(friction[0], 3)}}}, ± {plain(friction[1], 2)}, sliding at up to {plain(speed[0], 2)} m/s"
+        return "a smooth wall holds these grains: boundary: sticky"
+    friction = mean([one.friction for one in found.slides])
+    return f"smooth walls, boundary: {{frictional: {plain(friction[0], 3)}}}" + (f", ± {plain(friction[1], 2)}" if math.isfinite(friction[1]) else "")
 
 
 def plain(value: float, figures: int = 4) -> str:
@@ -199,10 +201,10 @@ def about_bed(found: Found) -> str:
 
 def about_slides(found: Found) -> str:
     if not found.slides:
-        return "No layer slid on a smooth plane, however far it leant."
+        return "Friction of a smooth wall was not measured." if found.slides is None else "On a smooth plane no layer slid, however far it leant."
     told = [with_spread(*mean([getattr(one, name) for one in found.slides])) for name in ("friction", "speed")]
     return (f"On a smooth plane that leans, a layer of these grains slides with a friction of {told[0]}, as its acceleration says; its lowest row came to "
-            f"{told[1]} m/s. Grains roll on a wall as well as slide, so that this is less than the friction of a contact.")
+            f"{told[1]} m/s.")
 
 
 def page(found: Found, command: str, drawn: list[str]) -> str:

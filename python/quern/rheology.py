@@ -142,14 +142,17 @@ def chute(run: Run, angle: float, last: float, grains: Grains) -> Rows:
 
 
 def slide(run: Run, angle: float, grains: Grains) -> Slide:
-    """But for the first fifth of its time, in which the layer starts. All of it is in balance with the plane, however it moves within."""
+    """While it moves, however it moves within: all of it is in balance with the plane. Where the lowest row hardly moves, the plane holds and
+    the layer flows on it, which is friction of the grains among each other."""
     _, times, density, velocity = profiles(run)
     mean = (density * velocity).sum(axis=1) / density.sum(axis=1)
-    late = times > times[-1] / 5
+    late = np.flatnonzero(mean > math.sqrt(grains.gravity * grains.diameter) / 3)
+    late = late[late >= len(times) // 5]
+    if len(late) < 5 or mean[-1] < mean[late[0]]:
+        return Slide(math.nan, float(velocity[-1, 0]), False)
     gain = float(np.polyfit(times[late], mean[late], 1)[0])
-    across = grains.gravity * math.cos(angle)
-    moves = bool(mean[-1] > math.sqrt(grains.gravity * grains.diameter) and gain > 0)
-    return Slide(math.tan(angle) - gain / across, float(velocity[-1, 0]), moves)
+    holds = float(velocity[late, 0].mean()) < 0.5 * float(mean[late].mean())
+    return Slide(max(0.0, math.tan(angle) - gain / (grains.gravity * math.cos(angle))), float(velocity[-1, 0]), not holds)
 
 
 def fit_law(inertia: np.ndarray, friction: np.ndarray) -> Law:
