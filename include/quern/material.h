@@ -21,7 +21,7 @@ typedef struct quern_material_batch {
 	quern_real *wave_speed; /* m/s, out; NULL if not wanted */
 	quern_real *energy;     /* J/kg stored, out; NULL if not wanted */
 	const quern_column *use;
-	/* since 2.1; NULL: none. Pa, before the step: the mean of the point's cell. Where points lie without order their pressures
+	/* since 2.1; NULL: none. Pa, before the step or some steps ago: the mean of the point's cell. Where points lie without order their pressures
 	 * scatter by as much as they are, and a friction that is not linear in them comes out too low; 0 where all are open */
 	const quern_real *mean_pressure;
 } quern_material_batch;

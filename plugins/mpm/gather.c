@@ -16,7 +16,9 @@ typedef struct {
 	trips trips;
 	calm calm;
 	bool answers;         /* volume does, to how full cells are */
+	bool counts;          /* the same of a continuum alone, in this step */
 	quern_real full;      /* from there on a cell is crowded */
+	quern_real still;     /* 1/s: sheared much faster, material flows */
 	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
 } gather_work;
 
@@ -25,11 +27,13 @@ typedef struct {
 	trip_memory trip;
 	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
 	_Alignas(64) quern_real kept[3][STENCIL], mean_pressure[STENCIL];
-	/* by cell of the block: Pa and m^3 of its points, m^3 of those that are open, kg/m^3 of what it holds */
+	/* by cell of the block: Pa and m^3 of its points, m^3 of those that are open, kg/m^3 of what it holds and of its points that
+	 * are not open */
 	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
-		held[QUERN_BLOCK_CELLS];
+		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
 	fit_memory fit;                   /* where the transfer asks for it */
 	quern_real said[QUERN_TILE_MOST]; /* kg/m^3 at the tile's nodes */
+	bool silent[QUERN_TILE_MOST];     /* those that bodies leave no room */
 } gather_memory;
 
 /* For a node that says nothing those around it speak, if there are any that hold something. */
@@ -51,7 +55,10 @@ static quern_real said_around(const gather_work *w, const gather_memory *m, uint
 static void speak_for_others(const gather_work *w, gather_memory *m) {
 	const uint32_t lane = motion_density(w->s->dim), nodes = w->g->tile_size;
 	bool any = false;
-	for (uint32_t k = 0; k < nodes; k++) any = any || m->tile[k][lane] < 0;
+	for (uint32_t k = 0; k < nodes; k++) {
+		m->silent[k] = m->tile[k][lane] < 0;
+		any = any || m->silent[k];
+	}
 	if (!any) return;
 	for (uint32_t k = 0; k < nodes; k++)
 		m->said[k] = m->tile[k][lane] < 0 ? said_around(w, m, k) : m->tile[k][lane];
@@ -114,12 +121,21 @@ static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin
 
 /* Of motion below the grid, at rest, over the shear rate of what is: all of it at once would take elastic waves along. */
 static const quern_real calm_rate = 400;
-/* Of the shear rate of what is at rest: where material flows for certain. */
-static const quern_real flowing = 30;
+/* Of the shear rate of what is at rest: where material flows for certain. What is alone has no noise of grains and conversions. */
+static const quern_real flowing = 30, flowing_alone = 3;
 /* What is shaken changes volume as much as shape, what flows hardly: weight of the former. */
 static const quern_real shaken = 30;
+/* Of densities within a cell: a rate over the shear rate. */
+static const quern_real evening = 20;
 /* What is full, over what was full at first: that varies by so much. */
 static const quern_real dead_band = 1.01;
+
+/* A tile may reach far beyond the end of a period, where no cells are: what is counted in cells comes back before that. */
+QUERN_INLINE bool beyond_period(const gather_work *w, uint32_t k, quern_real x) {
+	const quern_grid_view *g = w->g;
+	const quern_real at = (x - g->lower[k]) / g->cell;
+	return w->p->alone && g->periodic[k] && (at < -0.5 || at >= g->cells[k] + 0.5);
+}
 
 /* x += dt sum S v; V *= det(1 + dt L); true density m/V */
 QUERN_INLINE void move_chunk(
@@ -141,7 +157,8 @@ QUERN_INLINE void move_chunk(
 		QUERN_SIMD
 		for (uint32_t i = 0; i < n; i++) x[i] += dt * v[i];
 		for (uint32_t i = 0; i < n; i++)
-			if (!stencil_holds(w->g, b, (uint32_t)k, x[i])) w->moved[b] = 1;
+			if (!stencil_holds(w->g, b, (uint32_t)k, x[i]) || beyond_period(w, (uint32_t)k, x[i]))
+				w->moved[b] = 1;
 	}
 	QUERN_SIMD
 	for (uint32_t i = 0; i < n; i++) {
@@ -165,7 +182,9 @@ static uint32_t cell_in_block(const gather_work *w, uint32_t b, const quern_real
 	uint32_t cell = 0;
 	for (uint32_t k = w->s->dim; k-- > 0;) {
 		const quern_real x = place[k] / w->g->cell - w->g->at[b][k] * (int32_t)w->g->edge;
-		const quern_real most = w->g->edge - 1;
+		const int32_t inside = w->g->cells[k] - w->g->at[b][k] * (int32_t)w->g->edge;
+		const quern_real most =
+			(w->p->alone && inside < (int32_t)w->g->edge ? inside : (int32_t)w->g->edge) - 1;
 		cell = cell * w->g->edge + (uint32_t)(x > 0 ? (x < most ? x : most) : 0);
 	}
 	return cell;
@@ -190,15 +209,41 @@ static quern_real centre_density(const gather_work *w, const gather_memory *m, u
 	return sum / (1u << dim);
 }
 
-/* Of a cell's density, what is measured in the cell itself, and not on the grid. */
-static const quern_real own_part = 0.25;
+/* Whether every node of the domain that hats around the cell's centre reach up to knows a density: at a surface or a body some do not, and what
+ * is counted there lacks what the body or the air holds. */
+static bool surrounded(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c) {
+	const quern_grid_view *g = w->g;
+	const uint32_t dim = w->s->dim, edge = g->edge, at[3] = { c % edge, c / edge % edge, c / edge / edge };
+	for (uint32_t near = 0; near < 1u << 2 * dim; near++) {
+		uint32_t node = 0;
+		for (uint32_t k = dim; k-- > 0;) node = node * g->span + at[k] + (near >> 2 * k & 3);
+		if (m->tile[node][motion_density(dim)] > 0 && !m->silent[node]) continue;
+		bool outside = false;
+		for (uint32_t k = 0; k < dim; k++) {
+			/* the tile begins a cell before the block */
+			const int32_t place = g->at[b][k] * (int32_t)edge + (int32_t)(at[k] + (near >> 2 * k & 3)) - 1;
+			outside = outside || (!g->periodic[k] && (place < 0 || place > g->cells[k]));
+		}
+		if (!outside) return false;
+	}
+	return true;
+}
 
-/* The grid's density in the middle of a cell is smooth, but the same where full cells and empty ones take turns; what the hybrid counts in
- * a cell is neither. */
+/* Of a cell's density, what is measured in the cell itself, and not on the grid. */
+static const quern_real own_part = 0.25, own_part_alone = 0.5;
+
+/* The grid's density in the middle of a cell is smooth, but the same where full cells and empty ones take turns; what is counted in
+ * a cell is neither. A continuum alone is counted by hats around the centres of cells (scatter.c). */
 static quern_real density_of(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c) {
 	const quern_real *fullness = w->s->use[GATHER_FULLNESS].real[0];
-	const quern_real centre = centre_density(w, m, c),
-					 counted = fullness ? fullness[b * QUERN_BLOCK_CELLS + c] : 0;
+	const quern_real centre = centre_density(w, m, c);
+	if (w->p->alone) {
+		if (!surrounded(w, m, b, c)) return centre;
+		const quern_row *node = w->trips.node + (size_t)b * QUERN_BLOCK_CELLS + c;
+		return centre +
+			   own_part_alone * ((*node)[node_held(w->s->dim)] / quern_grid_cell_volume(w->g) - centre);
+	}
+	const quern_real counted = fullness ? fullness[b * QUERN_BLOCK_CELLS + c] : 0;
 	return counted > 0 ? centre + own_part * (counted * w->p->density - centre) : centre;
 }
 
@@ -213,17 +258,20 @@ static void level_block(const gather_work *w, gather_memory *m, uint32_t b) {
 	memset(m->level, 0, sizeof m->level);
 	memset(m->room, 0, sizeof m->room);
 	memset(m->loose, 0, sizeof m->loose);
+	memset(m->mean, 0, sizeof m->mean);
 	for (uint32_t i = w->point[b]; i < w->point[b + 1]; i++) {
 		quern_real place[3];
 		for (uint32_t k = 0; k < w->s->dim; k++) place[k] = position[k][i] - w->g->lower[k];
 		const uint32_t c = cell_in_block(w, b, place);
 		const bool open = mass[i] < dense * w->p->density * volume[i];
 		m->level[c] += volume[i] * pressure_of(w, i);
+		m->mean[c] += open ? 0 : mass[i];
 		*(open ? &m->loose[c] : &m->room[c]) += volume[i];
 	}
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
 		const bool any = m->room[c] + m->loose[c] > 0;
 		m->held[c] = any ? density_of(w, m, b, c) : 0;
+		m->mean[c] = m->room[c] > 0 ? m->mean[c] / m->room[c] : 0;
 		const quern_real room = m->room[c] + (m->held[c] > dense * w->p->density ? m->loose[c] : 0);
 		m->level[c] = room > 0 ? m->level[c] / room : 0;
 	}
@@ -254,18 +302,38 @@ static quern_real follow_cell(
 	return part / (1 + part) * fmin(off, 0.1);
 }
 
+/* A continuum alone: densities of points go to the mean of their cell's, which keeps the volume of all, much faster
+ * than that goes to what the cell holds. Each by itself would take over the noise of its own gradient. */
+static quern_real follow_alone(
+	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, quern_real rate) {
+	quern_real trace = 0;
+	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
+	if (!(rate > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) || m->density[i] < dense * w->p->density)
+		return 0;
+	const quern_real sheared = rate * rate / (rate * rate + shaken * trace * trace),
+					 time = w->s->dt * COUNT_EVERY, shear = rate * sheared * time;
+	const quern_real evened = evening * shear, part = w->p->follow * shear, off = m->held[c] / m->mean[c] - 1;
+	return (evened / (1 + evened) * (1 - m->density[i] / m->mean[c]) +
+			   (off < -0.1 ? 0 : part / (1 + part) * fmin(off, 0.1))) /
+		   time;
+}
+
+/* 0 at rest, 1 in flow, by the square of the shear rate. */
+static quern_real flowing_share(const gather_work *w, quern_real rate2) {
+	const quern_real fast = rate2 / (w->still * w->still);
+	return w->still > 0 ? fast * fast / (1 + fast * fast) : 1;
+}
+
 /* Mass that came where there was no room has brought its volume along, and does not press: what pressure lacks comes as a compression
  * beside that of the flow, where material flows, so that it holds for every material. */
 static void answer_chunk(const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
 	const mpm *p = w->p;
 	const uint32_t dim = w->s->dim;
-	const quern_real still = flowing * p->rest_rate;
 	for (uint32_t i = 0; i < n; i++) {
 		quern_real before[3];
 		for (uint32_t k = 0; k < dim; k++) before[k] = m->trip.stencil.position[k][i];
 		const uint32_t c = cell_in_block(w, b, before);
-		const quern_real rate2 = calm_shear(m->gradient, i, dim), fast = rate2 / (still * still),
-						 flows = fast * fast / (1 + fast * fast);
+		const quern_real rate2 = calm_shear(m->gradient, i, dim), flows = flowing_share(w, rate2);
 		const quern_real followed = flows * follow_cell(w, m, c, i, sqrt(rate2)),
 						 lack = flows * lacks_least(w, m, b * QUERN_BLOCK_CELLS + c, i, begin + i) +
 								p->bulk * followed;
@@ -276,6 +344,36 @@ static void answer_chunk(const gather_work *w, gather_memory *m, uint32_t b, uin
 			m->gradient[(dim + 1) * k][i] -= lack / (p->bulk * w->s->dt * dim);
 		}
 	}
+}
+
+/* A continuum alone: how fast each density will follow until cells are counted again, and the mean pressure around. */
+static void measure_chunk(const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
+	const quern_column *u = w->s->use;
+	for (uint32_t i = 0; i < n; i++) {
+		quern_real before[3];
+		for (uint32_t k = 0; k < w->s->dim; k++) before[k] = m->trip.stencil.position[k][i];
+		const uint32_t c = cell_in_block(w, b, before);
+		const quern_real rate2 = calm_shear(m->gradient, i, w->s->dim);
+		u[GATHER_FOLLOWING].real[0][begin + i] =
+			flowing_share(w, rate2) * follow_alone(w, m, c, i, sqrt(rate2));
+		u[GATHER_AROUND].real[0][begin + i] = m->level[c];
+	}
+}
+
+/* The density and, as a compression beside that of the flow, the pressure with it. */
+static void follow_chunk(const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n) {
+	const uint32_t dim = w->s->dim;
+	const quern_real *restrict following = w->s->use[GATHER_FOLLOWING].real[0] + begin;
+	for (uint32_t k = 0; k < dim; k++) {
+		quern_real *restrict l = m->gradient[(dim + 1) * k], *restrict kept = m->kept[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			kept[i] = l[i];
+			l[i] -= following[i] / dim;
+		}
+	}
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) m->density[i] *= 1 + w->s->dt * following[i];
 }
 
 static void call_material(const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n) {
@@ -289,7 +387,9 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 		.grid_density = m->grid_density,
 		.density = m->density,
 		.use = own,
-		.mean_pressure = w->answers ? m->mean_pressure : NULL };
+		.mean_pressure = w->p->alone  ? u[GATHER_AROUND].real[0] + begin
+						 : w->answers ? m->mean_pressure
+									  : NULL };
 	for (uint32_t k = 0; k < dim * dim; k++) b.gradient[k] = m->gradient[k];
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
 		b.stress[k] = u[GATHER_STRESS].real[k] + begin;
@@ -337,7 +437,7 @@ QUERN_INLINE void gather_block(
 	quern_tile_load(w->g, w->motion, b, m->tile);
 	speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
-	if (last && w->answers) level_block(w, m, b);
+	if (last && (w->answers || w->counts)) level_block(w, m, b);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
@@ -352,8 +452,10 @@ QUERN_INLINE void gather_block(
 				&w->calm, k, i + k, m->gradient, m->trip.pic, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
 		move_chunk(w, m, b, i, n, dim);
 		if (w->answers) answer_chunk(w, m, b, i, n);
+		if (w->counts) measure_chunk(w, m, b, i, n);
+		if (w->p->alone) follow_chunk(w, m, i, n);
 		call_material(w, m, i, n);
-		for (int k = 0; k < dim && w->answers; k++)
+		for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
 			memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
 		finish_chunk(w, m, b, i, n);
 	}
@@ -424,6 +526,8 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	w.moved = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.full = s->use[GATHER_FULL].real[0] ? dead_band * s->use[GATHER_FULL].real[0][0] : 0;
 	w.answers = p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
+	w.counts = p->alone && s->use[GATHER_UNCOUNTED].index[0] == 1;
+	w.still = p->alone ? flowing_alone * p->rest_alone : flowing * p->rest_rate;
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };
 	if (!w.bad || !w.moved || calm_init(&w.calm, s, points.n) != QUERN_OK) return QUERN_E_MEMORY;

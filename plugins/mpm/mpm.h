@@ -23,8 +23,10 @@ typedef struct mpm {
 	bool matrix, moments;                       /* or what the transfer gives; whose moment can be kept */
 	quern_real stiffness, bulk, shear, density; /* of the step limit */
 	quern_real relief, answer; /* of the pressure to cells that are too full: over the bulk modulus, 1/s */
-	quern_real follow;         /* of density, to the grid's: a rate over the shear rate */
+	quern_real follow;         /* of density, to the cell's: a rate over the shear rate */
+	bool alone;                /* density follows without a hybrid: cells are counted here */
 	quern_real rest, diameter, rest_rate; /* shear rate of what is at rest: over sqrt(g/D), 1/s */
+	quern_real rest_alone;                /* 1/s: the same of a continuum alone, from sqrt(g/h) */
 	quern_real share_wall, share_next;    /* of a wall's nodes */
 	uint32_t dim;
 	bool rough, still; /* whether a body is */
@@ -43,11 +45,15 @@ typedef struct mpm_fill {
 
 enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
 
-/* Lanes of a node's row (mass, momentum, force) and of its motion (velocity, change, density, grip). */
+/* Lanes of a node's row (mass, momentum, force, held) and of its motion (velocity, change, density, grip). */
 QUERN_INLINE uint32_t node_force(uint32_t dim) { return 1 + dim; }
+QUERN_INLINE uint32_t node_held(uint32_t dim) { return 1 + 2 * dim; }
 QUERN_INLINE uint32_t motion_change(uint32_t dim) { return dim; }
 QUERN_INLINE uint32_t motion_density(uint32_t dim) { return 2 * dim; }
 QUERN_INLINE uint32_t motion_grip(uint32_t dim) { return 2 * dim + 1; }
+
+/* Density follows slowly, by the shear, so that a continuum alone is counted in every so many steps. */
+enum { COUNT_EVERY = 20 };
 
 quern_status quern_mpm_fill(const void *self, const quern_step *);
 /* The n points of another run's state, which are there before the fill: checks and adopts them. */

@@ -7,6 +7,9 @@
 /* clang-format off */
 #define UNSORTED_USE \
 	"total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: points must be sorted before the next scatter."
+#define UNCOUNTED_USE(ACCESS) \
+	"total.uncounted", "1", ACCESS, QUERN_INDEX, .when = "alone", \
+	.doc = "1: what cells hold was counted in this step; counts up to the next time."
 #define IMPULSE_USE "body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL
 #define TWIST_USE "body.twist", "N m s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL
 #define WORK_USE "body.work", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL
@@ -77,7 +80,10 @@ QUERN_USE_ENUM(SORT_USES);
 	X(SCATTER_NODE_MASS, "node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass.") \
 	X(SCATTER_NODE_MOMENTUM, "node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum.") \
 	X(SCATTER_NODE_FORCE, "node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force.") \
-	X(SCATTER_AFFINE_WANTED, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .when = "affine")
+	X(SCATTER_AFFINE_WANTED, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .when = "affine") \
+	X(SCATTER_NODE_HELD, "node.held", "kg", QUERN_ADD, QUERN_SCALAR, .when = "alone", \
+		.doc = "Mass of the cell above the node, by hats around the centres of cells.") \
+	X(SCATTER_UNCOUNTED, UNCOUNTED_USE(QUERN_UPDATE))
 QUERN_USE_ENUM(SCATTER_USES);
 
 #define NODES_USES(X) \
@@ -131,6 +137,12 @@ QUERN_USE_ENUM(WALLS_USES);
 	X(GATHER_UNSORTED, UNSORTED_USE) \
 	X(GATHER_CHANGE, "motion.change", "m/s", QUERN_READ, QUERN_VECTOR) \
 	X(GATHER_DENSITY, "motion.density", "kg/m^3", QUERN_READ, QUERN_SCALAR) \
+	X(GATHER_FOLLOWING, "point.following", "1/s", QUERN_UPDATE, QUERN_SCALAR, .when = "alone", \
+		.doc = "Rate at which the density goes to that of the cell, over the density.") \
+	X(GATHER_AROUND, "point.around", "Pa", QUERN_UPDATE, QUERN_SCALAR, .when = "alone", \
+		.doc = "Mean pressure of the cell when it was counted.") \
+	X(GATHER_UNCOUNTED, UNCOUNTED_USE(QUERN_READ)) \
+	X(GATHER_HELD, "node.held", "kg", QUERN_READ, QUERN_SCALAR, .when = "alone") \
 	X(GATHER_CROWDING, "cell.crowding", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(GATHER_FULLNESS, "cell.fullness", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(GATHER_FULL, "total.full", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)

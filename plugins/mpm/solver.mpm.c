@@ -48,11 +48,16 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, answer, "1/s", "Rate at which the pressure rises to that.", .def = 300, .max = 1e9,
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, follow, "1",
-		"In a hybrid, rate over the shear rate at which the density of points goes to their cell's; 0: it does not.",
+		"Rate over the shear rate at which the density of points goes to their cell's, in a hybrid and in a material that "
+		"flows; 0: it does not.",
 		.def = 2, .max = 1e3, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, alone, NULL,
+		"Count what cells hold; set by itself where density follows without a hybrid.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rest, "1",
 		"In a hybrid, shear rate over sqrt(g/D) below which material is at rest and motion below the grid is stopped, of "
-		"points and of the grains that meet them, and far above which volume answers; 0: neither is done.",
+		"points and of the grains that meet them, and far above which volume answers; 0: neither is done. In a "
+		"continuum alone over sqrt(g/h), of the cell h, and three times that much is where density follows.",
 		.def = 0.003, .max = 1e6, .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(mpm, diameter, "grain.diameter", "m", "Mean diameter of the grains.",
 		.from = "grain.diameter", .flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),
@@ -248,6 +253,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		setup->host->keeps(setup, "hybrid"); /* without one no mass comes to points but by flow */
 	const quern_real gravity = quern_gravity_size(setup->dim, setup->gravity);
 	p->rest_rate = hybrid && p->diameter > 0 ? p->rest * sqrt(gravity / p->diameter) : 0;
+	p->rest_alone = p->rest * sqrt(gravity / p->cell);
 	setup->host->publish(setup, "continuum.rest", "1/s", p->rest_rate);
 	p->sources = (p->sources || p->source.n) && !setup->host->keeps(setup, "hybrid");
 	p->stream = setup->stream;
@@ -327,6 +333,8 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->affine = p->affine || p->matrix;
 	((const quern_material_ops *)material->ops)
 		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
+	p->alone = ((const quern_material_ops *)material->ops)->friction && p->follow > 0 &&
+			   !setup->host->keeps(setup, "hybrid");
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)

@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: MIT */
+/* A continuum alone keeps its room as it flows, however its points lie, and flows as Bagnold's law has it: down a slope, periodic
+ * along it. docs/theory/mpm.md, section 8; docs/decisions/0034-room-of-points.md */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "harness.h"
+#include "table.h"
+#include <string.h>
+
+static const double cell = 4e-3, diameter = 2e-3, gravity = 9.81, degree = 3.14159265358979312 / 180;
+static const double slow = 0.218, fast = 0.945, number = 0.473, packed = 2004, solid = 2500;
+
+typedef struct chute {
+	int cells, along; /* over the depth; along the slope */
+	double angle;     /* degrees */
+	const char *material, *boundary, *transfer;
+} chute;
+static const char *const mu_i =
+	"mu_i: {bulk_modulus: 1e5, diameter: 0.002, grain_density: 2500, critical_density: 2004, "
+	"static_friction: 0.218, limit_friction: 0.945, inertial_number: 0.473}";
+
+static quern_run *open_chute_with(const chute *c, const char *more) {
+	const double depth = c->cells * cell, length = c->along * cell, angle = c->angle * degree;
+	return harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [%.17g, %.17g], time: {end: 100}, output: {every: 1},\n"
+		"domain: {lower: [0, 0], upper: [%.17g, %.17g], periodic: [true, false]},\n"
+		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: %s}}],\n"
+		"continuum: {cell: %.17g, transfer: %s, material: {%s}%s,\n"
+		"  fill: [{region: {box: {lower: [0, 0], upper: [%.17g, %.17g]}}, stress: at_rest}]}}\n",
+		gravity * sin(angle), -gravity * cos(angle), length, 2 * depth, c->boundary, cell, c->transfer,
+		c->material, more, length, depth);
+}
+
+static quern_run *open_chute(const chute *c) { return open_chute_with(c, ""); }
+
+/* ==== room ==== */
+
+/* In [0, 1), from one call to the next. */
+static double drawn(uint64_t *state) {
+	*state = *state * 6364136223846793005u + 1442695040888963407u;
+	return (double)(*state >> 11) / 9007199254740992.0;
+}
+
+/* Anywhere in the layer, and sheared. */
+static void mix(quern_run *run, const chute *c, double shear) {
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+	uint64_t state = 14;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		x.real[0][i] = drawn(&state) * c->along * cell;
+		x.real[1][i] = (0.25 + drawn(&state) * (c->cells - 0.5)) * cell;
+		v.real[0][i] = shear * x.real[1][i];
+	}
+}
+
+/* Height of the middle of all mass over that of a layer with its density without stress, the mean of some looks. */
+static double height(quern_run *run, const chute *c, double from, double until) {
+	enum { LOOKS = 10 };
+	double sum = 0;
+	for (int k = 1; k <= LOOKS; k++) {
+		harness_until(run, from + (until - from) * k / LOOKS);
+		const quern_column x = harness_field(run, "point.position"), m = harness_field(run, "point.mass");
+		double mass = 0, moment = 0;
+		for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+			mass += m.real[0][i];
+			moment += m.real[0][i] * x.real[1][i];
+		}
+		sum += moment / mass / (0.5 * mass / (packed * c->along * cell)) / LOOKS;
+	}
+	return sum;
+}
+
+static void mixed_points_keep_their_room(void **unused) {
+	(void)unused;
+	static const chute cases[] = { { 18, 8, 20, NULL, "{rough: 7.8}", "picflip" },
+		{ 18, 8, 20, NULL, "{rough: 7.8}", "apic" },
+		{ 18, 8, 20, "drucker_prager: {bulk_modulus: 1e5, density: 2004, friction: 0.364}", "sticky",
+			"picflip" } };
+	bool good = true;
+	table_head("points at random in a layer that flows: height of its middle");
+	for (int k = 0; k < 3; k++) {
+		chute c = cases[k];
+		if (!c.material) c.material = mu_i;
+		quern_run *run = open_chute(&c);
+		mix(run, &c, 30);
+		good &= table_row(k == 0   ? "mu_i, picflip"
+						  : k == 1 ? "mu_i, apic"
+								   : "drucker_prager",
+			height(run, &c, 1.5, 2), 1, 0.02);
+		harness_close(run);
+	}
+	const chute c = { 18, 8, 20, mu_i, "{rough: 7.8}", "picflip" };
+	quern_run *run = open_chute_with(&c, ", follow: 0");
+	mix(run, &c, 30);
+	const double sunk = height(run, &c, 1.5, 2);
+	table_note("mu_i whose density does not follow", sunk);
+	harness_close(run);
+	assert_true(good && sunk < 0.9);
+}
+
+/* ==== Bagnold ==== */
+
+/* Where all of the layer flows at one inertial number, v = 2/3 I/D sqrt(phi g cos) (H^1.5 - (H - y)^1.5). */
+static double bagnold(const chute *c, double y) {
+	const double depth = c->cells * cell, angle = c->angle * degree, slope = tan(angle);
+	const double left = depth > y ? depth - y : 0, inertial = number * (slope - slow) / (fast - slope);
+	return 2.0 / 3 * inertial / diameter * sqrt(packed / solid * gravity * cos(angle)) *
+		   (depth * sqrt(depth) - left * sqrt(left));
+}
+
+/* Root mean square difference over that of the law. */
+static double off(quern_run *run, const chute *c) {
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+	double wrong = 0, whole = 0;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		const double law = bagnold(c, x.real[1][i]), d = v.real[0][i] - law;
+		wrong += d * d, whole += law * law;
+	}
+	return sqrt(wrong / whole);
+}
+
+static double energy(quern_run *run) {
+	const quern_column v = harness_field(run, "point.velocity");
+	double sum = 0;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		sum += v.real[0][i] * v.real[0][i] + v.real[1][i] * v.real[1][i];
+	return sum;
+}
+
+static void begin(quern_run *run, const chute *c) {
+	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) v.real[0][i] = bagnold(c, x.real[1][i]);
+}
+
+static void bagnold_stays(void **unused) {
+	(void)unused;
+	static const char *const transfers[] = { "apic", "{picflip: {rate: 0}}" };
+	bool good = true;
+	table_head("begun with Bagnold's velocity, off after 0.5 s");
+	for (int k = 0; k < 2; k++) {
+		const chute c = { 20, 4, 20, mu_i, "sticky", transfers[k] };
+		quern_run *run = open_chute(&c);
+		begin(run, &c);
+		harness_until(run, 0.5);
+		good &= table_row(transfers[k], off(run, &c), 0, 0.02);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+static void bagnold_is_reached(void **unused) {
+	(void)unused;
+	const chute c = { 8, 4, 20, mu_i, "sticky", "apic" };
+	quern_run *run = open_chute(&c);
+	harness_until(run, 2);
+	table_head("from rest, 8 cells deep, off");
+	const bool good = table_row("after 2 s", off(run, &c), 0, 0.03);
+	harness_close(run);
+	assert_true(good);
+}
+
+/* Below the friction of slow flow a layer that flows comes to rest, above that of fast flow it goes ever faster. */
+static void slopes_decide(void **unused) {
+	(void)unused;
+	const chute gentle = { 8, 4, atan(slow) / degree - 2, mu_i, "sticky", "apic" },
+				steep = { 8, 4, atan(fast) / degree + 2, mu_i, "sticky", "apic" },
+				middle = { 8, 4, 20, NULL, NULL, NULL };
+	table_head("two degrees below and above the range of flow");
+	quern_run *run = open_chute(&gentle);
+	begin(run, &middle);
+	const double before = energy(run);
+	harness_until(run, 2);
+	bool good = table_row("below: energy after 2 s over that before", energy(run) / before, 0, 1e-6);
+	harness_close(run);
+	run = open_chute(&steep);
+	harness_until(run, 1);
+	const double one = sqrt(energy(run));
+	harness_until(run, 2);
+	const double two = sqrt(energy(run)),
+				 least = gravity * (sin(steep.angle * degree) - fast * cos(steep.angle * degree)),
+				 gained = (two - one) / sqrt(harness_count(run, "point"));
+	table_note("above: velocity gained in the second second, m/s", gained);
+	table_note("what friction leaves of gravity at the least", least);
+	good &= gained > least;
+	harness_close(run);
+	assert_true(good);
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(mixed_points_keep_their_room),
+		cmocka_unit_test(bagnold_stays), cmocka_unit_test(bagnold_is_reached),
+		cmocka_unit_test(slopes_decide) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
