@@ -4,6 +4,7 @@
 #include "region.h"
 #include <math.h>
 #include <quern/math.h>
+#include <quern/space.h>
 
 typedef struct {
 	observer_region region;
@@ -99,10 +100,19 @@ static void share_out(const slabs *s, quern_real x, quern_real size, bool round,
 	}
 }
 
+/* Where an entry stands: of its images that nearest to the region's middle. It may be a while until what has left a periodic domain is brought
+ * back. */
+static quern_real place_of(const observer *o, quern_real *const *x, uint32_t i, uint32_t k) {
+	const quern_real off = x[k][i] - 0.5 * (o->low[k] + o->high[k]);
+	return x[k][i] + (quern_image_far(off, o->length[k]) - off);
+}
+
 /* Across the slabs an entry counts if its centre is in the region; along the axis with what of it is in each. */
 static bool is_beside(const observer *o, quern_real *const *x, uint32_t i, uint32_t dim) {
-	for (uint32_t k = 0; k < dim; k++)
-		if (k != (uint32_t)o->axis && !(x[k][i] >= o->low[k] && x[k][i] <= o->high[k])) return false;
+	for (uint32_t k = 0; k < dim; k++) {
+		const quern_real at = place_of(o, x, i, k);
+		if (k != (uint32_t)o->axis && !(at >= o->low[k] && at <= o->high[k])) return false;
+	}
 	return true;
 }
 
@@ -115,7 +125,9 @@ static void add_all(const slabs *s, const cloud *c, const uint32_t *order, const
 		if (!(mass > 0) || !is_beside(s->o, x->real, i, s->dim)) continue;
 		const quern_real size =
 			radius ? radius[i] : 0.5 * (s->dim == 2 ? __builtin_sqrt(volume[i]) : quern_cbrt(volume[i]));
-		if (size > 0) share_out(s, x->real[s->o->axis][i], size, radius != NULL, mass, v->real, i);
+		if (size > 0)
+			share_out(
+				s, place_of(s->o, x->real, i, (uint32_t)s->o->axis), size, radius != NULL, mass, v->real, i);
 	}
 }
 
