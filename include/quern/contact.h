@@ -39,7 +39,7 @@ typedef struct quern_contact_batch {
 		*drag_couple[3]; /* N m on first, ADDed: the part of `couple` that damps; NULL without couples too */
 	/* m/s, rad/s; NULL unless the table says `means`: the mean of `velocity` and of `spin` over the time dt since the last
 	 * evaluation, which is the way by which springs are stretched, and no other column may be taken for it: an integrator
-	 * evaluates dashpots at the step's end (docs/theory/grains.md, section 3). `turn` is such a mean too. */
+	 * evaluates dashpots at the step's end (docs/theory/grains.md, section 3). With `means` 1 `turn` is such a mean too. */
 	const quern_real *mean_velocity[3], *mean_spin[3];
 } quern_contact_batch;
 

@@ -138,8 +138,8 @@ static void begin_flight(
 /* Springs are stretched by dt times the velocity that `open` leaves: it has moved the grains by that. */
 static void compare_way(flight *f) {
 	const quern_check_kernel *k = f->open;
-	const quern_real at = ((const quern_integrator_ops *)k->ops)->at;
-	for (uint32_t a = 0; a < k->dim && at > 0; a++)
+	const quern_real asked = ((const quern_integrator_ops *)k->ops)->at, at = asked > 0 ? asked : 1;
+	for (uint32_t a = 0; a < k->dim; a++)
 		for (uint32_t i = 0; i < k->n; i++) {
 			const double from = quern_check_given(k, POSITION, a)[i],
 						 to = quern_check_found(k, NEW_POSITION, a)[i];

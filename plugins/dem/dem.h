@@ -108,7 +108,7 @@ QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
 	return &s->slot[s->settling ? SLOT_SETTLING : SLOT_INTEGRATOR][0];
 }
 
-/* After which share of the step the integrator evaluates forces; and whether all of their impulse is given in that step. */
+/* After which share of the step the integrator evaluates forces; below 1, all of their impulse is given in that step. */
 QUERN_INLINE quern_real dem_ahead(const quern_integrator_ops *ops, uint32_t dim) {
 	return !ops->open[dim - 2] ? 0 : ops->at > 0 ? ops->at : 1;
 }

@@ -8,7 +8,8 @@ typedef struct {
 } verlet;
 static const quern_param params[] = { QUERN_END_PARAMS };
 
-/* Of a new grain no acceleration is known: NaN. Its first dashpots see its velocity as it is, an error of second order, once. */
+/* Of a new grain no acceleration is known: NaN. Its first dashpots see its velocity as it is, an error of second order, once; springs that
+ * it has at the start are stretched by half a step too much. */
 /* clang-format off */
 #define USES(X) \
 	X(ACCELERATION, "grain.acceleration", "m/s^2", QUERN_UPDATE, QUERN_VECTOR, .initial = __builtin_nan(""), \

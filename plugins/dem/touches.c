@@ -35,7 +35,7 @@ static void surface_means(
 	const quern_pose *now = &sh->pose[c->body].pose, *middle = &sh->mean_pose[c->body].pose;
 	const uint32_t dim = sh->s->dim;
 	for (uint32_t k = 0; k < dim; k++) memcpy(w->mean_velocity[k], w->velocity[k], c->n * sizeof(quern_real));
-	if (!sh->pose[c->body].moves) return;
+	if (!sh->pose[c->body].moves && !sh->mean_pose[c->body].moves) return; /* it may just have stopped */
 	const quern_vec drift = quern_vec_sub(QUERN_VEC_OF(middle->velocity), QUERN_VEC_OF(now->velocity)),
 					turn = quern_vec_sub(QUERN_VEC_OF(middle->spin), QUERN_VEC_OF(now->spin));
 	for (uint32_t q = 0; q < c->n; q++) {
