@@ -21,11 +21,13 @@ static inline quern_real quern_gravity_size(uint32_t dim, const quern_real gravi
 }
 
 /* Brought back through a periodic face, and inside: what is less than half an ulp below `lower` would round to
- * `upper`. */
+ * `upper`. Points may have gone by several periods of a domain that is narrower than a block of cells. */
 static inline quern_real quern_brought_back(quern_real x, quern_real lower, quern_real upper) {
-	x = x >= upper ? x - (upper - lower) : x;
-	x = x < lower ? x + (upper - lower) : x;
-	return x >= upper ? lower : x;
+	const quern_real length = upper - lower;
+	x = x >= upper ? x - length : x;
+	x = x < lower ? x + length : x;
+	if (x >= upper || x < lower) x -= length * __builtin_floor((x - lower) / length);
+	return x >= upper || x < lower ? lower : x;
 }
 
 /* Positions become numbers of cells, so none may be far outside: what is fixed may lie beyond the domain by as much as that

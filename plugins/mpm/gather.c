@@ -125,8 +125,8 @@ static const quern_real calm_rate = 400;
 static const quern_real flowing = 30, flowing_alone = 3;
 /* What is shaken changes volume as much as shape, what flows hardly: weight of the former. */
 static const quern_real shaken = 30;
-/* Of densities within a cell: a rate over the shear rate. */
-static const quern_real evening = 20;
+/* Of densities within a cell: a rate over that at which they go to what the cell holds. */
+static const quern_real evening = 10;
 /* What is full, over what was full at first: that varies by so much. */
 static const quern_real dead_band = 1.01;
 
@@ -312,7 +312,8 @@ static quern_real follow_alone(
 		return 0;
 	const quern_real sheared = rate * rate / (rate * rate + shaken * trace * trace),
 					 time = w->s->dt * COUNT_EVERY, shear = rate * sheared * time;
-	const quern_real evened = evening * shear, part = w->p->follow * shear, off = m->held[c] / m->mean[c] - 1;
+	const quern_real evened = evening * w->p->follow * shear, part = w->p->follow * shear,
+					 off = m->held[c] / m->mean[c] - 1;
 	return (evened / (1 + evened) * (1 - m->density[i] / m->mean[c]) +
 			   (off < -0.1 ? 0 : part / (1 + part) * fmin(off, 0.1))) /
 		   time;
@@ -435,7 +436,7 @@ QUERN_INLINE void gather_block(
 	const uint32_t begin = w->point[b], end = w->point[b + 1];
 	if (begin == end) return;
 	quern_tile_load(w->g, w->motion, b, m->tile);
-	speak_for_others(w, m);
+	if (last) speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
 	if (last && (w->answers || w->counts)) level_block(w, m, b);
 	for (uint32_t i = begin; i < end; i += STENCIL) {

@@ -333,8 +333,8 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->affine = p->affine || p->matrix;
 	((const quern_material_ops *)material->ops)
 		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
-	p->alone = ((const quern_material_ops *)material->ops)->friction && p->follow > 0 &&
-			   !setup->host->keeps(setup, "hybrid");
+	p->alone = ((const quern_material_ops *)material->ops)->friction && (p->follow > 0 || p->alone) &&
+			   p->rest > 0 && !setup->host->keeps(setup, "hybrid");
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)

@@ -190,9 +190,61 @@ static void slopes_decide(void **unused) {
 	assert_true(good);
 }
 
+/* ==== periods narrower than a block of cells ==== */
+
+enum { MOST = 64 };
+
+/* Of points on a lattice: how far they are off it, m; and the most and least in a column. */
+static double off_lattice(quern_run *run, int columns, double apart, int most_least[2]) {
+	const quern_column x = harness_field(run, "point.position");
+	int count[MOST] = { 0 };
+	double worst = 0;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		const double t = (x.real[0][i] - x.real[0][0]) / apart, whole = floor(t + 0.5);
+		worst = fmax(worst, fabs(t - whole) * apart);
+		count[((int)whole % columns + columns) % columns]++;
+	}
+	most_least[0] = 0, most_least[1] = INT32_MAX;
+	for (int k = 0; k < columns; k++) {
+		if (count[k] > most_least[0]) most_least[0] = count[k];
+		if (count[k] < most_least[1]) most_least[1] = count[k];
+	}
+	return worst;
+}
+
+/* What flies round a period of one to four cells, many times within its block, stays a lattice: whoever is brought back at last has gone by
+ * several periods. */
+static void narrow_periods(void **unused) {
+	(void)unused;
+	const double wide = 0.1, speed = 1.03;
+	bool good = true;
+	table_head("lattices that fly round narrow periods: off the lattice, cells");
+	for (int dim = 2; dim <= 3; dim++)
+		for (int cells = 1; cells <= (dim == 2 ? 4 : 2); cells++) {
+			char name[40];
+			int count[2];
+			quern_run *run = harness_open(1,
+				"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: [%g, %s], periodic: %s},\n"
+				"time: {end: 10, step: 5e-3}, output: {every: 1},\n"
+				"continuum: {cell: %g, material: {elastic: {bulk_modulus: 1000, density: 1000}},\n"
+				"  fill: [{region: {box: {lower: %s, upper: [%g, %s]}}, velocity: %s}]}}\n",
+				dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]", cells * wide,
+				dim == 2 ? "0.4" : "0.2, 0.2", dim == 2 ? "[true, true]" : "[true, true, true]", wide,
+				dim == 2 ? "[0, 0]" : "[0, 0, 0]", cells * wide, dim == 2 ? "0.4" : "0.2, 0.2",
+				dim == 2 ? "[1.03, 0]" : "[1.03, 0, 0]");
+			harness_until(run, 5);
+			const double off = off_lattice(run, 2 * cells, wide / 2, count);
+			snprintf(name, sizeof name, "%d-D, %d cells, %.0f times round", dim, cells,
+				5 * speed / (cells * wide));
+			good &= table_row(name, off / wide, 0, 1e-9) && count[0] == count[1];
+			harness_close(run);
+		}
+	assert_true(good);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(mixed_points_keep_their_room),
-		cmocka_unit_test(bagnold_stays), cmocka_unit_test(bagnold_is_reached),
-		cmocka_unit_test(slopes_decide) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(narrow_periods),
+		cmocka_unit_test(mixed_points_keep_their_room), cmocka_unit_test(bagnold_stays),
+		cmocka_unit_test(bagnold_is_reached), cmocka_unit_test(slopes_decide) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
