@@ -270,41 +270,50 @@ static double weight_above(quern_run *run, double height, double width) {
 	return sum;
 }
 
-/* A bed of discs at rest on a face of the domain, on a body on a face of cells, and on bodies that cut their cells: points
- * made in it bear what lies above them, in the lowest cells too. Of a cell that is open to a quarter the room is known to a fifth. */
+/* A bed of discs at rest on a floor that lies so many cells above the domain's face: over its three lowest rows, vertical stress of new
+ * points over the weight above them. */
+static void bear(double floor_at, int seed, double ratio[3]) {
+	const double width = 0.06, base = floor_at * cell;
+	double weight[3];
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, seed: %d, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [%g, 0.06], "
+		"periodic: [true, false]},\ntime: {end: 10}, bodies: [{plane: {point: [0, %g], normal: [0, 1]}}],\n"
+		"continuum: {cell: %g, material: {elastic: {bulk_modulus: 1e6, density: 1900}}},\n"
+		"hybrid: {oracle: [{packing_fraction: {depth: 9 mm, half_width: 4 mm}}], substeps: 4},\n"
+		"grains: {material: {density: 2500, radius: {mean: %g, spread: 0.2}}, contact: {linear: {stiffness: 1e6}},\n"
+		"  settle: {energy: 1e-8}, fill: {region: {box: {lower: [0, %g], upper: [%g, %g]}}, settle: true}}}\n",
+		seed, width, base, cell, radius, base + radius, width, base + 0.03);
+	harness_settle(run);
+	harness_steps(run, 1);
+	const int first = (int)floor(floor_at);
+	for (int k = 0; k < 3; k++)
+		weight[k] = weight_above(run, 0.5 * (fmax((first + k) * cell, base) + (first + k + 1) * cell), width);
+	update(run);
+	for (int k = 0; k < 3; k++) ratio[k] = pressed(run, first + k) / weight[k];
+	harness_close(run);
+}
+
+/* On a face of the domain, on a body on a face of cells, and on bodies that cut their cells: points made in a bed bear what lies above them, in
+ * the lowest cells too. Of a cell that is open to a quarter the room is known to a fifth, and few grains are in it: one bed may be off by a third. */
 static void beds_bear_their_weight(void **state) {
 	static const double floors[] = { 0, 1, 1.25, 1.5, 1.75 }; /* cells */
-	const double width = 0.06;
 	bool good = true;
 	(void)state;
-	table_head("vertical stress of new points over the weight above them");
+	table_head("vertical stress of new points over the weight above them, of four beds on the last floor");
 	for (size_t f = 0; f < sizeof floors / sizeof *floors; f++) {
-		const double base = floors[f] * cell;
-		double weight[3];
-		quern_run *run = harness_open(1,
-			"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [%g, 0.06], "
-			"periodic: "
-			"[true, false]},\ntime: {end: 10}, bodies: [{plane: {point: [0, %g], normal: [0, 1]}}],\n"
-			"continuum: {cell: %g, material: {elastic: {bulk_modulus: 1e6, density: 1900}}},\n"
-			"hybrid: {oracle: [{packing_fraction: {depth: 9 mm, half_width: 4 mm}}], substeps: 4},\n"
-			"grains: {material: {density: 2500, radius: {mean: %g, spread: 0.2}}, contact: {linear: "
-			"{stiffness: "
-			"1e6}},\n  settle: {energy: 1e-8}, fill: {region: {box: {lower: [0, %g], upper: [%g, %g]}}, "
-			"settle: true}}}\n",
-			width, base, cell, radius, base + radius, width, base + 0.03);
-		harness_settle(run);
-		harness_steps(run, 1);
-		const int first = (int)floor(floors[f]);
-		for (int k = 0; k < 3; k++)
-			weight[k] =
-				weight_above(run, 0.5 * (fmax((first + k) * cell, base) + (first + k + 1) * cell), width);
-		update(run);
+		const int seeds = floors[f] > 1.5 ? 4 : 1;
+		double mean[3] = { 0 };
+		for (int seed = 1; seed <= seeds; seed++) {
+			double ratio[3];
+			bear(floors[f], seed, ratio);
+			for (int k = 0; k < 3; k++) mean[k] += ratio[k] / seeds;
+			table_note("  row 0 of one", ratio[0]);
+		}
 		for (int k = 0; k < 3; k++) {
 			char name[80];
 			snprintf(name, sizeof name, "floor at %g cells, row %d", floors[f], k);
-			good &= table_row(name, pressed(run, first + k) / weight[k], 1, 0.12);
+			good &= table_row(name, mean[k], 1, 0.12);
 		}
-		harness_close(run);
 	}
 	assert_true(good);
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A scene that starts from another run's state goes on as that run would have, to the bit where nothing else has changed; what does
 not fit is refused with a sentence, or begins anew and is said."""
+import math
 import os
 import pathlib
 import re
@@ -156,19 +157,26 @@ def lasts(place):
 
 
 def history_counts(place):
-    """From a frame that shows slips grains of 2-D begin with their springs; without them, the bed gives way a little first."""
-    after = {}
-    for name, source, options in (("checkpoint", "bed", []), ("frame", "bed:4", []), ("none", "bare:4", [])):
-        if name == "none":
-            lab.run(place / "bed.yaml", place / "bare", "--set=output.fields=[grain.velocity, grain.spin]")
-        scene = write(place, f"rest_{name}", started(BED, source, 0.0625, "[0, -10]"))
-        said = lab.run(scene, place / f"rest_{name}", *options)
-        log = (place / f"rest_{name}" / "log.txt").read_text()
-        assert ("all touches" in log) == (name != "checkpoint") and ("all contacts" in log) == (name == "none"), log
-        start, end = (table(lab.frames(place / f"rest_{name}")[i], "grains", "position") for i in (0, -1))
-        after[name] = numpy.abs(end - start).max()
-    print("a bed at rest moves on by", ", ".join(f"{after[k]:.3g} m ({k})" for k in after))
-    assert after["checkpoint"] < 0.2 * after["frame"] < 0.2 * after["none"]
+    """From a frame that shows slips grains of 2-D begin with their springs; without them, beds give way a little first. Root mean square over all
+    grains of three beds: how far the one goes that moves most is chance."""
+    after = dict.fromkeys(("checkpoint", "frame", "none"), 0.0)
+    for seed in (3, 4, 5):
+        here = place / f"at_rest_{seed}"
+        here.mkdir()
+        bed = BED.replace("seed: 3", f"seed: {seed}")
+        (here / "bed.yaml").write_text(bed)
+        for name, options in (("bed", []), ("bare", ["--set=output.fields=[grain.velocity, grain.spin]"])):
+            lab.run(here / "bed.yaml", here / name, *options)
+        for name, source in (("checkpoint", "bed"), ("frame", "bed:4"), ("none", "bare:4")):
+            scene = write(here, f"rest_{name}", started(bed, source, 0.0625, "[0, -10]"))
+            lab.run(scene, here / f"rest_{name}")
+            log = (here / f"rest_{name}" / "log.txt").read_text()
+            assert ("all touches" in log) == (name != "checkpoint") and ("all contacts" in log) == (name == "none"), log
+            start, end = (table(lab.frames(here / f"rest_{name}")[i], "grains", "position") for i in (0, -1))
+            after[name] += numpy.mean((end - start) ** 2) / 3
+    after = {name: math.sqrt(square) for name, square in after.items()}
+    print("beds at rest move on by", ", ".join(f"{after[k]:.3g} m ({k})" for k in after))
+    assert after["checkpoint"] < 0.6 * after["frame"] < 0.3 * after["none"]
 
 
 def changes(place):

@@ -15,7 +15,7 @@ dimension: 2
 seed: 1
 gravity: [0, -9.81]
 domain: {lower: [-48 mm, -48 mm], upper: [48 mm, 48 mm]}
-time: {end: 0.6 s}
+time: {end: 1 s}
 output: {every: 10 ms}
 grains:
   material: {density: 2500, radius: {mean: 1 mm, spread: 10 %}}
@@ -45,17 +45,17 @@ def surfaces(scene, place):
 
 
 def lifted(scene, place):
-    """After a tenth of a turn: slope of the surface over the last 0.1 s, and work of the drum over the last 0.3 s, when what happens as zones are
-    made is over."""
+    """From half a second on, once the surface gives way again and again: its slope in the mean, and the work of the drum. Before that one avalanche
+    decides. Friction of the continuum is the material's default here, not that of these grains."""
     found = {}
     for model in ("grains", "all"):
         lab.run(scene, place / model, f"--set=model={model}")
         with open(place / model / "series.csv", newline="") as file:
-            rows = [{key.split(" ")[0]: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-        found[model] = (-math.degrees(statistics.mean(row["repose.angle"] for row in rows[-10:])), rows[-1]["wall_torque.work"] - rows[-31]["wall_torque.work"])
-        print(f"drum, model {model}: the surface leans by {found[model][0]:.1f} degrees, work {found[model][1]:.4f} J in the last 0.3 s, {rows[-1]['wall_torque.work']:.4f} in all")
+            rows = [{key.split(" ")[0]: float(value) for key, value in row.items()} for row in csv.DictReader(file)][-51:]
+        found[model] = (-math.degrees(statistics.mean(row["repose.angle"] for row in rows)), rows[-1]["wall_torque.work"] - rows[0]["wall_torque.work"])
+        print(f"drum, model {model}: from 0.5 s on the surface leans by {found[model][0]:.1f} degrees, work {found[model][1]:.4f} J")
     (angle, work), (hybrid_angle, hybrid_work) = found["grains"], found["all"]
-    assert 15 < angle < 30 and abs(hybrid_angle - angle) < 2 and abs(hybrid_work / work - 1) < 0.06
+    assert 15 < angle < 30 and abs(hybrid_angle - angle) < 3 and abs(hybrid_work / work - 1) < 0.1     # three seeds: 0.8 to 1.9 degrees less
 
 
 if __name__ == "__main__":
