@@ -140,6 +140,9 @@ static bool read_partition(quern_run *run, hid_t group, int s, quern_text *why) 
 	if (set->grid && set->n)
 		return quern_grid_cut(&run->grid, store, s) == QUERN_OK || fault(why, "memory", set->name);
 	if (!n_blocks) return true;
+	size_t rows = 0, columns = 0; /* memory is taken only for what the file does hold */
+	if (!quern_h5_read_size(group, "block", &rows, &columns) || rows != (size_t)n_blocks + 1)
+		return fault(why, "the partition", set->name);
 	uint32_t *block = malloc(((size_t)n_blocks + 1) * sizeof(uint32_t));
 	bool good = block && quern_h5_read(group, "block", H5T_NATIVE_UINT32, (size_t)n_blocks + 1, 1, block);
 	good = good && block[0] == 0 && block[n_blocks] == set->n;
