@@ -41,6 +41,11 @@ typedef struct quern_integrator_ops {
 	quern_real damping;
 } quern_integrator_ops;
 
+/* After which share of the step forces are evaluated; below 1, all of their impulse is given in that step. */
+QUERN_INLINE quern_real quern_integrator_ahead(const quern_integrator_ops *ops, uint32_t dim) {
+	return !ops->open[dim - 2] ? 0 : ops->at > 0 ? ops->at : 1;
+}
+
 QUERN_KIND(integrator, quern_integrator_ops, "Grains moved on by forces.",
 	QUERN_EACH(quern_integrator_ops, close), QUERN_EITHER(quern_integrator_ops, open),
 	QUERN_EITHER(quern_integrator_ops, predict));

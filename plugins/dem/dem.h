@@ -108,11 +108,6 @@ QUERN_INLINE const quern_bound *dem_integrator(const quern_step *s) {
 	return &s->slot[s->settling ? SLOT_SETTLING : SLOT_INTEGRATOR][0];
 }
 
-/* After which share of the step the integrator evaluates forces; below 1, all of their impulse is given in that step. */
-QUERN_INLINE quern_real dem_ahead(const quern_integrator_ops *ops, uint32_t dim) {
-	return !ops->open[dim - 2] ? 0 : ops->at > 0 ? ops->at : 1;
-}
-
 /* The grains with rows of dem.fill; `weight` NULL: all of what each is. */
 QUERN_INLINE cloud dem_cloud(const quern_step *s, const quern_real *weight) {
 	return (cloud) { s->use[FILL_MASS].real[0], weight, s->use[FILL_FIXED].index,

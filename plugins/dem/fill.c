@@ -451,7 +451,8 @@ static quern_status fill_all(filling *f, const grain_table *table) {
  * the step's end gives half of it in the next. */
 static quern_status refuse_two_steps(const quern_step *s) {
 	const quern_bound *integrator = &s->slot[SLOT_INTEGRATOR][0];
-	if (!s->host->has(s->run, "hybrid") || dem_ahead(integrator->ops, s->dim) < 1) return QUERN_OK;
+	if (!s->host->has(s->run, "hybrid") || quern_integrator_ahead(integrator->ops, s->dim) < 1)
+		return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_PARAM, "integrator", -1,
 		"%s gives half of each kick in the next step, and the books of a hybrid take one: use position_verlet or "
 		"symplectic_euler",

@@ -165,7 +165,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	const quern_integrator_ops *integrator = dem_integrator(s)->ops;
 	sh->use = s->use;
 	/* springs are where the last forces were, grains have gone on since */
-	const quern_real ahead = dem_ahead(integrator, s->dim), left = 1 - ahead;
+	const quern_real ahead = quern_integrator_ahead(integrator, s->dim), left = 1 - ahead;
 	sh->dt = !sh->looks ? s->dt : left > 0 ? fmax(left * s->dt, NO_TIME) : NO_TIME;
 	sh->waits =
 		ahead < 1 ? 0 : 1; /* the half of a kick that `open` of the next step gives is as large as this one */

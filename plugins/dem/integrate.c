@@ -164,7 +164,7 @@ static void integrate(const forces_shared *sh, const forces_work *w, uint32_t be
 static void look_at_motion(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n) {
 	const quern_column *u = sh->use;
 	const uint32_t dim = sh->s->dim, n_spin = sh->spin ? (dim == 3 ? 3 : 1) : 0;
-	if (!(dem_ahead(dem_integrator(sh->s)->ops, dim) > 0)) {
+	if (!(quern_integrator_ahead(dem_integrator(sh->s)->ops, dim) > 0)) {
 		integrate(sh, w, begin, n);
 		return;
 	}

@@ -1,29 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* integrator.velocity_verlet - second order, also with dashpots, which see v + dt a, the velocity that the old acceleration
  * predicts. docs/theory/grains.md, section 3 */
-#include <quern/integrator.h>
+#include "verlet.h"
 
-typedef struct {
-	int32_t unused;
-} verlet;
-static const quern_param params[] = { QUERN_END_PARAMS };
-
-/* Of a new grain no acceleration is known: NaN. Its first step moves it with its velocity and kicks it once, which
- * costs an error of second order, once. */
-/* clang-format off */
-#define USES(X) \
-	X(ACCELERATION, "grain.acceleration", "m/s^2", QUERN_UPDATE, QUERN_VECTOR, .initial = __builtin_nan(""), \
-		.doc = "Of the last step, gravity included; NaN: not known yet.") \
-	X(SPIN_ACCELERATION, "grain.spin_acceleration", "rad/s^2", QUERN_UPDATE, QUERN_AXIAL, .with = "grain.spin", \
-		.initial = __builtin_nan(""), .doc = "Of the last step; NaN: not known yet.") \
-	X(OPEN_ACCELERATION, "grain.acceleration", "m/s^2", QUERN_READ, QUERN_VECTOR, .hook = QUERN_INTEGRATOR_OPEN) \
-	X(OPEN_SPIN_ACCELERATION, "grain.spin_acceleration", "rad/s^2", QUERN_READ, QUERN_AXIAL, .with = "grain.spin", \
-		.hook = QUERN_INTEGRATOR_OPEN)
-/* clang-format on */
-QUERN_USE_ENUM(USES);
-static const quern_use uses[] = QUERN_USE_ROWS(USES);
-
-/* v becomes that of the middle of the step, v + dt a / 2, by which x moves. */
+/* A new grain is moved with its velocity in its first step and kicked once, which costs an error of second order, once.
+ * v becomes that of the middle of the step, v + dt a / 2, by which x moves. */
 QUERN_INLINE void open(const int dim, const quern_integrator_batch *b) {
 	const quern_real dt = b->dt, half = 0.5 * dt;
 	for (int k = 0; k < dim; k++) {
@@ -79,30 +60,10 @@ QUERN_INLINE void close(const int dim, const quern_integrator_batch *b) {
 	}
 }
 
-/* v + dt a, half a step on from where `open` has left it. */
-QUERN_INLINE void predict(const int dim, const quern_integrator_batch *b) {
-	const quern_real half = 0.5 * b->dt;
-	for (int k = 0; k < dim; k++) {
-		const quern_real *restrict a = b->use[OPEN_ACCELERATION].real[k], *restrict v = b->velocity[k];
-		quern_real *restrict nv = b->new_velocity[k];
-		QUERN_SIMD
-		for (uint32_t i = 0; i < b->n; i++) nv[i] = v[i] + (a[i] == a[i] ? half * a[i] : 0);
-	}
-	for (int k = 0; k < (dim == 3 ? 3 : 1) && b->spin[0]; k++) {
-		const quern_real *restrict a = b->use[OPEN_SPIN_ACCELERATION].real[k], *restrict w = b->spin[k];
-		quern_real *restrict nw = b->new_spin[k];
-		QUERN_SIMD
-		for (uint32_t i = 0; i < b->n; i++) nw[i] = w[i] + (a[i] == a[i] ? half * a[i] : 0);
-	}
-}
-
 static void open_2d(const void *self, const quern_integrator_batch *b) { (void)self, open(2, b); }
 static void open_3d(const void *self, const quern_integrator_batch *b) { (void)self, open(3, b); }
 static void close_2d(const void *self, const quern_integrator_batch *b) { (void)self, close(2, b); }
 static void close_3d(const void *self, const quern_integrator_batch *b) { (void)self, close(3, b); }
-
-static void predict_2d(const void *self, const quern_integrator_batch *b) { (void)self, predict(2, b); }
-static void predict_3d(const void *self, const quern_integrator_batch *b) { (void)self, predict(3, b); }
 
 static const quern_integrator_ops ops = { .size = sizeof ops,
 	.close = { close_2d, close_3d },

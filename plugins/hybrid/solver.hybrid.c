@@ -228,11 +228,6 @@ static uint32_t wants_of(const quern_bound *oracle, uint32_t n) {
 	return wants;
 }
 
-/* After which share of a substep grains get its impulse. */
-static quern_real ahead_of(const quern_integrator_ops *ops, uint32_t dim) {
-	return !ops->open[dim - 2] ? 0 : ops->at > 0 ? ops->at : 1;
-}
-
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
 	hybrid *h = self;
@@ -246,7 +241,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	h->moving = quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	h->affine = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->affine != 0;
 	h->solves = ((const quern_coupling_ops *)slot[SLOT_COUPLING][0].ops)->solve != NULL;
-	h->ahead = ahead_of(slot[SLOT_INTEGRATOR][0].ops, h->dim);
+	h->ahead = quern_integrator_ahead(slot[SLOT_INTEGRATOR][0].ops, h->dim);
 	const uint32_t wants = wants_of(slot[SLOT_ORACLE], n_slot[SLOT_ORACLE]);
 	h->ramped = h->ramped || h->weights == WEIGHTS_RAMP || wants & QUERN_ORACLE_WEIGHT;
 	h->marks = h->marks || wants & QUERN_ORACLE_MARKED;
