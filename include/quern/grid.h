@@ -2,6 +2,7 @@
 /* quern/grid.h - the sparse grid as a solver sees it: rows of eight numbers per node, one dense tile per block */
 #pragma once
 #include <quern/space.h>
+#include <string.h>
 
 /* One node of a row set. */
 typedef quern_real quern_row __attribute__((vector_size(64)));
@@ -153,8 +154,9 @@ QUERN_INLINE void quern_grid_corner(const quern_grid_view *g, uint32_t entry, qu
 QUERN_INLINE void quern_tile_load(
 	const quern_grid_view *g, const quern_row *rows, uint32_t b, quern_row *tile) {
 	const int32_t *entry = g->tile + (size_t)b * g->tile_size;
-	for (uint32_t i = 0; i < g->tile_size; i++)
-		tile[i] = entry[i] < 0 ? QUERN_VALUE(quern_row, 0) : rows[entry[i]];
+	const quern_row none = { 0 };
+	for (uint32_t i = 0; i < g->tile_size; i++) /* a chosen value would pass through memory */
+		memcpy(tile + i, entry[i] < 0 ? &none : rows + entry[i], sizeof none);
 }
 
 /* Adds a tile to its nodes; call it colour by colour, so that no two blocks add to one node at once. */

@@ -51,12 +51,14 @@ QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shap
 			for (uint32_t i = 0; i < n; i++) s->position[a][i] = from[i] - lower;
 	}
 	stencil_weigh(g, shape, n, s);
-	const int32_t span = (int32_t)g->span;
-	for (uint32_t i = 0; i < n; i++) {
-		int32_t node = 0;
-		for (uint32_t a = g->dim; a-- > 0;)
-			node = node * span + s->first[a][i] - (g->at[block][a] * (int32_t)g->edge - 1);
-		s->node[i] = node;
+	memset(s->node, 0, n * sizeof s->node[0]);
+	for (uint32_t a = g->dim; a-- > 0;) {
+		/* the tile begins a cell before the block */
+		const int32_t span = (int32_t)g->span, lowest = g->at[block][a] * (int32_t)g->edge - 1;
+		const int32_t *restrict first = s->first[a];
+		int32_t *restrict node = s->node;
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) node[i] = node[i] * span + first[i] - lowest;
 	}
 }
 
@@ -99,84 +101,127 @@ QUERN_INLINE parted_row parted(const quern_real l[QUERN_LANES]) {
 }
 #define PARTED(...) parted((const quern_real[QUERN_LANES]) { __VA_ARGS__ })
 
+/* A row's first four lanes carry what particles bring along and its last four what pushes: parts of the processor's that hold
+ * only one of the two are spared the work of the other. */
+enum { CARRIED = QUERN_LANES / 2 };
+QUERN_INLINE bool part_carries(const int k) { return k * PART_LANES < CARRIED; }
+QUERN_INLINE bool part_pushes(const int k) { return (k + 1) * PART_LANES > CARRIED; }
+
 /* What a particle sends: `base` to every node; `along` per metre of way from the particle to the node (a velocity
- * gradient); `slope` per unit of the function's slope (a stress). Lanes that `along` and `slope` use must differ. */
+ * gradient); `slope` per unit of the function's slope (a stress). The former two have the carried lanes, `slope` the others. */
 typedef struct sent {
 	parted_row base, along[3], slope[3];
 } sent;
+typedef enum sends { SENDS_BASE = 0, SENDS_ALONG = 1, SENDS_SLOPE = 2 } sends;
 
-QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent *p,
-	const quern_row *split_lanes, quern_row *tile, const int dim, quern_real way[3][3], int32_t span,
-	const int k) {
-	const row_part split = const_parts_of(split_lanes)[k], rest = 1 - split;
-	for (int z = 0; z < (dim == 3 ? 3 : 1); z++) {
-		row_part u = p->base.part[k], ax = p->along[0].part[k] + p->slope[0].part[k],
-				 ay = p->along[1].part[k], sy = p->slope[1].part[k];
+/* Nodes per axis of a tile, a constant where the dimension is one. */
+QUERN_INLINE uint32_t tile_span(const int dim) { return dim == 2 ? 12 : 8; }
+
+/* Lanes of the other kind are zero, and what is added for them does not change a bit: rows come out alike however they are cut.
+ * What is added may lie anywhere for all that the compiler knows: what nodes share is read before. */
+QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent *p, const int what,
+	quern_row *tile, const int dim, quern_real way[3][3], const int k) {
+	const bool carries = part_carries(k), along = carries && what & SENDS_ALONG,
+			   pushes = part_pushes(k) && what & SENDS_SLOPE;
+	const row_part none = { 0 };
+	if (!carries && !pushes) return;
+	const uint32_t span = tile_span(dim);
+	quern_row *const lowest = tile + s->node[i];
+	row_part value[3], slope[3], lean[3];
+	for (int x = 0; x < 3; x++) {
+		value[x] = s->value[0][x][i] + none;
+		slope[x] = s->slope[0][x][i] + none;
+		lean[x] = s->value[0][x][i] * way[0][x] + none;
+	}
+	for (uint32_t z = 0; z < (dim == 3 ? 3 : 1); z++) {
+		row_part base = p->base.part[k], ax = p->along[0].part[k], ay = p->along[1].part[k];
+		row_part sx = p->slope[0].part[k], sy = p->slope[1].part[k], sz = none;
 		if (dim == 3) {
 			const quern_real v = s->value[2][z][i];
-			u = v * (u + way[2][z] * p->along[2].part[k]) + s->slope[2][z][i] * p->slope[2].part[k];
-			ax = v * ax;
-			ay = v * ay;
-			sy = v * sy;
+			if (along) base += way[2][z] * p->along[2].part[k], ax *= v, ay *= v;
+			base *= v;
+			if (pushes) sx *= v, sy *= v, sz = s->slope[2][z][i] * p->slope[2].part[k];
 		}
-		for (int y = 0; y < 3; y++) {
+		for (uint32_t y = 0; y < 3; y++) {
 			const quern_real v = s->value[1][y][i];
-			const row_part e = v * (u + way[1][y] * ay) + s->slope[1][y][i] * sy, t = v * ax;
-			quern_row *row = tile + s->node[i] + (z * span + y) * span;
-			for (int x = 0; x < 3; x++) {
-				const quern_real w = s->value[0][x][i];
-				parts_of(row + x)[k] += w * e + (w * way[0][x] * rest + s->slope[0][x][i] * split) * t;
+			row_part even = none, tilt = none, push = none;
+			if (along) even = v * (base + way[1][y] * ay), tilt = v * ax;
+			else if (carries) even = v * base;
+			if (pushes) {
+				row_part cross = s->slope[1][y][i] * sy;
+				if (dim == 3) cross += v * sz;
+				even += cross;
+				push = v * sx;
+			}
+			for (uint32_t x = 0; x < 3; x++) {
+				row_part to = value[x] * even;
+				if (along) to += lean[x] * tilt;
+				if (pushes) to += slope[x] * push;
+				parts_of(lowest + (z * span + y) * span + x)[k] += to;
 			}
 		}
 	}
 }
 
-/* Adds one particle to the tile. `split` holds 1 in the lanes of `slope`, 0 elsewhere. */
-QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, const quern_row *split,
-	quern_row *tile, const int dim, quern_real cell, int32_t span) {
+/* Adds one particle to the tile; `what`, a constant, names the rows of `p` that hold something beside `base`. */
+QUERN_INLINE void stencil_scatter(const stencil *s, uint32_t i, const sent *p, const int what,
+	quern_row *tile, const int dim, quern_real cell) {
 	quern_real way[3][3] = { { 0 } };
-	for (int a = 0; a < dim; a++)
+	for (int a = 0; a < dim && what & SENDS_ALONG; a++)
 		for (int k = 0; k < 3; k++) way[a][k] = (quern_real)(s->first[a][i] + k) * cell - s->position[a][i];
-	for (int k = 0; k < PARTS; k++) stencil_scatter_part(s, i, p, split, tile, dim, way, span, k);
+	stencil_scatter_part(s, i, p, what, tile, dim, way, 0);
+	if (PARTS > 1) stencil_scatter_part(s, i, p, what, tile, dim, way, 1);
+	if (PARTS > 2) {
+		stencil_scatter_part(s, i, p, what, tile, dim, way, 2);
+		stencil_scatter_part(s, i, p, what, tile, dim, way, 3);
+	}
 }
 
 QUERN_INLINE void stencil_gather_part(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
-	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4], int32_t span, const int k) {
+	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4], const int k) {
+	const bool sloped = slopes && part_carries(k);
+	const uint32_t span = tile_span(dim);
 	row_part sum = { 0 }, sx = { 0 }, sy = { 0 }, sz = { 0 };
-	for (int z = 0; z < (dim == 3 ? 3 : 1); z++) {
+	for (uint32_t z = 0; z < (dim == 3 ? 3 : 1); z++) {
 		row_part u = { 0 }, ux = { 0 }, uy = { 0 };
-		for (int y = 0; y < 3; y++) {
+		for (uint32_t y = 0; y < 3; y++) {
 			const quern_row *row = tile + s->node[i] + (z * span + y) * span;
 			const row_part a = const_parts_of(row)[k], b = const_parts_of(row + 1)[k],
 						   c = const_parts_of(row + 2)[k];
 			const row_part e = s->value[0][0][i] * a + s->value[0][1][i] * b + s->value[0][2][i] * c;
 			u += s->value[1][y][i] * e;
-			if (!slopes) continue;
+			if (!sloped) continue;
 			const row_part d = slope[0][0][i] * a + slope[0][1][i] * b + slope[0][2][i] * c;
 			ux += s->value[1][y][i] * d;
 			uy += slope[1][y][i] * e;
 		}
 		const quern_real v = dim == 3 ? s->value[2][z][i] : 1;
 		sum += v * u;
+		if (!sloped) continue;
 		sx += v * ux;
 		sy += v * uy;
 		if (dim == 3) sz += slope[2][z][i] * u;
 	}
 	parts_of(&out[0])[k] = sum;
-	if (slopes) parts_of(&out[1])[k] = sx, parts_of(&out[2])[k] = sy, parts_of(&out[3])[k] = sz;
+	if (sloped) parts_of(&out[1])[k] = sx, parts_of(&out[2])[k] = sy, parts_of(&out[3])[k] = sz;
 }
 
 /* The weighted sum of a tile's rows at one particle in out[0]; with `slopes`, in out[1 + axis] their sums with what
- * `slope` has in place of the weights along that axis. */
+ * `slope` has in place of the weights along that axis, of the carried lanes alone. */
 QUERN_INLINE void stencil_gather_by(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
-	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4], int32_t span) {
-	for (int k = 0; k < PARTS; k++) stencil_gather_part(s, i, tile, dim, slopes, slope, out, span, k);
+	const bool slopes, const quern_real slope[3][3][STENCIL], quern_row out[4]) {
+	stencil_gather_part(s, i, tile, dim, slopes, slope, out, 0);
+	if (PARTS > 1) stencil_gather_part(s, i, tile, dim, slopes, slope, out, 1);
+	if (PARTS > 2) {
+		stencil_gather_part(s, i, tile, dim, slopes, slope, out, 2);
+		stencil_gather_part(s, i, tile, dim, slopes, slope, out, 3);
+	}
 }
 
 /* The same with the functions' own slopes. */
 QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
-	const bool slopes, quern_row out[4], int32_t span) {
-	stencil_gather_by(s, i, tile, dim, slopes, s->slope, out, span);
+	const bool slopes, quern_row out[4]) {
+	stencil_gather_by(s, i, tile, dim, slopes, s->slope, out);
 }
 
 /* ---- all blocks, where they add to nodes ---- */

@@ -48,7 +48,7 @@ QUERN_INLINE void trips_hear(trip_memory *m, uint32_t i, const quern_row *row, i
 QUERN_INLINE void trips_hear_echo(const trips *t, trip_memory *m, uint32_t n, const int dim) {
 	for (uint32_t i = 0; i < n && t->echo; i++) {
 		quern_row v[4];
-		stencil_gather(&m->stencil, i, m->echoes, dim, false, v, (int32_t)t->g->span);
+		stencil_gather(&m->stencil, i, m->echoes, dim, false, v);
 		for (int k = 0; k < dim; k++) m->echo[k][i] = v[0][k];
 	}
 }
@@ -74,7 +74,7 @@ static inline void trips_call(const trips *t, trip_memory *m, fit_memory *fit, q
 QUERN_INLINE void trips_send(const trips *t, trip_memory *m, uint32_t i, quern_real mass, const int dim) {
 	sent p = { 0 };
 	p.base = PARTED(mass * m->send[0][i], mass * m->send[1][i], dim == 3 ? mass * m->send[2][i] : 0);
-	stencil_scatter(&m->stencil, i, &p, &(quern_row) { 0 }, m->sent, dim, t->g->cell, (int32_t)t->g->span);
+	stencil_scatter(&m->stencil, i, &p, SENDS_BASE, m->sent, dim, t->g->cell);
 }
 
 /* ---- all blocks ---- */

@@ -58,7 +58,7 @@ QUERN_INLINE void load_coupled(const back_work *w, back_memory *m, uint32_t n, c
 	for (uint32_t k = 0; k < n; k++) {
 		quern_row v[4];
 		const bool slopes = w->h->rest > 0;
-		stencil_gather(&m->trip.stencil, k, m->mixture, dim, slopes, v, (int32_t)w->g->span);
+		stencil_gather(&m->trip.stencil, k, m->mixture, dim, slopes, v);
 		for (int c = 0; c < dim && slopes; c++)
 			for (int a = 0; a < dim; a++) m->gradient[dim * c + a][k] = v[1 + a][1 + c];
 		trips_hear(&m->trip, k, &v[0], 1, dim);

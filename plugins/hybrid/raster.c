@@ -28,7 +28,7 @@ QUERN_INLINE sent send_grain(
 	p.base = PARTED(mass, mass * u[0][i], mass * u[1][i], dim == 3 ? mass * u[2][i] : 0);
 	if (!affine) return p;
 	quern_row v[4];
-	stencil_gather(&m->stencil, k, m->motion, dim, true, v, (int32_t)w->g->span);
+	stencil_gather(&m->stencil, k, m->motion, dim, true, v);
 	for (int a = 0; a < dim; a++)
 		p.along[a] = PARTED(0, mass * v[1 + a][0], mass * v[1 + a][1], dim == 3 ? mass * v[1 + a][2] : 0);
 	return p;
@@ -50,7 +50,7 @@ QUERN_INLINE void raster_block(const raster_work *w, raster_memory *m, uint32_t 
 			const company c = company_of(&m->stencil, k, m->mass, dim, span, least);
 			if (!c.any || !(w->grains.weight[grain[k]] > 0)) continue;
 			const sent p = send_grain(w, m, k, (uint32_t)grain[k], w->h->affine && c.all, dim);
-			stencil_scatter(&m->stencil, k, &p, &(quern_row) { 0 }, m->sum, dim, w->g->cell, span);
+			stencil_scatter(&m->stencil, k, &p, SENDS_ALONG, m->sum, dim, w->g->cell);
 		}
 	}
 	quern_tile_add(w->g, w->mixture, b, m->sum);

@@ -70,7 +70,7 @@ QUERN_INLINE void collect_chunk(
 	const gather_work *w, gather_memory *m, uint32_t n, const int dim, const bool slopes) {
 	for (uint32_t i = 0; i < n; i++) {
 		quern_row v[4];
-		stencil_gather(&m->trip.stencil, i, m->tile, dim, slopes, v, (int32_t)w->g->span);
+		stencil_gather(&m->trip.stencil, i, m->tile, dim, slopes, v);
 		trips_hear(&m->trip, i, &v[0], 0, dim);
 		for (int k = 0; k < dim; k++)
 			for (int a = 0; a < dim && slopes; a++) m->gradient[dim * k + a][i] = v[1 + a][k];
@@ -97,7 +97,7 @@ QUERN_INLINE void fit_chunk(const gather_work *w, gather_memory *m, uint32_t n, 
 	fit_slopes(&m->trip.stencil, n, dim, inverse, &m->fit);
 	for (uint32_t i = 0; i < n; i++) {
 		quern_row v[4];
-		stencil_gather_by(&m->trip.stencil, i, m->tile, dim, true, slope, v, (int32_t)w->g->span);
+		stencil_gather_by(&m->trip.stencil, i, m->tile, dim, true, slope, v);
 		for (int k = 0; k < dim; k++)
 			for (int a = 0; a < dim; a++) m->fit.fit[dim * k + a][i] = v[1 + a][k];
 	}
@@ -130,11 +130,28 @@ static const quern_real evening = 10;
 /* What is full, over what was full at first: that varies by so much. */
 static const quern_real dead_band = 1.01;
 
-/* A tile may reach far beyond the end of a period, where no cells are: what is counted in cells comes back before that. */
-QUERN_INLINE bool beyond_period(const gather_work *w, uint32_t k, quern_real x) {
+/* From where to where along an axis, in cells from the block's corner, a point may be until the next sort: where all nodes that it reaches
+ * are in the tile. That may reach far beyond the end of a period, where no cells are: what is counted in cells comes back before that. */
+static void reach_of(const gather_work *w, uint32_t b, uint32_t k, quern_real reach[2]) {
 	const quern_grid_view *g = w->g;
-	const quern_real at = (x - g->lower[k]) / g->cell;
-	return w->p->alone && g->periodic[k] && (at < -0.5 || at >= g->cells[k] + 0.5);
+	const quern_real begin = (quern_real)(g->at[b][k] * (int32_t)g->edge), end = g->cells[k] - begin + 0.5;
+	reach[0] = -0.5;
+	reach[1] = (quern_real)g->edge + 0.5;
+	if (w->p->alone && g->periodic[k] && end < reach[1]) reach[1] = end;
+}
+
+QUERN_INLINE bool one_leaves(
+	const gather_work *w, uint32_t b, uint32_t k, const quern_real *restrict x, uint32_t n) {
+	const quern_real lower = w->g->lower[k], inverse = 1 / w->g->cell,
+					 begin = (quern_real)(w->g->at[b][k] * (int32_t)w->g->edge);
+	quern_real reach[2];
+	reach_of(w, b, k, reach);
+	int leaves = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real t = (x[i] - lower) * inverse - begin;
+		leaves |= !(t >= reach[0]) | !(t <= reach[1]);
+	}
+	return leaves;
 }
 
 /* x += dt sum S v; V *= det(1 + dt L); true density m/V */
@@ -156,9 +173,7 @@ QUERN_INLINE void move_chunk(
 		const quern_real *restrict v = m->trip.pic[k];
 		QUERN_SIMD
 		for (uint32_t i = 0; i < n; i++) x[i] += dt * v[i];
-		for (uint32_t i = 0; i < n; i++)
-			if (!stencil_holds(w->g, b, (uint32_t)k, x[i]) || beyond_period(w, (uint32_t)k, x[i]))
-				w->moved[b] = 1;
+		if (one_leaves(w, b, (uint32_t)k, x, n)) w->moved[b] = 1;
 	}
 	QUERN_SIMD
 	for (uint32_t i = 0; i < n; i++) {
@@ -401,15 +416,36 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 	((const quern_material_ops *)material->ops)->update[dim - 2](material->self, &b);
 }
 
-/* What the material left: volume from its density, what is stored for others, and whether all is sound. */
-static void finish_chunk(
-	const gather_work *w, const gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
+/* Points from i to `end` of a chunk that is not one: all that are finite, keep a volume and go no farther than a cell. */
+QUERN_INLINE bool are_sound(const gather_work *w, const gather_memory *m, uint32_t begin, uint32_t i,
+	uint32_t end, const int dim) {
 	const quern_column *u = w->s->use;
-	const uint32_t dim = w->s->dim;
-	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, most = w->g->cell / w->s->dt;
+	const quern_real most = w->g->cell / w->s->dt, *restrict volume = u[GATHER_VOLUME].real[0] + begin;
+	const int parts = dim == 3 ? 6 : 3;
+	const quern_real *stress[6], *velocity[3];
+	for (int k = 0; k < parts; k++) stress[k] = u[GATHER_STRESS].real[k] + begin;
+	for (int k = 0; k < dim; k++) velocity[k] = m->trip.pic[k];
+	int unsound = 0;
+	for (; i < end; i++) {
+		quern_real speed2 = 0, sum = volume[i];
+		for (int k = 0; k < dim; k++) speed2 += velocity[k][i] * velocity[k][i];
+		for (int k = 0; k < parts; k++) sum += fabs(stress[k][i]);
+		unsound |= !(speed2 <= most * most) | !(sum < INFINITY) | !(volume[i] > 0);
+	}
+	return !unsound;
+}
+
+/* What the material left: volume from its density, what is stored for others, and whether all is sound. */
+QUERN_INLINE void finish_chunk(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t begin,
+	uint32_t n, const int axes) {
+	const quern_column *u = w->s->use;
+	const uint32_t dim = (uint32_t)axes;
+	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, *restrict density = m->density,
+					 *restrict moved = m->moved;
 	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin;
 	/* whatever a material makes of a negative density, a point that was turned inside out stays so */
-	for (uint32_t i = 0; i < n; i++) volume[i] = m->moved[i] > 0 ? mass[i] / m->density[i] : m->moved[i];
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) volume[i] = moved[i] > 0 ? mass[i] / density[i] : moved[i];
 	const quern_real(*given)[STENCIL] = w->p->matrix ? m->fit.affine : m->gradient;
 	for (uint32_t k = 0; k < dim * dim && u[GATHER_GRADIENT].real[0]; k++)
 		memcpy(u[GATHER_GRADIENT].real[k] + begin, m->gradient[k], n * sizeof(quern_real));
@@ -420,14 +456,9 @@ static void finish_chunk(
 		for (uint32_t k = 0; k < dim; k++) trace += u[GATHER_STRESS].real[k][begin + i];
 		u[GATHER_PRESSURE].real[0][begin + i] = -trace / dim;
 	}
-	for (uint32_t i = 0; i < n; i++) {
-		quern_real speed2 = 0, sum = volume[i];
-		for (uint32_t k = 0; k < dim; k++) speed2 += m->trip.pic[k][i] * m->trip.pic[k][i];
-		for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
-			sum += fabs(u[GATHER_STRESS].real[k][begin + i]);
-		if (speed2 <= most * most && sum < INFINITY && volume[i] > 0) continue;
-		if (w->bad[b] < 0) w->bad[b] = (int32_t)(begin + i);
-	}
+	if (are_sound(w, m, begin, 0, n, axes)) return;
+	for (uint32_t i = 0; i < n && w->bad[b] < 0; i++)
+		if (!are_sound(w, m, begin, i, i + 1, axes)) w->bad[b] = (int32_t)(begin + i);
 }
 
 QUERN_INLINE void gather_block(
@@ -458,7 +489,7 @@ QUERN_INLINE void gather_block(
 		call_material(w, m, i, n);
 		for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
 			memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
-		finish_chunk(w, m, b, i, n);
+		finish_chunk(w, m, b, i, n, dim);
 	}
 	if (last && w->calm.part)
 		calm_block(

@@ -45,9 +45,10 @@ typedef struct mpm_fill {
 
 enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
 
-/* Lanes of a node's row (mass, momentum, force, held) and of its motion (velocity, change, density, grip). */
-QUERN_INLINE uint32_t node_force(uint32_t dim) { return 1 + dim; }
-QUERN_INLINE uint32_t node_held(uint32_t dim) { return 1 + 2 * dim; }
+/* Lanes of a node's row (mass, momentum, held, force: in 2-D too the force has the second half) and of its motion
+ * (velocity, change, density, grip). */
+QUERN_INLINE uint32_t node_held(uint32_t dim) { return 1 + dim; }
+QUERN_INLINE uint32_t node_force(uint32_t dim) { return 2 + dim; }
 QUERN_INLINE uint32_t motion_change(uint32_t dim) { return dim; }
 QUERN_INLINE uint32_t motion_density(uint32_t dim) { return 2 * dim; }
 QUERN_INLINE uint32_t motion_grip(uint32_t dim) { return 2 * dim + 1; }

@@ -79,10 +79,10 @@ QUERN_USE_ENUM(SORT_USES);
 	X(SCATTER_AFFINE, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL) \
 	X(SCATTER_NODE_MASS, "node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass.") \
 	X(SCATTER_NODE_MOMENTUM, "node.momentum", "kg m/s", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted momentum.") \
+	X(SCATTER_NODE_HELD, "node.held", "kg", QUERN_ADD, QUERN_SCALAR, \
+		.doc = "Mass of the cell above the node, by hats around the centres of cells: of a continuum alone, where it is counted.") \
 	X(SCATTER_NODE_FORCE, "node.force", "N", QUERN_ADD, QUERN_VECTOR, .doc = "Weighted internal force.") \
 	X(SCATTER_AFFINE_WANTED, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .when = "affine") \
-	X(SCATTER_NODE_HELD, "node.held", "kg", QUERN_ADD, QUERN_SCALAR, .when = "alone", \
-		.doc = "Mass of the cell above the node, by hats around the centres of cells.") \
 	X(SCATTER_UNCOUNTED, UNCOUNTED_USE(QUERN_UPDATE))
 QUERN_USE_ENUM(SCATTER_USES);
 

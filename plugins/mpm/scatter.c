@@ -13,33 +13,51 @@ typedef struct {
 	bool counts; /* what cells hold */
 } scatter_work;
 
+/* Of a chunk: mass and momentum, minus volume times stress, mass times velocity gradient. */
 typedef struct {
 	quern_row tile[QUERN_TILE_MOST];
 	stencil stencil;
+	_Alignas(64) quern_real base[4][STENCIL], push[6][STENCIL], along[9][STENCIL];
 } scatter_memory;
 
-QUERN_INLINE sent send_point(const quern_column *u, uint32_t i, const int dim) {
-	const quern_real weight = u[SCATTER_WEIGHT].real[0] ? u[SCATTER_WEIGHT].real[0][i] : 1;
-	const quern_real m = weight * u[SCATTER_MASS].real[0][i], volume = -weight * u[SCATTER_VOLUME].real[0][i];
-	quern_real *const *v = u[SCATTER_VELOCITY].real;
-	const symmetric t = SYMMETRIC_AT(u[SCATTER_STRESS].real, i, dim);
-	quern_real *const *l = u[SCATTER_AFFINE].real; /* m (v + L (x_i - x)) */
-	sent p;
-	if (dim == 2) {
-		p.base = PARTED(m, m * v[0][i], m * v[1][i]);
-		p.slope[0] = PARTED(0, 0, 0, volume * t.xx, volume * t.xy);
-		p.slope[1] = PARTED(0, 0, 0, volume * t.xy, volume * t.yy);
-		p.slope[2] = PARTED(0);
-	} else {
-		p.base = PARTED(m, m * v[0][i], m * v[1][i], m * v[2][i]);
-		p.slope[0] = PARTED(0, 0, 0, 0, volume * t.xx, volume * t.xy, volume * t.xz);
-		p.slope[1] = PARTED(0, 0, 0, 0, volume * t.xy, volume * t.yy, volume * t.yz);
-		p.slope[2] = PARTED(0, 0, 0, 0, volume * t.xz, volume * t.yz, volume * t.zz);
+QUERN_INLINE void times(quern_real *restrict to, const quern_real *restrict by, const quern_real *restrict column, uint32_t n) {
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) to[i] = by[i] * column[i];
+}
+
+/* Column by column: point by point each would wait for memory in its turn. */
+QUERN_INLINE void load_chunk(
+	const quern_column *u, scatter_memory *m, uint32_t begin, uint32_t n, const int dim, const bool affine) {
+	const quern_real *restrict weight = u[SCATTER_WEIGHT].real[0];
+	quern_real volume[STENCIL];
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real part = weight ? weight[begin + i] : 1;
+		m->base[0][i] = part * u[SCATTER_MASS].real[0][begin + i];
+		volume[i] = -part * u[SCATTER_VOLUME].real[0][begin + i];
 	}
-	for (int a = 0; a < 3; a++)
-		p.along[a] = !l[0] || a >= dim
-						 ? PARTED(0)
-						 : PARTED(0, m * l[a][i], m * l[dim + a][i], dim == 3 ? m * l[2 * dim + a][i] : 0);
+	for (int k = 0; k < dim; k++) times(m->base[1 + k], m->base[0], u[SCATTER_VELOCITY].real[k] + begin, n);
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, (uint32_t)dim); k++)
+		times(m->push[k], volume, u[SCATTER_STRESS].real[k] + begin, n);
+	for (int k = 0; k < dim * dim && affine; k++)
+		times(m->along[k], m->base[0], u[SCATTER_AFFINE].real[k] + begin, n);
+}
+
+QUERN_INLINE sent send_point(scatter_memory *m, uint32_t i, const int dim, const bool affine) {
+	quern_real *const push[] = { m->push[0], m->push[1], m->push[2], m->push[3], m->push[4], m->push[5] };
+	const symmetric t = SYMMETRIC_AT(push, i, dim);
+	sent p = { 0 };
+	if (dim == 2) {
+		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i]);
+		p.slope[0] = PARTED(0, 0, 0, 0, t.xx, t.xy);
+		p.slope[1] = PARTED(0, 0, 0, 0, t.xy, t.yy);
+	} else {
+		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i], m->base[3][i]);
+		p.slope[0] = PARTED(0, 0, 0, 0, 0, t.xx, t.xy, t.xz);
+		p.slope[1] = PARTED(0, 0, 0, 0, 0, t.xy, t.yy, t.yz);
+		p.slope[2] = PARTED(0, 0, 0, 0, 0, t.xz, t.yz, t.zz);
+	}
+	for (int a = 0; a < dim && affine; a++) /* m (v + L (x_i - x)) */
+		p.along[a] = PARTED(0, m->along[a][i], m->along[dim + a][i], dim == 3 ? m->along[2 * dim + a][i] : 0);
 	return p;
 }
 
@@ -71,34 +89,36 @@ QUERN_INLINE void count_point(
 	}
 }
 
-QUERN_INLINE void scatter_block(const scatter_work *w, scatter_memory *m, uint32_t b, const int dim) {
+QUERN_INLINE void scatter_block(
+	const scatter_work *w, scatter_memory *m, uint32_t b, const int dim, const bool affine) {
 	const quern_column *u = w->s->use;
 	const uint32_t begin = w->point[b], end = w->point[b + 1];
-	const quern_row split =
-		dim == 2 ? (quern_row) { 0, 0, 0, 1, 1, 0, 0, 0 } : (quern_row) { 0, 0, 0, 0, 1, 1, 1, 0 };
 	if (begin == end) return;
 	memset(m->tile, 0, w->g->tile_size * sizeof(quern_row));
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[SCATTER_POSITION].real, i, NULL, n, &m->stencil);
+		load_chunk(u, m, i, n, dim, affine);
 		for (uint32_t k = 0; k < n; k++) {
-			const sent p = send_point(u, i + k, dim);
-			stencil_scatter(&m->stencil, k, &p, &split, m->tile, dim, w->g->cell, (int32_t)w->g->span);
+			const sent p = send_point(m, k, dim, affine);
+			stencil_scatter(&m->stencil, k, &p, affine ? SENDS_SLOPE | SENDS_ALONG : SENDS_SLOPE, m->tile,
+				dim, w->g->cell);
 			if (w->counts) count_point(w, m, b, k, u[SCATTER_MASS].real[0][i + k], dim);
 		}
 	}
 	quern_tile_add(w->g, w->node, b, m->tile);
 }
 
-static void scatter_2d(void *arg, uint32_t b, uint32_t worker) {
+static void scatter_one(void *arg, uint32_t b, uint32_t worker) {
 	const scatter_work *w = arg;
+	const bool affine = w->s->use[SCATTER_AFFINE].real[0];
 	scatter_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
-	if (m) scatter_block(w, m, b, 2);
-}
-static void scatter_3d(void *arg, uint32_t b, uint32_t worker) {
-	const scatter_work *w = arg;
-	scatter_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
-	if (m) scatter_block(w, m, b, 3);
+	if (!m) return;
+	if (w->s->dim == 2) {
+		if (affine) scatter_block(w, m, b, 2, true);
+		else scatter_block(w, m, b, 2, false);
+	} else if (affine) scatter_block(w, m, b, 3, true);
+	else scatter_block(w, m, b, 3, false);
 }
 
 quern_status quern_mpm_scatter(const void *self, const quern_step *s) {
@@ -113,6 +133,6 @@ quern_status quern_mpm_scatter(const void *self, const quern_step *s) {
 		w.counts = s->step == s->stage_step || *uncounted % COUNT_EVERY == 0;
 		*uncounted = w.counts ? 1 : *uncounted + 1;
 	}
-	if (points.n) stencil_by_colour(s, w.g, s->dim == 2 ? scatter_2d : scatter_3d, &w);
+	if (points.n) stencil_by_colour(s, w.g, scatter_one, &w);
 	return QUERN_OK;
 }
