@@ -219,8 +219,8 @@ QUERN_INLINE void stencil_gather_by(const stencil *s, uint32_t i, const quern_ro
 }
 
 /* The same with the functions' own slopes. */
-QUERN_INLINE void stencil_gather(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
-	const bool slopes, quern_row out[4]) {
+QUERN_INLINE void stencil_gather(
+	const stencil *s, uint32_t i, const quern_row *tile, const int dim, const bool slopes, quern_row out[4]) {
 	stencil_gather_by(s, i, tile, dim, slopes, s->slope, out);
 }
 

@@ -417,8 +417,8 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 }
 
 /* Points from i to `end` of a chunk that is not one: all that are finite, keep a volume and go no farther than a cell. */
-QUERN_INLINE bool are_sound(const gather_work *w, const gather_memory *m, uint32_t begin, uint32_t i,
-	uint32_t end, const int dim) {
+QUERN_INLINE bool are_sound(
+	const gather_work *w, const gather_memory *m, uint32_t begin, uint32_t i, uint32_t end, const int dim) {
 	const quern_column *u = w->s->use;
 	const quern_real most = w->g->cell / w->s->dt, *restrict volume = u[GATHER_VOLUME].real[0] + begin;
 	const int parts = dim == 3 ? 6 : 3;
@@ -436,12 +436,12 @@ QUERN_INLINE bool are_sound(const gather_work *w, const gather_memory *m, uint32
 }
 
 /* What the material left: volume from its density, what is stored for others, and whether all is sound. */
-QUERN_INLINE void finish_chunk(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t begin,
-	uint32_t n, const int axes) {
+QUERN_INLINE void finish_chunk(
+	const gather_work *w, const gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int axes) {
 	const quern_column *u = w->s->use;
 	const uint32_t dim = (uint32_t)axes;
 	const quern_real *restrict mass = u[GATHER_MASS].real[0] + begin, *restrict density = m->density,
-					 *restrict moved = m->moved;
+							   *restrict moved = m->moved;
 	quern_real *restrict volume = u[GATHER_VOLUME].real[0] + begin;
 	/* whatever a material makes of a negative density, a point that was turned inside out stays so */
 	QUERN_SIMD

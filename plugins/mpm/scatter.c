@@ -13,14 +13,15 @@ typedef struct {
 	bool counts; /* what cells hold */
 } scatter_work;
 
-/* Of a chunk: mass and momentum, minus volume times stress, mass times velocity gradient. */
+/* Of a chunk: mass and momentum, volume times stress, mass times velocity gradient. */
 typedef struct {
 	quern_row tile[QUERN_TILE_MOST];
 	stencil stencil;
 	_Alignas(64) quern_real base[4][STENCIL], push[6][STENCIL], along[9][STENCIL];
 } scatter_memory;
 
-QUERN_INLINE void times(quern_real *restrict to, const quern_real *restrict by, const quern_real *restrict column, uint32_t n) {
+QUERN_INLINE void times(
+	quern_real *restrict to, const quern_real *restrict by, const quern_real *restrict column, uint32_t n) {
 	QUERN_SIMD
 	for (uint32_t i = 0; i < n; i++) to[i] = by[i] * column[i];
 }
@@ -28,13 +29,11 @@ QUERN_INLINE void times(quern_real *restrict to, const quern_real *restrict by, 
 /* Column by column: point by point each would wait for memory in its turn. */
 QUERN_INLINE void load_chunk(
 	const quern_column *u, scatter_memory *m, uint32_t begin, uint32_t n, const int dim, const bool affine) {
-	const quern_real *restrict weight = u[SCATTER_WEIGHT].real[0];
-	quern_real volume[STENCIL];
-	for (uint32_t i = 0; i < n; i++) {
-		const quern_real part = weight ? weight[begin + i] : 1;
-		m->base[0][i] = part * u[SCATTER_MASS].real[0][begin + i];
-		volume[i] = -part * u[SCATTER_VOLUME].real[0][begin + i];
-	}
+	const quern_real *weight = u[SCATTER_WEIGHT].real[0];
+	quern_real part[STENCIL], volume[STENCIL];
+	for (uint32_t i = 0; i < n; i++) part[i] = weight ? weight[begin + i] : 1;
+	times(m->base[0], part, u[SCATTER_MASS].real[0] + begin, n);
+	times(volume, part, u[SCATTER_VOLUME].real[0] + begin, n);
 	for (int k = 0; k < dim; k++) times(m->base[1 + k], m->base[0], u[SCATTER_VELOCITY].real[k] + begin, n);
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, (uint32_t)dim); k++)
 		times(m->push[k], volume, u[SCATTER_STRESS].real[k] + begin, n);
@@ -48,13 +47,13 @@ QUERN_INLINE sent send_point(scatter_memory *m, uint32_t i, const int dim, const
 	sent p = { 0 };
 	if (dim == 2) {
 		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i]);
-		p.slope[0] = PARTED(0, 0, 0, 0, t.xx, t.xy);
-		p.slope[1] = PARTED(0, 0, 0, 0, t.xy, t.yy);
+		p.slope[0] = PARTED(0, 0, 0, 0, -t.xx, -t.xy);
+		p.slope[1] = PARTED(0, 0, 0, 0, -t.xy, -t.yy);
 	} else {
 		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i], m->base[3][i]);
-		p.slope[0] = PARTED(0, 0, 0, 0, 0, t.xx, t.xy, t.xz);
-		p.slope[1] = PARTED(0, 0, 0, 0, 0, t.xy, t.yy, t.yz);
-		p.slope[2] = PARTED(0, 0, 0, 0, 0, t.xz, t.yz, t.zz);
+		p.slope[0] = PARTED(0, 0, 0, 0, 0, -t.xx, -t.xy, -t.xz);
+		p.slope[1] = PARTED(0, 0, 0, 0, 0, -t.xy, -t.yy, -t.yz);
+		p.slope[2] = PARTED(0, 0, 0, 0, 0, -t.xz, -t.yz, -t.zz);
 	}
 	for (int a = 0; a < dim && affine; a++) /* m (v + L (x_i - x)) */
 		p.along[a] = PARTED(0, m->along[a][i], m->along[dim + a][i], dim == 3 ? m->along[2 * dim + a][i] : 0);
