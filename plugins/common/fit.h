@@ -51,7 +51,7 @@ QUERN_INLINE void fit_slopes(
 static inline bool fit_has_moments(const quern_bound *shape, uint32_t dim) {
 	const quern_grid_view plain = { .cell = 1, .dim = dim, .periodic = { true, true, true } };
 	stencil s = { .position = { { 2 }, { 2 }, { 2 } } };
-	stencil_weigh(&plain, shape, 1, &s);
+	stencil_weigh(&plain, shape, EVERYWHERE, 1, &s);
 	return fit_moment(s.first[0][0] - 2, s.value[0][0][0], s.value[0][1][0], s.value[0][2][0]) >= fit_least;
 }
 

@@ -27,13 +27,23 @@ QUERN_INLINE void stencil_place(const quern_grid_view *g, uint32_t block, uint32
 			quern_image_at(x[index[i]] - g->lower[axis], middle, images.half[axis], images.length[axis]);
 }
 
+/* The walls along an axis that particles in the tile of a block may be near to; of all the domain: `block` is EVERYWHERE. */
+enum { EVERYWHERE = -1 };
+QUERN_INLINE void stencil_walls(const quern_grid_view *g, int64_t block, uint32_t axis, int32_t wall[2]) {
+	const int32_t edge = (int32_t)g->edge, at = block < 0 ? 0 : g->at[block][axis];
+	const bool low = !g->periodic[axis] && (block < 0 || at == 0),
+			   high = !g->periodic[axis] && (block < 0 || (at + 1) * edge + 2 >= g->cells[axis]);
+	wall[0] = low ? 0 : INT32_MIN;
+	wall[1] = high ? g->cells[axis] : INT32_MAX;
+}
+
 /* Weights and slopes at the positions that stand in s. */
-QUERN_INLINE void stencil_weigh(const quern_grid_view *g, const quern_bound *shape, uint32_t n, stencil *s) {
+QUERN_INLINE void stencil_weigh(
+	const quern_grid_view *g, const quern_bound *shape, int64_t block, uint32_t n, stencil *s) {
 	quern_shape_batch b = { .n = n, .cap = STENCIL, .dim = g->dim, .inverse_cell = 1 / g->cell };
 	for (uint32_t a = 0; a < g->dim; a++) {
 		b.position[a] = s->position[a];
-		b.wall[a][0] = g->periodic[a] ? INT32_MIN : 0;
-		b.wall[a][1] = g->periodic[a] ? INT32_MAX : g->cells[a];
+		stencil_walls(g, block, a, b.wall[a]);
 		b.first[a] = s->first[a];
 		for (int k = 0; k < 3; k++) b.value[a][k] = s->value[a][k], b.slope[a][k] = s->slope[a][k];
 	}
@@ -50,7 +60,7 @@ QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shap
 		else
 			for (uint32_t i = 0; i < n; i++) s->position[a][i] = from[i] - lower;
 	}
-	stencil_weigh(g, shape, n, s);
+	stencil_weigh(g, shape, block, n, s);
 	memset(s->node, 0, n * sizeof s->node[0]);
 	for (uint32_t a = g->dim; a-- > 0;) {
 		/* the tile begins a cell before the block */

@@ -87,7 +87,7 @@ static void look_ahead(const gather_work *w, gather_memory *m, uint32_t n) {
 			const quern_real way = dt * m->trip.pic[a][i], held = way < most ? way : most;
 			m->fit.there.position[a][i] = m->trip.stencil.position[a][i] + (held > -most ? held : -most);
 		}
-	stencil_weigh(w->g, &w->s->slot[SLOT_SHAPE][0], n, &m->fit.there);
+	stencil_weigh(w->g, &w->s->slot[SLOT_SHAPE][0], EVERYWHERE, n, &m->fit.there);
 }
 
 /* The linear field that fits what the nodes say, point by point. */

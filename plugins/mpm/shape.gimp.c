@@ -18,37 +18,42 @@ static const quern_use uses[] = { QUERN_END_USES };
 
 /* With f in [l, 1 + l) the way from the lowest node, in cells, and l < 1/2, that node is seen from beyond l. The
  * middle weight follows from the others: they sum to one and their slopes to zero. */
-static void weights(const void *self, const quern_shape_batch *b) {
-	const quern_real l = ((const gimp *)self)->half_width, inverse = b->inverse_cell, quarter = 1 / (4 * l);
-	for (uint32_t a = 0; a < b->dim; a++) {
-		const quern_real *restrict x = b->position[a];
-		int32_t *restrict first = b->first[a];
-		quern_real *restrict w0 = b->value[a][0], *restrict w1 = b->value[a][1],
-							 *restrict w2 = b->value[a][2];
-		quern_real *restrict g0 = b->slope[a][0], *restrict g1 = b->slope[a][1],
-							 *restrict g2 = b->slope[a][2];
-		const bool low = b->wall[a][0] != INT32_MIN, high = b->wall[a][1] != INT32_MAX;
-		const quern_real lowest = low ? (quern_real)b->wall[a][0] : -0x1p40,
-						 highest = high ? (quern_real)b->wall[a][1] : 0x1p40;
-		QUERN_SIMD
-		for (uint32_t i = 0; i < b->n; i++) {
-			const quern_real t = x[i] * inverse, base = quern_floor(t - l), f = t - base;
-			const quern_real near = 1 + l - f, beyond = f - (1 - l), far = beyond > 0 ? beyond : 0;
-			const bool linear = f < 1 - l;
-			const quern_real a0 = linear ? 1 - f : near * near * quarter, a2 = far * far * quarter;
-			const quern_real d0 = linear ? -1 : -2 * near * quarter, d2 = 2 * far * quarter;
-			/* folding at a wall closer than l: S_0 += 2 S_-1, S_1 -= S_-1 gives 1 - t and t */
-			const bool at_low = t<lowest + l, at_high = t> highest - l, folded = at_low | at_high;
-			const quern_real start = at_low ? lowest : at_high ? highest - 1 : base, hat = t - start;
-			first[i] = (int32_t)start;
-			w0[i] = folded ? 1 - hat : a0;
-			w1[i] = folded ? hat : 1 - a0 - a2;
-			w2[i] = folded ? 0 : a2;
-			g0[i] = (folded ? -1 : d0) * inverse;
-			g1[i] = (folded ? 1 : -(d0 + d2)) * inverse;
-			g2[i] = (folded ? 0 : d2) * inverse;
-		}
+QUERN_INLINE void weights_along(
+	const quern_real l, const quern_shape_batch *b, uint32_t a, const bool walls) {
+	const quern_real inverse = b->inverse_cell, quarter = 1 / (4 * l);
+	const quern_real *restrict x = b->position[a];
+	int32_t *restrict first = b->first[a];
+	quern_real *restrict w0 = b->value[a][0], *restrict w1 = b->value[a][1], *restrict w2 = b->value[a][2];
+	quern_real *restrict g0 = b->slope[a][0], *restrict g1 = b->slope[a][1], *restrict g2 = b->slope[a][2];
+	const bool low = b->wall[a][0] != INT32_MIN, high = b->wall[a][1] != INT32_MAX;
+	const quern_real lowest = low ? (quern_real)b->wall[a][0] : -0x1p40,
+					 highest = high ? (quern_real)b->wall[a][1] : 0x1p40;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < b->n; i++) {
+		const quern_real t = x[i] * inverse, base = quern_floor(t - l), f = t - base;
+		const quern_real near = 1 + l - f, beyond = f - (1 - l), far = beyond > 0 ? beyond : 0;
+		const bool linear = f < 1 - l;
+		const quern_real a0 = linear ? 1 - f : near * near * quarter, a2 = far * far * quarter;
+		const quern_real d0 = linear ? -1 : -2 * near * quarter, d2 = 2 * far * quarter;
+		/* folding at a wall closer than l: S_0 += 2 S_-1, S_1 -= S_-1 gives 1 - t and t */
+		const bool at_low = walls & (t < lowest + l), at_high = walls & (t > highest - l),
+				   folded = at_low | at_high;
+		const quern_real start = at_low ? lowest : at_high ? highest - 1 : base, hat = t - start;
+		first[i] = (int32_t)start;
+		w0[i] = folded ? 1 - hat : a0;
+		w1[i] = folded ? hat : 1 - a0 - a2;
+		w2[i] = folded ? 0 : a2;
+		g0[i] = (folded ? -1 : d0) * inverse;
+		g1[i] = (folded ? 1 : -(d0 + d2)) * inverse;
+		g2[i] = (folded ? 0 : d2) * inverse;
 	}
+}
+
+static void weights(const void *self, const quern_shape_batch *b) {
+	const quern_real l = ((const gimp *)self)->half_width;
+	for (uint32_t a = 0; a < b->dim; a++)
+		if (b->wall[a][0] != INT32_MIN || b->wall[a][1] != INT32_MAX) weights_along(l, b, a, true);
+		else weights_along(l, b, a, false);
 }
 
 /* The integrals of the folded functions: h/2 + l^2/(6h) on the wall, h - l^2/(6h) next to it. */
