@@ -497,13 +497,27 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	return status;
 }
 
-/* At rest: the mean kinetic energy is small against m g d, looked at every 200 steps, and not before the grains had
- * the time to fall by a diameter. */
+/* Of sqrt(H/g), H the height of the fill: for so long grains must have been at rest. A bed bounces on its own springs, and at each turn it
+ * has no kinetic energy: half a period is 2 sqrt(e H/g) where its lowest grains are pressed together by e. */
+static const quern_real quiet = 0.25;
+/* Of the energy at rest: from there down grains no longer rearrange, and what is left is taken out. */
+static const quern_real nearly = 100;
+enum { LOOK_EVERY = 50 };
+
+static void stop_grains(const quern_step *s, uint32_t n) {
+	const quern_column *u = s->use;
+	for (uint32_t k = 0; k < s->dim; k++) memset(u[FILL_VELOCITY].real[k], 0, n * sizeof(quern_real));
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_AXIAL, s->dim) && u[FILL_SPIN].real[0]; k++)
+		memset(u[FILL_SPIN].real[k], 0, n * sizeof(quern_real));
+}
+
+/* At rest: the mean kinetic energy has been small against m g d for a while, looked at every 50 steps, and not before the
+ * grains had the time to fall by a diameter. Whenever it has passed a maximum, where springs and weight are in balance, grains are stopped. */
 bool quern_dem_settled(const void *self, const quern_step *s) {
 	const dem *d = self;
 	const cloud grains = dem_cloud(s, NULL);
 	if (!d->settles || !grains.n) return true;
-	if (s->substep % 200) return false;
+	if (s->substep % LOOK_EVERY) return false;
 	if (s->substep >= d->settle_most) {
 		s->host->log(
 			s->run, 2, "settling was cut off after %d steps: the grains are not at rest", d->settle_most);
@@ -516,7 +530,14 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 	quern_real energy = 0;
 	if (!cloud_open(&c, s->host, s->run, &grains)) return false;
 	CLOUD_ADD(&c, i, 0.5 * cloud_square(&s->use[FILL_VELOCITY], i, s->dim), energy);
-	return energy <= d->rest * cloud_total(&c) * g * diameter;
+	const quern_real bound = d->rest * cloud_total(&c) * g * diameter;
+	int32_t *stirred = s->use[FILL_STIRRED].index;
+	quern_real *sway = s->use[FILL_SWAY].real[0];
+	const bool falls = energy < *sway && energy < nearly * bound;
+	if (!(energy <= bound)) *stirred = (int32_t)s->substep;
+	if (energy > bound && falls) stop_grains(s, grains.n);
+	*sway = energy > bound && falls ? 0 : energy;
+	return (quern_real)(s->substep - *stirred) * s->dt >= quiet * sqrt((d->height + diameter) / g);
 }
 
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */
