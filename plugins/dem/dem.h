@@ -21,7 +21,8 @@ typedef struct dem_material {
 } dem_material;
 
 typedef struct dem {
-	quern_real skin, rest, settle_step; /* from the scene */
+	quern_real skin, step, rest,
+		settle_step; /* from the scene; step: NaN if it leaves that to the integrator */
 	dem_material alone;
 	quern_list materials, pairs, fill, place, source;
 	const char *file, *from;

@@ -58,17 +58,26 @@ static contact_limit limit_of(
 	return c;
 }
 
-static void say_limit(
-	const contact_limit *fast, const contact_limit *hard, bool by_period, char reason[160]) {
+/* The recommended step over the half-period: the scene's word, or that of the integrator, whose order decides how many steps a
+ * contact needs. */
+static quern_real share_of(const dem *d, const quern_step *s) {
+	const quern_integrator_ops *ops = dem_integrator(s)->ops;
+	if (!isnan(d->step)) return d->step;
+	return ops->step > 0 ? ops->step : 0.02;
+}
+
+static void say_limit(const contact_limit *fast, const contact_limit *hard, quern_real share, bool by_period,
+	char reason[160]) {
 	const contact_limit *c = by_period ? fast : hard;
 	const bool same = c->period == hard->period && c->damping == hard->damping;
-	char others[24] = "", damped[120] = "";
+	char others[24] = "", damped[120] = "", parts[24] = "";
+	if (by_period) snprintf(parts, sizeof parts, " / %.3g", 1 / share);
 	if (c->others) snprintf(others, sizeof others, " and %u more", c->others);
 	if (hard->hard < 0.2 * hard->period)
 		snprintf(damped, sizeof damped, "%s%.80s, damping ratio %.3g", same ? "" : "; hard limit ",
 			same ? "" : hard->where, hard->damping);
-	snprintf(reason, 160, "%s%s %s, half-period %.3g s%s%s", c->law, others, c->where, c->period,
-		by_period ? " / 50" : "", damped);
+	snprintf(
+		reason, 160, "%s%s %s, half-period %.3g s%s%s", c->law, others, c->where, c->period, parts, damped);
 }
 
 typedef struct {
@@ -170,11 +179,12 @@ static quern_real limit_of_lightest(
 	find_limits(d, s, l, &fast, &first);
 	for (uint32_t k = 0; k < d->n_materials; k++) least = fmin(least, l[k].radius);
 	*hard = first.hard;
-	const bool by_period = fast.period / 50 <= 0.5 * first.hard;
-	if (isfinite(fast.period)) say_limit(&fast, &first, by_period, reason);
+	const quern_real share = share_of(d, s);
+	const bool by_period = share * fast.period <= 0.5 * first.hard;
+	if (isfinite(fast.period)) say_limit(&fast, &first, share, by_period, reason);
 	else snprintf(reason, 160, "grains without a contact law");
 	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
-	const quern_real chosen = by_period ? fast.period / 50 : 0.5 * first.hard;
+	const quern_real chosen = by_period ? share * fast.period : 0.5 * first.hard;
 	const quern_real speed =
 		d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY) : 0;
 	if (!(0.1 * least < speed * chosen)) return chosen;

@@ -14,8 +14,31 @@ typedef struct {
 } opening;
 
 typedef struct {
-	_Alignas(64) quern_real position[3][CHUNK], velocity[3][CHUNK], spin[3][CHUNK];
+	_Alignas(64) quern_real position[3][CHUNK], velocity[3][CHUNK], spin[3][CHUNK], way[CHUNK];
 } opened;
+
+/* A column's new numbers, but for grains that are held. */
+static void keep(
+	quern_real *restrict to, const quern_real *restrict now, const int32_t *restrict held, uint32_t n) {
+	if (!held) {
+		memcpy(to, now, n * sizeof *to);
+		return;
+	}
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) to[i] = held[i] ? to[i] : now[i];
+}
+
+/* Of n squares of ways, at most CHUNK; what is held has gone none. In halves, so that no number waits for all those before it. */
+static quern_real most_of(quern_real *restrict way, const int32_t *restrict held, uint32_t n) {
+	for (uint32_t i = 0; i < n && held; i++) way[i] = held[i] ? 0 : way[i];
+	while (n > 1) {
+		const uint32_t half = (n + 1) / 2;
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n - half; i++) way[i] = way[i + half] > way[i] ? way[i + half] : way[i];
+		n = half;
+	}
+	return way[0];
+}
 
 /* The new state is made aside and then copied: an integrator may read and write as if the columns were distinct. */
 static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
@@ -43,21 +66,18 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 		b.new_spin[k] = w->spin[k];
 	}
 	((const quern_integrator_ops *)o->bound->ops)->open[dim - 2](o->bound->self, &b);
-	const int32_t *fixed = u[OPEN_FIXED].index;
-	quern_real farthest = 0;
-	for (uint32_t i = 0; i < n; i++) {
-		quern_real way = 0;
-		if (fixed && fixed[begin + i]) continue;
-		for (uint32_t k = 0; k < dim; k++) {
-			const quern_real d = w->position[k][i] - u[OPEN_ANCHOR].real[k][begin + i];
-			way += d * d;
-			u[OPEN_POSITION].real[k][begin + i] = w->position[k][i];
-			u[OPEN_VELOCITY].real[k][begin + i] = w->velocity[k][i];
-		}
-		for (uint32_t k = 0; k < o->n_spin; k++) u[OPEN_SPIN].real[k][begin + i] = w->spin[k][i];
-		farthest = way > farthest ? way : farthest;
+	const int32_t *held = u[OPEN_FIXED].index ? u[OPEN_FIXED].index + begin : NULL;
+	quern_real *restrict way = w->way;
+	memset(way, 0, n * sizeof *way);
+	for (uint32_t k = 0; k < dim; k++) {
+		const quern_real *restrict x = w->position[k], *restrict from = u[OPEN_ANCHOR].real[k] + begin;
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) way[i] += (x[i] - from[i]) * (x[i] - from[i]);
+		keep(u[OPEN_POSITION].real[k] + begin, w->position[k], held, n);
+		keep(u[OPEN_VELOCITY].real[k] + begin, w->velocity[k], held, n);
 	}
-	o->farthest[chunk] = farthest;
+	for (uint32_t k = 0; k < o->n_spin; k++) keep(u[OPEN_SPIN].real[k] + begin, w->spin[k], held, n);
+	o->farthest[chunk] = most_of(way, held, n);
 }
 
 quern_status quern_dem_open(const void *self, const quern_step *s) {
