@@ -6,7 +6,7 @@ enum { GRAIN, POINT, NODE, ENTRIES };
 /* s that a grain's step takes, as solver.dem has it, in 2-D and 3-D; below, costs of an entry in units of that. Beside what solver.mpm
  * reckons for points those of a hybrid send gradients, follow their cell's density and come to rest. */
 static const quern_real grain_step[2] = { 40e-9, 100e-9 };
-static const quern_real in_a_step[ENTRIES] = { [GRAIN] = 4, [POINT] = 2.6, [NODE] = 0.2 };
+static const quern_real in_a_step[ENTRIES] = { [GRAIN] = 4, [POINT] = 0.9, [NODE] = 0.2 };
 static const quern_real in_an_update[ENTRIES] = { [GRAIN] = 38, [POINT] = 4, [NODE] = 3.3 };
 
 quern_real quern_hybrid_work(const void *self, const quern_step *s, quern_real wider) {

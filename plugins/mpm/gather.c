@@ -32,6 +32,7 @@ typedef struct {
 	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
 		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
 	fit_memory fit;                   /* where the transfer asks for it */
+	int32_t cell[STENCIL];            /* of the block, by point of a chunk */
 	quern_real said[QUERN_TILE_MOST]; /* kg/m^3 at the tile's nodes */
 	bool silent[QUERN_TILE_MOST];     /* those that bodies leave no room */
 } gather_memory;
@@ -191,18 +192,23 @@ QUERN_INLINE void move_chunk(
 	}
 }
 
-/* Of the block's cells, the one that a place (m from the grid's lower corner) is in, or the nearest to it: between sorts a point may be
+/* Of the block's cells, those that points (m from the grid's lower corner) are in, or the nearest to them: between sorts a point may be
  * beyond. */
-static uint32_t cell_in_block(const gather_work *w, uint32_t b, const quern_real place[3]) {
-	uint32_t cell = 0;
-	for (uint32_t k = w->s->dim; k-- > 0;) {
-		const quern_real x = place[k] / w->g->cell - w->g->at[b][k] * (int32_t)w->g->edge;
-		const int32_t inside = w->g->cells[k] - w->g->at[b][k] * (int32_t)w->g->edge;
-		const quern_real most =
-			(w->p->alone && inside < (int32_t)w->g->edge ? inside : (int32_t)w->g->edge) - 1;
-		cell = cell * w->g->edge + (uint32_t)(x > 0 ? (x < most ? x : most) : 0);
+QUERN_INLINE void cells_of(const gather_work *w, uint32_t b, quern_real position[3][STENCIL], uint32_t n,
+	const int dim, int32_t *restrict cell) {
+	const quern_real width = w->g->cell;
+	const int32_t edge = (int32_t)w->g->edge;
+	memset(cell, 0, n * sizeof *cell);
+	for (int k = dim; k-- > 0;) {
+		const int32_t begin = w->g->at[b][k] * edge, inside = w->g->cells[k] - begin;
+		const quern_real most = (w->p->alone && inside < edge ? inside : edge) - 1;
+		const quern_real *restrict at = position[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			const quern_real x = at[i] / width - begin;
+			cell[i] = cell[i] * edge + (int32_t)(x > 0 ? (x < most ? x : most) : 0);
+		}
 	}
-	return cell;
 }
 
 static quern_real pressure_of(const gather_work *w, uint32_t i) {
@@ -267,21 +273,26 @@ static const quern_real dense = 0.98;
 
 /* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
  * where the cell is full; in one that is not they are spray beside it. */
-static void level_block(const gather_work *w, gather_memory *m, uint32_t b) {
+QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b, const int dim) {
 	const quern_real *mass = w->s->use[GATHER_MASS].real[0], *volume = w->s->use[GATHER_VOLUME].real[0];
-	quern_real *const *position = w->s->use[GATHER_POSITION].real;
+	quern_real *const *position = w->s->use[GATHER_POSITION].real,
+					  (*place)[STENCIL] = m->trip.stencil.position;
 	memset(m->level, 0, sizeof m->level);
 	memset(m->room, 0, sizeof m->room);
 	memset(m->loose, 0, sizeof m->loose);
 	memset(m->mean, 0, sizeof m->mean);
-	for (uint32_t i = w->point[b]; i < w->point[b + 1]; i++) {
-		quern_real place[3];
-		for (uint32_t k = 0; k < w->s->dim; k++) place[k] = position[k][i] - w->g->lower[k];
-		const uint32_t c = cell_in_block(w, b, place);
-		const bool open = mass[i] < dense * w->p->density * volume[i];
-		m->level[c] += volume[i] * pressure_of(w, i);
-		m->mean[c] += open ? 0 : mass[i];
-		*(open ? &m->loose[c] : &m->room[c]) += volume[i];
+	for (uint32_t begin = w->point[b]; begin < w->point[b + 1]; begin += STENCIL) {
+		const uint32_t rest = w->point[b + 1] - begin, n = rest < STENCIL ? rest : STENCIL;
+		for (int k = 0; k < dim; k++)
+			for (uint32_t i = 0; i < n; i++) place[k][i] = position[k][begin + i] - w->g->lower[k];
+		cells_of(w, b, place, n, dim, m->cell);
+		for (uint32_t i = 0; i < n; i++) {
+			const uint32_t at = begin + i, c = (uint32_t)m->cell[i];
+			const bool open = mass[at] < dense * w->p->density * volume[at];
+			m->level[c] += volume[at] * pressure_of(w, at);
+			m->mean[c] += open ? 0 : mass[at];
+			*(open ? &m->loose[c] : &m->room[c]) += volume[at];
+		}
 	}
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
 		const bool any = m->room[c] + m->loose[c] > 0;
@@ -292,29 +303,20 @@ static void level_block(const gather_work *w, gather_memory *m, uint32_t b) {
 	}
 }
 
-/* What a point's pressure lacks of the least one of a crowded cell. At rest no mass arrives, and a bed is denser here than there. */
-static quern_real lacks_least(
-	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, uint32_t at) {
-	const mpm *p = w->p;
-	quern_real pressure = pressure_of(w, at), trace = 0;
-	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
-	pressure -= p->bulk * trace * w->s->dt; /* what the flow itself will make of it */
-	const quern_real least = p->relief * p->bulk * (w->s->use[GATHER_CROWDING].real[0][c] - w->full);
-	return least > 0 && least > pressure ? fmin(1, p->answer * w->s->dt) * (least - pressure) : 0;
+/* 0 at rest, 1 in flow, by the square of the shear rate. */
+QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
+	const quern_real fast = rate2 / (still * still), share = fast * fast / (1 + fast * fast);
+	return still > 0 ? share : 1;
 }
 
 /* Points do not feel that they lie one upon the other: as material is sheared, their density goes to their cell's, a part for each unit of
  * shear; if it went to the grid's at their own place it would take over that one's noise. A cell that bears nothing has no friction to lose,
- * and a point far denser than its cell is at a surface. Returned: by what share the point's density grows in this step. */
-static quern_real follow_cell(
-	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, quern_real rate) {
-	quern_real trace = 0;
-	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
-	const quern_real own = m->density[i], off = m->held[c] / own - 1,
-					 sheared = rate * rate / (rate * rate + shaken * trace * trace),
-					 part = w->p->follow * rate * sheared * w->s->dt;
-	if (!(rate > 0) || !(m->level[c] > 0) || own < dense * w->p->density || off < -0.1) return 0;
-	return part / (1 + part) * fmin(off, 0.1);
+ * and a point far denser than its cell is at a surface. Returned: by what share the point's density grows in this step,
+ * `part` of what its cell has more. */
+QUERN_INLINE quern_real follow_cell(
+	quern_real level, quern_real held, quern_real own, quern_real part, quern_real solid) {
+	const quern_real off = held / own - 1, grown = part / (1 + part) * (off < 0.1 ? off : 0.1);
+	return (level > 0) & (own >= solid) & (off >= -0.1) ? grown : 0;
 }
 
 /* A continuum alone: densities of points go to the mean of their cell's, which keeps the volume of all, much faster
@@ -334,44 +336,64 @@ static quern_real follow_alone(
 		   time;
 }
 
-/* 0 at rest, 1 in flow, by the square of the shear rate. */
-static quern_real flowing_share(const gather_work *w, quern_real rate2) {
-	const quern_real fast = rate2 / (w->still * w->still);
-	return w->still > 0 ? fast * fast / (1 + fast * fast) : 1;
-}
-
 /* Mass that came where there was no room has brought its volume along, and does not press: what pressure lacks comes as a compression
  * beside that of the flow, where material flows, so that it holds for every material. */
-static void answer_chunk(const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
+QUERN_INLINE void answer_chunk(
+	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
 	const mpm *p = w->p;
-	const uint32_t dim = w->s->dim;
+	const quern_real dt = w->s->dt, bulk = p->bulk, follow = p->follow * dt, full = w->full,
+					 solid = dense * p->density, still = w->still, stiff = p->relief * bulk,
+					 soon = fmin(1, p->answer * dt);
+	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0] + (size_t)b * QUERN_BLOCK_CELLS;
+	const quern_real *stress[3];
+	quern_real crowded[STENCIL], holds[STENCIL], lack[STENCIL];
+	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
 	for (uint32_t i = 0; i < n; i++) {
-		quern_real before[3];
-		for (uint32_t k = 0; k < dim; k++) before[k] = m->trip.stencil.position[k][i];
-		const uint32_t c = cell_in_block(w, b, before);
-		const quern_real rate2 = calm_shear(m->gradient, i, dim), flows = flowing_share(w, rate2);
-		const quern_real followed = flows * follow_cell(w, m, c, i, sqrt(rate2)),
-						 lack = flows * lacks_least(w, m, b * QUERN_BLOCK_CELLS + c, i, begin + i) +
-								p->bulk * followed;
+		crowded[i] = crowding[m->cell[i]];
+		holds[i] = m->held[m->cell[i]];
+		m->mean_pressure[i] = m->level[m->cell[i]];
+	}
+	for (int k = 0; k < dim; k++) stress[k] = w->s->use[GATHER_STRESS].real[k] + begin;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) {
+		quern_real pressure = 0, trace = 0;
+		for (int k = 0; k < dim; k++) {
+			pressure -= stress[k][i] / dim;
+			trace += m->gradient[(dim + 1) * k][i];
+		}
+		pressure -= bulk * trace * dt; /* what the flow itself will make of it */
+		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim),
+						 flows = flowing_share(still, rate2);
+		/* of the deformation, what changes shape: what only changes volume does not even out densities */
+		const quern_real shape = rate2 / (rate2 > 0 ? rate2 + shaken * trace * trace : 1);
+		const quern_real followed = flows * follow_cell(m->mean_pressure[i], holds[i], m->density[i],
+												follow * sqrt(rate2) * shape, solid);
+		/* a crowded cell's least pressure; at rest no mass arrives, and a bed is denser here than there */
+		const quern_real least = stiff * (crowded[i] - full);
+		const quern_real lacks = (least > 0) & (least > pressure) ? soon * (least - pressure) : 0;
 		m->density[i] *= 1 + followed;
-		m->mean_pressure[i] = m->level[c];
-		for (uint32_t k = 0; k < dim; k++) {
-			m->kept[k][i] = m->gradient[(dim + 1) * k][i];
-			m->gradient[(dim + 1) * k][i] -= lack / (p->bulk * w->s->dt * dim);
+		lack[i] = flows * lacks + bulk * followed;
+	}
+	for (int k = 0; k < dim; k++) {
+		quern_real *restrict l = m->gradient[(dim + 1) * k], *restrict kept = m->kept[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			kept[i] = l[i];
+			l[i] -= lack[i] / (bulk * dt * dim);
 		}
 	}
 }
 
 /* A continuum alone: how fast each density will follow until cells are counted again, and the mean pressure around. */
-static void measure_chunk(const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n) {
+QUERN_INLINE void measure_chunk(
+	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
 	const quern_column *u = w->s->use;
+	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
 	for (uint32_t i = 0; i < n; i++) {
-		quern_real before[3];
-		for (uint32_t k = 0; k < w->s->dim; k++) before[k] = m->trip.stencil.position[k][i];
-		const uint32_t c = cell_in_block(w, b, before);
-		const quern_real rate2 = calm_shear(m->gradient, i, w->s->dim);
+		const uint32_t c = (uint32_t)m->cell[i];
+		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim);
 		u[GATHER_FOLLOWING].real[0][begin + i] =
-			flowing_share(w, rate2) * follow_alone(w, m, c, i, sqrt(rate2));
+			flowing_share(w->still, rate2) * follow_alone(w, m, c, i, sqrt(rate2));
 		u[GATHER_AROUND].real[0][begin + i] = m->level[c];
 	}
 }
@@ -469,7 +491,7 @@ QUERN_INLINE void gather_block(
 	quern_tile_load(w->g, w->motion, b, m->tile);
 	if (last) speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
-	if (last && (w->answers || w->counts)) level_block(w, m, b);
+	if (last && (w->answers || w->counts)) level_block(w, m, b, dim);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
@@ -483,8 +505,8 @@ QUERN_INLINE void gather_block(
 			calm_note(
 				&w->calm, k, i + k, m->gradient, m->trip.pic, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
 		move_chunk(w, m, b, i, n, dim);
-		if (w->answers) answer_chunk(w, m, b, i, n);
-		if (w->counts) measure_chunk(w, m, b, i, n);
+		if (w->answers) answer_chunk(w, m, b, i, n, dim);
+		if (w->counts) measure_chunk(w, m, b, i, n, dim);
 		if (w->p->alone) follow_chunk(w, m, i, n);
 		call_material(w, m, i, n);
 		for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
