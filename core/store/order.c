@@ -135,6 +135,11 @@ static bool is_first_of_section(const quern_plan *p, int stage) {
 	return p->stages[stage].section != NULL;
 }
 
+/* A row is cleared as a whole, with the lanes that nobody reads. */
+static bool is_cleared(const quern_plan *p, const quern_field *field) {
+	return !field->local || p->store.sets[field->set].rows;
+}
+
 /* Frames, observers, limits and accounts look at fields before anything is computed anew. What they see must come back
  * with a checkpoint, state or not. */
 static void mark_kept(quern_plan *p) {
@@ -203,9 +208,10 @@ static void mark_swaps_and_zeros(quern_plan *p) {
 			const int s = p->order[o], f = (int)k;
 			if (field->twice && stage_has(p, s, f, reads_others) && stage_has(p, s, f, quern_use_renews))
 				stage->swaps[swaps++] = f;
-			if (!field->local && !zeroed[k] && stage_has(p, s, f, adds))
+			const bool cleared = is_cleared(p, field);
+			if (cleared && !zeroed[k] && stage_has(p, s, f, adds))
 				stage->zeros[zeros++] = f, zeroed[k] = true;
-			if (acts_before_release(stage) && !field->local && !settled[k] && stage_has(p, s, f, adds))
+			if (acts_before_release(stage) && cleared && !settled[k] && stage_has(p, s, f, adds))
 				stage->zeros_settling[n++] = f, settled[k] = true;
 		}
 		stage->swaps[swaps] = stage->zeros[zeros] = stage->zeros_settling[n] = -1;

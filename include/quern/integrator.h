@@ -39,7 +39,7 @@ typedef struct quern_integrator_ops {
 	/* By which factor a damping ratio counts in the limit of the step, omega dt < 2 (sqrt(1 + zeta^2) - zeta) for dashpots that
 	 * see the velocity of the step's beginning: 2 for one predicted by half a step; 0 counts as 1. docs/theory/grains.md, section 2 */
 	quern_real damping;
-	/* Recommended step over half the shortest period of a contact, below 0.2; 0 counts as 0.02. docs/theory/grains.md, section 2 */
+	/* Recommended step over half the shortest period of a contact, at most 0.1; 0 counts as 0.02. docs/theory/grains.md, section 2 */
 	quern_real step;
 } quern_integrator_ops;
 

@@ -11,8 +11,10 @@ typedef struct quern_shape_batch {
 	uint32_t n, cap, dim, pad;
 	quern_real inverse_cell;       /* 1/m */
 	const quern_real *position[3]; /* m from the grid's lower corner */
-	int32_t wall[3][2]; /* node index of walls on node lines, INT32_MIN and INT32_MAX where there is none */
-	int32_t *first[3];  /* lowest node of the support; after folding never beyond a wall's far side */
+	int32_t wall
+		[3]
+		[2]; /* node index of walls on node lines, INT32_MIN and INT32_MAX where there is none within two cells */
+	int32_t *first[3];       /* lowest node of the support; after folding never beyond a wall's far side */
 	quern_real *value[3][3]; /* [axis][node] */
 	quern_real *slope[3][3]; /* 1/m */
 } quern_shape_batch;

@@ -122,7 +122,7 @@ QUERN_INLINE bool part_pushes(const int k) { return (k + 1) * PART_LANES > CARRI
 typedef struct sent {
 	parted_row base, along[3], slope[3];
 } sent;
-typedef enum sends { SENDS_BASE = 0, SENDS_ALONG = 1, SENDS_SLOPE = 2 } sends;
+enum { SENDS_BASE = 0, SENDS_ALONG = 1, SENDS_SLOPE = 2 };
 
 /* Nodes per axis of a tile, a constant where the dimension is one. */
 QUERN_INLINE uint32_t tile_span(const int dim) { return dim == 2 ? 12 : 8; }

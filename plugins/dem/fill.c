@@ -500,9 +500,9 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
 /* Of sqrt(H/g), H the height of the fill: for so long grains must have been at rest. A bed bounces on its own springs, and at each turn it
  * has no kinetic energy: half a period is 2 sqrt(e H/g) where its lowest grains are pressed together by e. */
 static const quern_real quiet = 0.25;
-/* Of the energy at rest: from there down grains no longer rearrange, and what is left is taken out. */
+/* Of the energy at rest: from there down grains hardly rearrange, and what is left is taken out. */
 static const quern_real nearly = 100;
-enum { LOOK_EVERY = 50 };
+enum { LOOK_EVERY = 50, LEAST_QUIET = 3 * LOOK_EVERY };
 
 static void stop_grains(const quern_step *s, uint32_t n) {
 	const quern_column *u = s->use;
@@ -511,8 +511,19 @@ static void stop_grains(const quern_step *s, uint32_t n) {
 		memset(u[FILL_SPIN].real[k], 0, n * sizeof(quern_real));
 }
 
+/* Stops grains when their kinetic energy has passed a maximum, where springs and weight are in balance. `sway` keeps the energy of the last
+ * look, negative if it had fallen since the one before. */
+static void take_sway(const quern_step *s, uint32_t n, quern_real energy, quern_real bound) {
+	quern_real *sway = s->use[FILL_SWAY].real[0];
+	const bool rose = *sway > 0, falls = energy < fabs(*sway);
+	if (rose && falls && energy > bound && *sway < nearly * bound) {
+		stop_grains(s, n);
+		*sway = 0;
+	} else *sway = falls ? -energy : energy;
+}
+
 /* At rest: the mean kinetic energy has been small against m g d for a while, looked at every 50 steps, and not before the
- * grains had the time to fall by a diameter. Whenever it has passed a maximum, where springs and weight are in balance, grains are stopped. */
+ * grains had the time to fall by a diameter. */
 bool quern_dem_settled(const void *self, const quern_step *s) {
 	const dem *d = self;
 	const cloud grains = dem_cloud(s, NULL);
@@ -525,19 +536,17 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 	}
 	const quern_real diameter = dem_diameter(d), g = quern_gravity_size(d->dim, s->gravity);
 	const quern_real fall = 2 * sqrt(2 * diameter / g);
-	if ((quern_real)s->substep * s->dt < fall) return false;
+	int32_t *stirred = s->use[FILL_STIRRED].index;
 	cloud_sums c;
 	quern_real energy = 0;
 	if (!cloud_open(&c, s->host, s->run, &grains)) return false;
 	CLOUD_ADD(&c, i, 0.5 * cloud_square(&s->use[FILL_VELOCITY], i, s->dim), energy);
 	const quern_real bound = d->rest * cloud_total(&c) * g * diameter;
-	int32_t *stirred = s->use[FILL_STIRRED].index;
-	quern_real *sway = s->use[FILL_SWAY].real[0];
-	const bool falls = energy < *sway && energy < nearly * bound;
-	if (!(energy <= bound)) *stirred = (int32_t)s->substep;
-	if (energy > bound && falls) stop_grains(s, grains.n);
-	*sway = energy > bound && falls ? 0 : energy;
-	return (quern_real)(s->substep - *stirred) * s->dt >= quiet * sqrt((d->height + diameter) / g);
+	const bool falling = (quern_real)s->substep * s->dt < fall;
+	if (falling || !(energy <= bound)) *stirred = (int32_t)s->substep;
+	if (!falling) take_sway(s, grains.n, energy, bound);
+	const int64_t still = s->substep - *stirred;
+	return still >= LEAST_QUIET && (quern_real)still * s->dt >= quiet * sqrt((d->height + diameter) / g);
 }
 
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */

@@ -9,7 +9,7 @@ const quern_output quern_dem_looks[] = {
 	{ .name = "kinetic", .unit = "J/grain", .doc = "Kinetic energy of a grain that moves, in the mean." },
 	{ .name = "residual",
 		.unit = "1",
-		.doc = "While settling: the same over m g d and over settle.energy; at rest below 1." },
+		.doc = "While settling: the same over m g d and over settle.energy; at rest when it stays below 1." },
 	{ .name = "overlap", .unit = "%", .doc = "Of two grains, over the smaller radius: the largest." },
 	{ .name = NULL }
 };

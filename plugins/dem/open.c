@@ -30,7 +30,8 @@ static void keep(
 
 /* Of n squares of ways, at most CHUNK; what is held has gone none. In halves, so that no number waits for all those before it. */
 static quern_real most_of(quern_real *restrict way, const int32_t *restrict held, uint32_t n) {
-	for (uint32_t i = 0; i < n && held; i++) way[i] = held[i] ? 0 : way[i];
+	/* what is not a number is found elsewhere, and would hide the others here */
+	for (uint32_t i = 0; i < n; i++) way[i] = (held && held[i]) || !(way[i] < INFINITY) ? 0 : way[i];
 	while (n > 1) {
 		const uint32_t half = (n + 1) / 2;
 		QUERN_SIMD

@@ -36,7 +36,7 @@
 	X(FILL_STIRRED, "total.stirred", "1", QUERN_UPDATE, QUERN_INDEX, \
 		.doc = "While settling: the last step that was looked at and in which grains were not at rest.") \
 	X(FILL_SWAY, "total.sway", "J", QUERN_UPDATE, QUERN_SCALAR, \
-		.doc = "While settling: kinetic energy of the last look; 0 after grains were stopped.") \
+		.doc = "While settling: kinetic energy of the last look, below 0 if it fell; 0 after grains were stopped.") \
 	X(FILL_LEFT, "grain_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
 	X(FILL_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "sources") \
 	X(FILL_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL) \

@@ -438,7 +438,7 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 	((const quern_material_ops *)material->ops)->update[dim - 2](material->self, &b);
 }
 
-/* Points from i to `end` of a chunk that is not one: all that are finite, keep a volume and go no farther than a cell. */
+/* Whether the points from i to `end` of a chunk are all finite, keep a volume and go no farther than a cell. */
 QUERN_INLINE bool are_sound(
 	const gather_work *w, const gather_memory *m, uint32_t begin, uint32_t i, uint32_t end, const int dim) {
 	const quern_column *u = w->s->use;
