@@ -19,7 +19,7 @@ SHORT = {"bed": LAYER, "chute": TURNED, "strip": TURNED, "shear": LAYER, "silo":
          "elastic_bar": lab.sets(time__end="2"),
          "column": [*lab.SMALL["column"], *lab.sets(time__end="20 ms")],
          "column_3d": [*lab.SMALL["column_3d"], *lab.sets(time__end="5 ms")],
-         "drum": lab.sets(time__end="50 ms", output__every="10 ms", grains__material__radius__mean="3 mm"),
+         "drum": lab.sets(time__end="50 ms", output__every="10 ms"),
          "gate": [*lab.sets(grains__material__radius__mean="3 mm", time__end="60 ms", output__every="10 ms"),
                   "--set=stages.0.for=15 ms", "--set=stages.1.for=20 ms"],
          "heap": lab.sets(time__end="60 ms", output__every="20 ms"),
