@@ -68,7 +68,7 @@ def drum(place):
     """A quarter of a turn, with coarser grains: none is lost, the surface leans against the turning as sand does, the drum's torque is
     what keeps the grains' weight aside, and its work is what was lost and what was raised."""
     out = place / "drum"
-    lab.run("drum", out, "--set=grains.material.radius.mean=2.5 mm", "--set=time.end=3.55 s", "--set=output.every=0.05 s",
+    lab.run("drum", out, "--set=model=grains", "--set=grains.material.radius.mean=2.5 mm", "--set=time.end=3.55 s", "--set=output.every=0.05 s",
             "--set=observe.2.repose.width=10 mm", "--set=run.batch=64")
     header, rows = lab.series(out)
     rows = [dict(zip((name.split(" ")[0] for name in header), row)) for row in rows]

@@ -19,10 +19,10 @@ SHORT = {"bed": LAYER, "chute": TURNED, "strip": TURNED, "shear": LAYER, "silo":
          "elastic_bar": lab.sets(time__end="2"),
          "column": [*lab.SMALL["column"], *lab.sets(time__end="20 ms")],
          "column_3d": [*lab.SMALL["column_3d"], *lab.sets(time__end="5 ms")],
-         "drum": lab.sets(time__end="50 ms", output__every="10 ms", grains__material__radius__mean="3 mm"),
+         "drum": lab.sets(time__end="50 ms", output__every="10 ms"),
          "gate": [*lab.sets(grains__material__radius__mean="3 mm", time__end="60 ms", output__every="10 ms"),
                   "--set=stages.0.for=15 ms", "--set=stages.1.for=20 ms"],
-         "heap": lab.sets(time__end="60 ms", output__every="20 ms"),
+         "heap": lab.sets(time__end="60 ms", output__every="20 ms"), "pile": lab.sets(time__end="60 ms", output__every="20 ms"),
          "packing": lab.sets(), "shear": lab.sets(time__end="20 ms", output__every="10 ms"),
          "hopper": lab.sets(
              time__end="60 ms", output__every="20 ms", grains__contact__linear__stiffness="1e5 N/m", grains__settle__energy=1e-2,
