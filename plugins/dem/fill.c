@@ -546,7 +546,11 @@ bool quern_dem_settled(const void *self, const quern_step *s) {
 	if (falling || !(energy <= bound)) *stirred = (int32_t)s->substep;
 	if (!falling) take_sway(s, grains.n, energy, bound);
 	const int64_t still = s->substep - *stirred;
-	return still >= LEAST_QUIET && (quern_real)still * s->dt >= quiet * sqrt((d->height + diameter) / g);
+	const bool rests =
+		still >= LEAST_QUIET && (quern_real)still * s->dt >= quiet * sqrt((d->height + diameter) / g);
+	if (rests)
+		*stirred = 0, s->use[FILL_SWAY].real[0][0] = 0; /* a settled state that was kept does not know them */
+	return rests;
 }
 
 /* What falls comes to rest within 2 to 10 sqrt(H/g): docs/theory/grains.md, section 6. */

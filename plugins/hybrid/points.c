@@ -77,34 +77,6 @@ static void weigh_parts(const update *d, uint32_t c, const int32_t cell[3], quer
 			d->u[U_GRAIN_MASS].real[0][d->grain[q]];
 }
 
-/* Moves the last `count` new points, as one and within their cell, so that their centre is that of the grains they stand for: a bed
- * whose sand becomes points shall not sink by that. */
-static void centre_points(update *d, uint32_t c, const int32_t cell[3], uint32_t count) {
-	const quern_images images = quern_grid_images(d->g);
-	const quern_real h = d->g->cell, *mass = d->u[U_GRAIN_MASS].real[0];
-	for (uint32_t k = 0; k < d->s->dim; k++) {
-		const quern_real begin = d->g->lower[k] + cell[k] * h, middle = begin + 0.5 * h;
-		quern_real sum = 0, moment = 0, way = 0, low, high;
-		for (uint32_t q = d->grain_begin[c]; q < d->grain_begin[c + 1]; q++) {
-			const int32_t i = d->grain[q];
-			sum += mass[i];
-			moment += mass[i] * (quern_image_at(d->u[U_GRAIN_POSITION].real[k][i], middle, images.half[k],
-									 images.length[k]) -
-									middle);
-		}
-		new_point *first = d->points + d->n_new_points - count;
-		low = high = 0.48 * h;
-		for (uint32_t i = 0; i < count; i++) {
-			const quern_real off = first[i].position[k] - middle;
-			way -= off / count;
-			low = fmin(low, 0.48 * h + off);
-			high = fmin(high, 0.48 * h - off);
-		}
-		way = fmin(fmax(way + moment / sum, -low), high);
-		for (uint32_t i = 0; i < count; i++) first[i].position[k] += way;
-	}
-}
-
 /* As many points as the mass is worth, a power of two if bodies leave the room, where the grains are; one in every part of a cell
  * that has no grains, so that no part comes before another. */
 void quern_hybrid_create(update *d, uint32_t c, quern_real mass, const quern_real v[3]) {
@@ -134,7 +106,6 @@ void quern_hybrid_create(update *d, uint32_t c, quern_real mass, const quern_rea
 		quern_hybrid_contact_stress(d, c, point.stress);
 		add_point(d, &point);
 	}
-	if (any && open == parts && !d->failed) centre_points(d, c, cell, count);
 }
 
 static quern_real mass_held(const update *d, uint32_t c) {

@@ -302,10 +302,12 @@ static void growth_in_a_jam(void **state) {
 	for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
 		if (!counts(&of[k])) continue;
 		const outcome o = row(&of[k]);
-		/* in one step: in a jam of some seeds that makes energy, in others grains tremble with some tenths of m g d */
-		const bool at_once = of[k].hybrid && strstr(of[k].hybrid, "growth: 1\n");
-		if (at_once && o.ended) says(of[k].name, &o, "grains grow too fast");
-		else if (at_once && o.kinetic < 1 && fabs(o.carried) < 0.02) continue;
+		/* in one step: in a jam of some seeds that makes energy, in others grains tremble with some tenths of m g d. In a hundred they
+		 * tremble with 4e-3 to 0.22 in seven seeds, in 7000 with 7e-4 to 7e-3 */
+		const bool soon =
+			of[k].hybrid && (strstr(of[k].hybrid, "growth: 1\n") || strstr(of[k].hybrid, "growth: 100\n"));
+		if (soon && o.ended) says(of[k].name, &o, "grains grow too fast");
+		else if (soon && o.kinetic < 1 && fabs(o.carried) < 0.02) continue;
 		else if (o.ended || !(o.kinetic < 0.1 && fabs(o.carried) < 0.02 && o.densest < 1.15))
 			fail_msg("%s: %g, %g, %g %s", of[k].name, o.kinetic, o.carried, o.densest, o.said);
 	}
