@@ -316,7 +316,8 @@ QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
 QUERN_INLINE quern_real follow_cell(
 	quern_real level, quern_real held, quern_real own, quern_real part, quern_real solid) {
 	const quern_real off = held / own - 1, grown = part / (1 + part) * (off < 0.1 ? off : 0.1);
-	return (level > 0) & (own >= solid) & (off >= -0.1) ? grown : 0;
+	const bool follows = (level > 0) & (own >= solid) & (off >= -0.1);
+	return follows ? grown : 0;
 }
 
 /* A continuum alone: densities of points go to the mean of their cell's, which keeps the volume of all, much faster
@@ -370,7 +371,8 @@ QUERN_INLINE void answer_chunk(
 												follow * sqrt(rate2) * shape, solid);
 		/* a crowded cell's least pressure; at rest no mass arrives, and a bed is denser here than there */
 		const quern_real least = stiff * (crowded[i] - full);
-		const quern_real lacks = (least > 0) & (least > pressure) ? soon * (least - pressure) : 0;
+		const bool short_of = (least > 0) & (least > pressure);
+		const quern_real lacks = short_of ? soon * (least - pressure) : 0;
 		m->density[i] *= 1 + followed;
 		lack[i] = flows * lacks + bulk * followed;
 	}
