@@ -71,6 +71,11 @@ static quern_real lacking(const update *d, uint32_t c) {
 	return grain_share(d, c) * (all < room ? all : room) - d->in_grains[c];
 }
 
+/* Sums round: what lacks nothing lacks a last bit or not, and how many cells lack something decides with which one the next update begins. */
+static bool lacks_something(const update *d, uint32_t c) {
+	return d->zone[c] == QUERN_HYBRID && lacking(d, c) > 1e-9 * d->full;
+}
+
 /* Half a grain over would never be paid back: a cell gets the next grain while all of it is lacking. Sums round, and where all grains
  * are alike a debt may be just one of them. */
 static bool share_out(enriching *e, packed_cell *p) {
@@ -229,13 +234,12 @@ static void enrich_one(void *arg, uint32_t i, uint32_t worker) {
 static bool find_cells(enriching *e) {
 	const update *d = e->d;
 	size_t most = 0;
-	for (uint32_t c = 0; c < d->n_cells; c++) most += d->zone[c] == QUERN_HYBRID && lacking(d, c) > 0;
+	for (uint32_t c = 0; c < d->n_cells; c++) most += lacks_something(d, c);
 	e->cell = d->s->host->memory(d->s->run, (most + 1) * sizeof *e->cell);
 	if (!e->cell) return false;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		packed_cell p = { .all = e, .c = nth_cell(d, q) };
-		if (d->zone[p.c] != QUERN_HYBRID || !(lacking(d, p.c) > 0) || !quern_grid_cell_of(d->g, p.c, p.cell))
-			continue;
+		if (!lacks_something(d, p.c) || !quern_grid_cell_of(d->g, p.c, p.cell)) continue;
 		for (uint32_t k = 0; k < d->s->dim; k++) {
 			p.lower[k] = d->g->lower[k] + p.cell[k] * d->g->cell;
 			p.upper[k] = p.lower[k] + d->g->cell;

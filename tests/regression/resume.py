@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """kill -9 at any moment: what is there is whole, and the run goes on to the same end.
 
-`resume.py [KILLS]`, 20 by default.
+`resume.py [KILLS]`, 50 by default.
 """
 import pathlib
 import re
@@ -82,4 +82,4 @@ def check(kills, place):
 
 if __name__ == "__main__":
     with lab.workplace() as name:
-        check(int(sys.argv[1]) if len(sys.argv) > 1 else 20, pathlib.Path(name))
+        check(int(sys.argv[1]) if len(sys.argv) > 1 else 50, pathlib.Path(name))
