@@ -116,10 +116,10 @@ SOFT = ["--set", "grains.contact.linear.stiffness=2e4", "--set", "grains.settle.
 
 
 def check_command(here):
-    """A layer of half the depth, one seed: its numbers are rough, but they are those of sand; one of four chutes may not be steady."""
-    words = [lab.scene("column"), *SOFT, "-o", here / "sand", "--size", "0.6", "--seeds", "1", "--angles", "15,17,19,21"]
+    """A layer that is smaller by a fifth, one seed: its numbers are rough, but they are those of sand. (Of half the depth, chutes of some seeds are not steady.)"""
+    words = [lab.scene("column"), *SOFT, "-o", here / "sand", "--size", "0.8", "--seeds", "1", "--angles", "15,18,21"]
     said = command(*words)
-    assert 6 <= said.count("] done: ") <= 13, said  # a bed, four chutes, and planes
+    assert 5 <= said.count("] done: ") <= 12, said  # a bed, three chutes, and planes
     options = dict(line.split("=")[1:] for line in (here / "sand/options.txt").read_text().splitlines())
     value = {key.rsplit(".", 1)[1]: float(text) for key, text in options.items()}
     print("    " + ", ".join(f"{key} {text:g}" for key, text in value.items()))
@@ -129,8 +129,7 @@ def check_command(here):
     assert 0.1 < value["bulk_modulus"] / 2e4 < 0.6, value
     with open(here / "sand/rows.csv") as file:
         rows = [row for row in csv.DictReader(file) if row["bulk"] == "1"]
-    steady = {row["angle [degree]"] for row in rows}
-    assert steady <= {"15", "17", "19", "21"} and len(steady) >= 3, steady
+    assert {row["angle [degree]"] for row in rows} == {"15", "18", "21"}
     for row in rows:  # in balance
         assert abs(float(row["friction"]) - math.tan(math.radians(float(row["angle [degree]"])))) < 0.03, row
     page = (here / "sand/calibration.md").read_text()

@@ -92,3 +92,12 @@ double held_support(const held *h) {
 	return harness_field(h->run, "body.impulse").real[1][0] +
 		   harness_field(h->run, "total.support").real[1][0];
 }
+
+double held_middle(double *rest, int n) {
+	for (int i = 1; i < n; i++)
+		for (int k = i; k > 0 && rest[k] < rest[k - 1]; k--) {
+			const double swap = rest[k];
+			rest[k] = rest[k - 1], rest[k - 1] = swap;
+		}
+	return rest[n / 2];
+}

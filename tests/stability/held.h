@@ -18,3 +18,5 @@ double held_kinetic(const held *);
 double held_top(const held *);
 /* Upward impulse that floor and fixed grains have given so far, N s. */
 double held_support(const held *);
+/* Of how n columns rest the middle one counts: some tremble by chance for as long again. Sorts them. */
+double held_middle(double *rest, int n);

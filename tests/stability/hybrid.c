@@ -27,6 +27,7 @@ typedef struct column {
 	const char *hybrid, *grains; /* more keys */
 	double jump;                 /* m: the zone goes so much deeper at once */
 	bool brief;                  /* in the shorter version too */
+	int seed;
 } column;
 
 /* What became of it. */
@@ -42,7 +43,7 @@ static double else_of(double x, double otherwise) { return x > 0 ? x : otherwise
 static void text_of(const column *c, char *out, size_t size) {
 	const double height = else_of(c->height, 0.06), cell = else_of(c->cell, 4e-3);
 	snprintf(out, size,
-		"quern: 1\ndimension: 2\nseed: 7\ngravity: [0, -9.81]\n"
+		"quern: 1\ndimension: 2\nseed: %d\ngravity: [0, -9.81]\n"
 		"domain: {lower: [0, 0], upper: [%g, %.17g]}\ntime: {end: 1000}\noutput: {every: 1000}\n"
 		"grains:\n  material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}}\n"
 		"  contact: {linear: {stiffness: 1e6, restitution: 0.5, friction: 0.4}}\n"
@@ -53,9 +54,9 @@ static void text_of(const column *c, char *out, size_t size) {
 		"  - plane: {point: [%g, 0], normal: [-1, 0], contact: {friction: 0}}\n"
 		"continuum:\n  cell: %.17g\n  material: {mu_i: {bulk_modulus: %g, critical_density: %g}}\n"
 		"hybrid:\n  oracle: [{packing_fraction: {depth: %g, half_width: %g}}]\n  substeps: 20\n%s",
-		width, floor(0.2 / cell) * cell, width, width - 0.001, height, c->grains ? c->grains : "", width,
-		cell, else_of(c->bulk, 3e5), else_of(c->packed, 1975), else_of(c->depth, 0.014),
-		else_of(c->half_width, 4e-3), c->hybrid ? c->hybrid : "");
+		c->seed ? c->seed : 7, width, floor(0.2 / cell) * cell, width, width - 0.001, height,
+		c->grains ? c->grains : "", width, cell, else_of(c->bulk, 3e5), else_of(c->packed, 1975),
+		else_of(c->depth, 0.014), else_of(c->half_width, 4e-3), c->hybrid ? c->hybrid : "");
 }
 
 /* The first of what is said, up to where it says what to do. */
@@ -287,10 +288,25 @@ static void full_cells(void **state) {
 	}
 }
 
+/* In a hundred steps grains of some seeds tremble, and how much is chance: with seeds 1 to 9 up to 0.2 m g d, in the middle 0.02. */
+static void hundred_steps(void) {
+	static const column of[] = { { "100", .jump = 0.02, .hybrid = "  growth: 100\n" },
+		{ "100, seed 1", .jump = 0.02, .hybrid = "  growth: 100\n", .seed = 1 },
+		{ "100, seed 2", .jump = 0.02, .hybrid = "  growth: 100\n", .seed = 2 } };
+	double kinetic[sizeof of / sizeof *of];
+	for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
+		const outcome o = row(&of[k]);
+		if (o.ended || !(fabs(o.carried) < 0.02 && o.densest < 1.15))
+			fail_msg("%s: %g, %g %s", of[k].name, o.carried, o.densest, o.said);
+		kinetic[k] = o.kinetic;
+	}
+	const double middle = held_middle(kinetic, sizeof of / sizeof *of);
+	if (!(middle < 0.1)) fail_msg("growth in 100 steps: %g", middle);
+}
+
 static void growth_in_a_jam(void **state) {
 	static const column of[] = { { "7000 steps", .jump = 0.02, .brief = true },
 		{ "700", .jump = 0.02, .hybrid = "  growth: 700\n" },
-		{ "100", .jump = 0.02, .hybrid = "  growth: 100\n", .brief = true },
 		{ "1", .jump = 0.02, .hybrid = "  growth: 1\n" },
 		{ "none grows", .jump = 0.02, .hybrid = "  growth: 0\n" },
 		{ "7000, packer expand", .jump = 0.02, .hybrid = "  packer: expand\n" },
@@ -302,15 +318,14 @@ static void growth_in_a_jam(void **state) {
 	for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
 		if (!counts(&of[k])) continue;
 		const outcome o = row(&of[k]);
-		/* in one step: in a jam of some seeds that makes energy, in others grains tremble with some tenths of m g d. In a hundred they
-		 * tremble with 4e-3 to 0.22 in seven seeds, in 7000 with 7e-4 to 7e-3 */
-		const bool soon =
-			of[k].hybrid && (strstr(of[k].hybrid, "growth: 1\n") || strstr(of[k].hybrid, "growth: 100\n"));
-		if (soon && o.ended) says(of[k].name, &o, "grains grow too fast");
-		else if (soon && o.kinetic < 1 && fabs(o.carried) < 0.02) continue;
+		/* in one step: in a jam of some seeds that makes energy, in others grains tremble with some tenths of m g d */
+		const bool at_once = of[k].hybrid && strstr(of[k].hybrid, "growth: 1\n");
+		if (at_once && o.ended) says(of[k].name, &o, "grains grow too fast");
+		else if (at_once && o.kinetic < 1 && fabs(o.carried) < 0.02) continue;
 		else if (o.ended || !(o.kinetic < 0.1 && fabs(o.carried) < 0.02 && o.densest < 1.15))
 			fail_msg("%s: %g, %g, %g %s", of[k].name, o.kinetic, o.carried, o.densest, o.said);
 	}
+	hundred_steps();
 }
 
 /* ==== a flow through a zone that stands ==== */

@@ -121,16 +121,6 @@ static void add_state(swept *mean, const swept *w, int states) {
 	mean->left += w->left / states;
 }
 
-/* Of how columns rest the middle one counts: some tremble by chance for as long again. */
-static double middle_of(double *rest, int n) {
-	for (int i = 1; i < n; i++)
-		for (int k = i; k > 0 && rest[k] < rest[k - 1]; k--) {
-			const double swap = rest[k];
-			rest[k] = rest[k - 1], rest[k - 1] = swap;
-		}
-	return rest[n / 2];
-}
-
 static void judge(const limits *l, const swept *w) {
 	const swept *m = &l->most;
 	const double rest = beyond_is_long() ? m->rest : rest_of_shorter;
@@ -160,7 +150,7 @@ static void zone_swept(void **unused) {
 			add_state(&mean, &w, states);
 			rest[seed - 1] = w.rest;
 		}
-		mean.rest = middle_of(rest, states);
+		mean.rest = held_middle(rest, states);
 		judge(&of_packer[k], &mean);
 	}
 }
