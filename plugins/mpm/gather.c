@@ -1,41 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* gather - nodes to points, chunk by chunk: velocity, position, volume, stress */
-#include "../common/calm.h"
-#include "../common/cloud.h"
-#include "../common/trips.h"
-#include "mpm.h"
+#include "answer.h"
+#include "damp.h"
 #include <math.h>
-
-typedef struct {
-	const mpm *p;
-	const quern_step *s;
-	const quern_grid_view *g;
-	const uint32_t *point;
-	cloud points;
-	const quern_row *motion;
-	trips trips;
-	calm calm;
-	bool answers;         /* volume does, to how full cells are */
-	bool counts;          /* the same of a continuum alone, in this step */
-	quern_real full;      /* from there on a cell is crowded */
-	quern_real still;     /* 1/s: sheared much faster, material flows */
-	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
-} gather_work;
-
-typedef struct {
-	quern_row tile[QUERN_TILE_MOST];
-	trip_memory trip;
-	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
-	_Alignas(64) quern_real kept[3][STENCIL], mean_pressure[STENCIL];
-	/* by cell of the block: Pa and m^3 of its points, m^3 of those that are open, kg/m^3 of what it holds and of its points that
-	 * are not open */
-	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
-		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
-	fit_memory fit;                   /* where the transfer asks for it */
-	int32_t cell[STENCIL];            /* of the block, by point of a chunk */
-	quern_real said[QUERN_TILE_MOST]; /* kg/m^3 at the tile's nodes */
-	bool silent[QUERN_TILE_MOST];     /* those that bodies leave no room */
-} gather_memory;
 
 /* For a node that says nothing those around it speak, if there are any that hold something. */
 static quern_real said_around(const gather_work *w, const gather_memory *m, uint32_t node) {
@@ -122,15 +89,6 @@ static void call_transfer(const gather_work *w, gather_memory *m, uint32_t begin
 
 /* Of motion below the grid, at rest, over the shear rate of what is: all of it at once would take elastic waves along. */
 static const quern_real calm_rate = 400;
-/* Of the shear rate of what is at rest: where material flows for certain. What is alone has no noise of grains and conversions. */
-static const quern_real flowing = 30, flowing_alone = 3;
-/* What is shaken changes volume as much as shape, what flows hardly: weight of the former. */
-static const quern_real shaken = 30;
-/* Of densities within a cell: a rate over that at which they go to what the cell holds. */
-static const quern_real evening = 10;
-/* What is full, over what was full at first: that varies by so much. */
-static const quern_real dead_band = 1.01;
-
 /* From where to where along an axis, in cells from the block's corner, a point may be until the next sort: where all nodes that it reaches
  * are in the tile. That may reach far beyond the end of a period, where no cells are: what is counted in cells comes back before that. */
 static void reach_of(const gather_work *w, uint32_t b, uint32_t k, quern_real reach[2]) {
@@ -192,230 +150,6 @@ QUERN_INLINE void move_chunk(
 	}
 }
 
-/* Of the block's cells, those that points (m from the grid's lower corner) are in, or the nearest to them: between sorts a point may be
- * beyond. */
-QUERN_INLINE void cells_of(const gather_work *w, uint32_t b, quern_real position[3][STENCIL], uint32_t n,
-	const int dim, int32_t *restrict cell) {
-	const quern_real width = w->g->cell;
-	const int32_t edge = (int32_t)w->g->edge;
-	memset(cell, 0, n * sizeof *cell);
-	for (int k = dim; k-- > 0;) {
-		const int32_t begin = w->g->at[b][k] * edge, inside = w->g->cells[k] - begin;
-		const quern_real most = (w->p->alone && inside < edge ? inside : edge) - 1;
-		const quern_real *restrict at = position[k];
-		QUERN_SIMD
-		for (uint32_t i = 0; i < n; i++) {
-			const quern_real x = at[i] / width - begin;
-			cell[i] = cell[i] * edge + (int32_t)(x > 0 ? (x < most ? x : most) : 0);
-		}
-	}
-}
-
-static quern_real pressure_of(const gather_work *w, uint32_t i) {
-	quern_real pressure = 0;
-	for (uint32_t k = 0; k < w->s->dim; k++) pressure -= w->s->use[GATHER_STRESS].real[k][i] / w->s->dim;
-	return pressure;
-}
-
-/* On the grid in the middle of a cell: the mean of its corners. */
-static quern_real centre_density(const gather_work *w, const gather_memory *m, uint32_t place) {
-	const uint32_t dim = w->s->dim, edge = w->g->edge;
-	const uint32_t at[3] = { place % edge, place / edge % edge, place / edge / edge };
-	quern_real sum = 0;
-	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
-		uint32_t node = 0;
-		for (uint32_t k = dim; k-- > 0;) node = node * w->g->span + at[k] + 1 + (corner >> k & 1);
-		sum += m->tile[node][motion_density(dim)];
-	}
-	return sum / (1u << dim);
-}
-
-/* Whether every node of the domain that hats around the cell's centre reach up to knows a density: at a surface or a body some do not, and what
- * is counted there lacks what the body or the air holds. */
-static bool surrounded(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c) {
-	const quern_grid_view *g = w->g;
-	const uint32_t dim = w->s->dim, edge = g->edge, at[3] = { c % edge, c / edge % edge, c / edge / edge };
-	for (uint32_t near = 0; near < 1u << 2 * dim; near++) {
-		uint32_t node = 0;
-		for (uint32_t k = dim; k-- > 0;) node = node * g->span + at[k] + (near >> 2 * k & 3);
-		if (m->tile[node][motion_density(dim)] > 0 && !m->silent[node]) continue;
-		bool outside = false;
-		for (uint32_t k = 0; k < dim; k++) {
-			/* the tile begins a cell before the block */
-			const int32_t place = g->at[b][k] * (int32_t)edge + (int32_t)(at[k] + (near >> 2 * k & 3)) - 1;
-			outside = outside || (!g->periodic[k] && (place < 0 || place > g->cells[k]));
-		}
-		if (!outside) return false;
-	}
-	return true;
-}
-
-/* Of a cell's density, what is measured in the cell itself, and not on the grid. */
-static const quern_real own_part = 0.25, own_part_alone = 0.5;
-
-/* The grid's density in the middle of a cell is smooth, but the same where full cells and empty ones take turns; what is counted in
- * a cell is neither. A continuum alone is counted by hats around the centres of cells (scatter.c). */
-static quern_real density_of(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c) {
-	const quern_real *fullness = w->s->use[GATHER_FULLNESS].real[0];
-	const quern_real centre = centre_density(w, m, c);
-	if (w->p->alone) {
-		if (!surrounded(w, m, b, c)) return centre;
-		const quern_row *node = w->trips.node + (size_t)b * QUERN_BLOCK_CELLS + c;
-		return centre +
-			   own_part_alone * ((*node)[node_held(w->s->dim)] / quern_grid_cell_volume(w->g) - centre);
-	}
-	const quern_real counted = fullness ? fullness[b * QUERN_BLOCK_CELLS + c] : 0;
-	return counted > 0 ? centre + own_part * (counted * w->p->density - centre) : centre;
-}
-
-/* Of the stress-free density: a point less dense is open, its volume is the grid's. */
-static const quern_real dense = 0.98;
-
-/* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
- * where the cell is full; in one that is not they are spray beside it. */
-QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b, const int dim) {
-	const quern_real *mass = w->s->use[GATHER_MASS].real[0], *volume = w->s->use[GATHER_VOLUME].real[0];
-	quern_real *const *position = w->s->use[GATHER_POSITION].real,
-					  (*place)[STENCIL] = m->trip.stencil.position;
-	memset(m->level, 0, sizeof m->level);
-	memset(m->room, 0, sizeof m->room);
-	memset(m->loose, 0, sizeof m->loose);
-	memset(m->mean, 0, sizeof m->mean);
-	for (uint32_t begin = w->point[b]; begin < w->point[b + 1]; begin += STENCIL) {
-		const uint32_t rest = w->point[b + 1] - begin, n = rest < STENCIL ? rest : STENCIL;
-		for (int k = 0; k < dim; k++)
-			for (uint32_t i = 0; i < n; i++) place[k][i] = position[k][begin + i] - w->g->lower[k];
-		cells_of(w, b, place, n, dim, m->cell);
-		for (uint32_t i = 0; i < n; i++) {
-			const uint32_t at = begin + i, c = (uint32_t)m->cell[i];
-			const bool open = mass[at] < dense * w->p->density * volume[at];
-			m->level[c] += volume[at] * pressure_of(w, at);
-			m->mean[c] += open ? 0 : mass[at];
-			*(open ? &m->loose[c] : &m->room[c]) += volume[at];
-		}
-	}
-	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
-		const bool any = m->room[c] + m->loose[c] > 0;
-		m->held[c] = any ? density_of(w, m, b, c) : 0;
-		m->mean[c] = m->room[c] > 0 ? m->mean[c] / m->room[c] : 0;
-		const quern_real room = m->room[c] + (m->held[c] > dense * w->p->density ? m->loose[c] : 0);
-		m->level[c] = room > 0 ? m->level[c] / room : 0;
-	}
-}
-
-/* 0 at rest, 1 in flow, by the square of the shear rate. */
-QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
-	const quern_real fast = rate2 / (still * still), share = fast * fast / (1 + fast * fast);
-	return still > 0 ? share : 1;
-}
-
-/* Points do not feel that they lie one upon the other: as material is sheared, their density goes to their cell's, a part for each unit of
- * shear; if it went to the grid's at their own place it would take over that one's noise. A cell that bears nothing has no friction to lose,
- * and a point far denser than its cell is at a surface. Returned: by what share the point's density grows in this step,
- * `part` of what its cell has more. */
-QUERN_INLINE quern_real follow_cell(
-	quern_real level, quern_real held, quern_real own, quern_real part, quern_real solid) {
-	const quern_real off = held / own - 1, grown = part / (1 + part) * (off < 0.1 ? off : 0.1);
-	const bool follows = (level > 0) & (own >= solid) & (off >= -0.1);
-	return follows ? grown : 0;
-}
-
-/* A continuum alone: densities of points go to the mean of their cell's, which keeps the volume of all, much faster
- * than that goes to what the cell holds. Each by itself would take over the noise of its own gradient. */
-static quern_real follow_alone(
-	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, quern_real rate) {
-	quern_real trace = 0;
-	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
-	if (!(rate > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) || m->density[i] < dense * w->p->density)
-		return 0;
-	const quern_real sheared = rate * rate / (rate * rate + shaken * trace * trace),
-					 time = w->s->dt * COUNT_EVERY, shear = rate * sheared * time;
-	const quern_real evened = evening * w->p->follow * shear, part = w->p->follow * shear,
-					 off = m->held[c] / m->mean[c] - 1;
-	return (evened / (1 + evened) * (1 - m->density[i] / m->mean[c]) +
-			   (off < -0.1 ? 0 : part / (1 + part) * fmin(off, 0.1))) /
-		   time;
-}
-
-/* Mass that came where there was no room has brought its volume along, and does not press: what pressure lacks comes as a compression
- * beside that of the flow, where material flows, so that it holds for every material. */
-QUERN_INLINE void answer_chunk(
-	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
-	const mpm *p = w->p;
-	const quern_real dt = w->s->dt, bulk = p->bulk, follow = p->follow * dt, full = w->full,
-					 solid = dense * p->density, still = w->still, stiff = p->relief * bulk,
-					 soon = fmin(1, p->answer * dt);
-	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0] + (size_t)b * QUERN_BLOCK_CELLS;
-	const quern_real *stress[3];
-	quern_real crowded[STENCIL], holds[STENCIL], lack[STENCIL];
-	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
-	for (uint32_t i = 0; i < n; i++) {
-		crowded[i] = crowding[m->cell[i]];
-		holds[i] = m->held[m->cell[i]];
-		m->mean_pressure[i] = m->level[m->cell[i]];
-	}
-	for (int k = 0; k < dim; k++) stress[k] = w->s->use[GATHER_STRESS].real[k] + begin;
-	QUERN_SIMD
-	for (uint32_t i = 0; i < n; i++) {
-		quern_real pressure = 0, trace = 0;
-		for (int k = 0; k < dim; k++) {
-			pressure -= stress[k][i] / dim;
-			trace += m->gradient[(dim + 1) * k][i];
-		}
-		pressure -= bulk * trace * dt; /* what the flow itself will make of it */
-		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim),
-						 flows = flowing_share(still, rate2);
-		/* of the deformation, what changes shape: what only changes volume does not even out densities */
-		const quern_real shape = rate2 / (rate2 > 0 ? rate2 + shaken * trace * trace : 1);
-		const quern_real followed = flows * follow_cell(m->mean_pressure[i], holds[i], m->density[i],
-												follow * sqrt(rate2) * shape, solid);
-		/* a crowded cell's least pressure; at rest no mass arrives, and a bed is denser here than there */
-		const quern_real least = stiff * (crowded[i] - full);
-		const bool short_of = (least > 0) & (least > pressure);
-		const quern_real lacks = short_of ? soon * (least - pressure) : 0;
-		m->density[i] *= 1 + followed;
-		lack[i] = flows * lacks + bulk * followed;
-	}
-	for (int k = 0; k < dim; k++) {
-		quern_real *restrict l = m->gradient[(dim + 1) * k], *restrict kept = m->kept[k];
-		QUERN_SIMD
-		for (uint32_t i = 0; i < n; i++) {
-			kept[i] = l[i];
-			l[i] -= lack[i] / (bulk * dt * dim);
-		}
-	}
-}
-
-/* A continuum alone: how fast each density will follow until cells are counted again, and the mean pressure around. */
-QUERN_INLINE void measure_chunk(
-	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
-	const quern_column *u = w->s->use;
-	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
-	for (uint32_t i = 0; i < n; i++) {
-		const uint32_t c = (uint32_t)m->cell[i];
-		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim);
-		u[GATHER_FOLLOWING].real[0][begin + i] =
-			flowing_share(w->still, rate2) * follow_alone(w, m, c, i, sqrt(rate2));
-		u[GATHER_AROUND].real[0][begin + i] = m->level[c];
-	}
-}
-
-/* The density and, as a compression beside that of the flow, the pressure with it. */
-static void follow_chunk(const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n) {
-	const uint32_t dim = w->s->dim;
-	const quern_real *restrict following = w->s->use[GATHER_FOLLOWING].real[0] + begin;
-	for (uint32_t k = 0; k < dim; k++) {
-		quern_real *restrict l = m->gradient[(dim + 1) * k], *restrict kept = m->kept[k];
-		QUERN_SIMD
-		for (uint32_t i = 0; i < n; i++) {
-			kept[i] = l[i];
-			l[i] -= following[i] / dim;
-		}
-	}
-	QUERN_SIMD
-	for (uint32_t i = 0; i < n; i++) m->density[i] *= 1 + w->s->dt * following[i];
-}
-
 static void call_material(const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n) {
 	const quern_bound *material = &w->s->slot[SLOT_MATERIAL][0];
 	const quern_column *u = w->s->use;
@@ -438,6 +172,22 @@ static void call_material(const gather_work *w, gather_memory *m, uint32_t begin
 	for (uint32_t r = 0; r < material->n_uses; r++)
 		own[r] = quern_column_from(material->column[r], material->uses[r].shape, begin);
 	((const quern_material_ops *)material->ops)->update[dim - 2](material->self, &b);
+}
+
+/* The material, and the dashpots that its stress feels. */
+QUERN_INLINE void press_chunk(
+	const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n, const int dim) {
+	const quern_column *stress = &w->s->use[GATHER_STRESS], *dashpot = &w->s->use[GATHER_DASHPOT];
+	const uint32_t parts = quern_shape_size(QUERN_SYMMETRIC, (uint32_t)dim);
+	quern_real *old[6] = { NULL }, *new[6] = { NULL }, *out[6] = { NULL }, *gradient[9] = { NULL };
+	for (uint32_t k = 0; k < parts && dashpot->real[0]; k++)
+		memcpy(m->stress[k], stress->real[k] + begin, n * sizeof(quern_real));
+	call_material(w, m, begin, n);
+	if (!dashpot->real[0]) return;
+	for (uint32_t k = 0; k < parts; k++)
+		old[k] = m->stress[k], new[k] = stress->real[k] + begin, out[k] = dashpot->real[k] + begin;
+	for (int k = 0; k < dim * dim; k++) gradient[k] = m->gradient[k];
+	damp_chunk(dim, old, new, gradient, n, w->s->dt, w->p->damping, out);
 }
 
 /* Whether the points from i to `end` of a chunk are all finite, keep a volume and go no farther than a cell. */
@@ -510,7 +260,7 @@ QUERN_INLINE void gather_block(
 		if (w->answers) answer_chunk(w, m, b, i, n, dim);
 		if (w->counts) measure_chunk(w, m, b, i, n, dim);
 		if (w->p->alone) follow_chunk(w, m, i, n);
-		call_material(w, m, i, n);
+		press_chunk(w, m, i, n, dim);
 		for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
 			memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
 		finish_chunk(w, m, b, i, n, dim);

@@ -75,6 +75,7 @@ QUERN_USE_ENUM(SORT_USES);
 	X(SCATTER_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(SCATTER_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR) \
 	X(SCATTER_STRESS, "point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC) \
+	X(SCATTER_DASHPOT, "point.dashpot", "Pa", QUERN_READ, QUERN_SYMMETRIC, .when = "damped") \
 	X(SCATTER_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(SCATTER_AFFINE, "point.affine", "1/s", QUERN_READ, QUERN_TENSOR, .flags = QUERN_OPTIONAL) \
 	X(SCATTER_NODE_MASS, "node.mass", "kg", QUERN_ADD, QUERN_SCALAR, .doc = "Weighted mass.") \
@@ -122,6 +123,8 @@ QUERN_USE_ENUM(WALLS_USES);
 	X(GATHER_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(GATHER_VOLUME, "point.volume", "m^3", QUERN_UPDATE, QUERN_SCALAR) \
 	X(GATHER_STRESS, "point.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC) \
+	X(GATHER_DASHPOT, "point.dashpot", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, .when = "damped", .rule = QUERN_MEANS, \
+		.doc = "Stress of the dashpots beside the elastic one.") \
 	X(GATHER_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(GATHER_GRADIENT, "point.gradient", "1/s", QUERN_WRITE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Velocity gradient of the last step.") \

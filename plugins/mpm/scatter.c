@@ -26,6 +26,12 @@ QUERN_INLINE void times(
 	for (uint32_t i = 0; i < n; i++) to[i] = by[i] * column[i];
 }
 
+QUERN_INLINE void add_times(
+	quern_real *restrict to, const quern_real *restrict by, const quern_real *restrict column, uint32_t n) {
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) to[i] += by[i] * column[i];
+}
+
 /* Column by column: point by point each would wait for memory in its turn. */
 QUERN_INLINE void load_chunk(
 	const quern_column *u, scatter_memory *m, uint32_t begin, uint32_t n, const int dim, const bool affine) {
@@ -35,8 +41,10 @@ QUERN_INLINE void load_chunk(
 	times(m->base[0], part, u[SCATTER_MASS].real[0] + begin, n);
 	times(volume, part, u[SCATTER_VOLUME].real[0] + begin, n);
 	for (int k = 0; k < dim; k++) times(m->base[1 + k], m->base[0], u[SCATTER_VELOCITY].real[k] + begin, n);
-	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, (uint32_t)dim); k++)
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, (uint32_t)dim); k++) {
 		times(m->push[k], volume, u[SCATTER_STRESS].real[k] + begin, n);
+		if (u[SCATTER_DASHPOT].real[0]) add_times(m->push[k], volume, u[SCATTER_DASHPOT].real[k] + begin, n);
+	}
 	for (int k = 0; k < dim * dim && affine; k++)
 		times(m->along[k], m->base[0], u[SCATTER_AFFINE].real[k] + begin, n);
 }

@@ -61,6 +61,12 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.def = 0.003, .max = 1e6, .flags = QUERN_ADVANCED),
 	QUERN_PARAM_AS(mpm, diameter, "grain.diameter", "m", "Mean diameter of the grains.",
 		.from = "grain.diameter", .flags = QUERN_MAYBE | QUERN_ADVANCED, .max = 1e6),
+	QUERN_PARAM(mpm, damping, "s",
+		"Dashpots beside the elastic stress, over its moduli: waves of the angular frequency w lose w^2 times this of their energy in a "
+		"second. A contact's dashpot over its stiffness is the order of what grains have.",
+		.max = 1e6),
+	QUERN_PARAM(mpm, damped, NULL, "Keep stresses of dashpots; set by itself where there is damping.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
 		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rough, NULL,
@@ -305,8 +311,11 @@ static quern_real frequency(const mpm *p) {
 	return sqrt(p->stiffness * modulus / p->density) / p->cell;
 }
 
-/* 1/s; with advection dt (omega/2 + |v|/h) < 1. */
-static quern_real rate_at(const mpm *p, quern_real fastest) { return 0.5 * frequency(p) + fastest / p->cell; }
+/* 1/s; with advection dt (omega/2 + |v|/h) < 1. Dashpots, which see the motion of the step before, ask for (omega dt)^2 + 2 T omega^2 dt < 4. */
+static quern_real rate_at(const mpm *p, quern_real fastest) {
+	const quern_real half = 0.5 * frequency(p), damped = half * p->damping;
+	return half * (damped + sqrt(1 + damped * damped)) + fastest / p->cell;
+}
 
 static quern_status ready(void *self, const quern_setup *setup, const quern_bound *const *slot,
 	const uint32_t *n_slot, quern_err *err) {
@@ -331,6 +340,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 		return setup->host->fail(err, QUERN_E_PARAM, "rasterise",
 			"is plain, and %s makes a matrix that points send with their velocity: take auto", transfer->id);
 	p->affine = p->affine || p->matrix;
+	p->damped = p->damped || p->damping > 0;
 	((const quern_material_ops *)material->ops)
 		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
 	p->alone = ((const quern_material_ops *)material->ops)->friction && (p->follow > 0 || p->alone) &&

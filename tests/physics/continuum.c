@@ -32,16 +32,16 @@ typedef struct bar {
 	double period, kept; /* kept: the fastest of the mean velocity after two periods, over the first */
 } bar;
 
-static bar ring(int cells, const char *shape, double speed) {
+static bar ring(int cells, const char *shape, double speed, double damping) {
 	const double h = (double)BAR_LENGTH / cells;
 	quern_run *run = harness_open(1,
 		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [%.17g, %.17g]},\n"
 		"time: {end: 1000, step: %.17g, force: true}, output: {every: 100},\n"
 		"bodies: [{plane: {point: [0, 0], normal: [1, 0], boundary: sticky}}],\n"
-		"continuum: {cell: %.17g, material: {elastic: {bulk_modulus: 50, poisson: 0, density: 1}},\n"
+		"continuum: {cell: %.17g, damping: %.17g, material: {elastic: {bulk_modulus: 50, poisson: 0, density: 1}},\n"
 		"  shape: %s, transfer: {picflip: {rate: 0}},\n"
 		"  fill: [{region: {box: {lower: [0, 0], upper: [%d, %.17g]}}}]}}\n",
-		(cells + 2) * h, 2 * h, 1.0 / cells, h, shape, BAR_LENGTH, 2 * h);
+		(cells + 2) * h, 2 * h, 1.0 / cells, h, damping, shape, BAR_LENGTH, 2 * h);
 	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
 	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
 		v.real[0][i] = speed * sin(pi * x.real[0][i] / (2 * BAR_LENGTH));
@@ -72,7 +72,7 @@ static void vibrating_bar(void **unused) {
 		snprintf(what, sizeof what, "bar of 25 m, %s: period, s", shapes[shape]);
 		table_head(what);
 		for (int k = 0; k < (shape == 1 ? 3 : 4); k++) {
-			const bar b = ring(cells[k], shapes[shape], 0.01);
+			const bar b = ring(cells[k], shapes[shape], 0.01, 0);
 			errors[k] = b.period - 10;
 			snprintf(what, sizeof what, "%d cells of two points", cells[k]);
 			good &= table_row(what, b.period, 10, 0.1);
@@ -82,8 +82,68 @@ static void vibrating_bar(void **unused) {
 		}
 	}
 	table_head("the same, at ten times the speed");
-	good &= table_row("13 cells of two points", ring(13, "gimp", 0.1).period, 10, 0.1);
+	good &= table_row("13 cells of two points", ring(13, "gimp", 0.1, 0).period, 10, 0.1);
 	assert_true(good);
+}
+
+/* Dashpots of the time T take w^2 T/2 of the amplitude in a second. */
+static void damped_bar(void **unused) {
+	static const double times[] = { 0.01, 0.02, 0.05 };
+	const double w = 2 * pi / 10, unseen = ring(26, "gimp", 0.01, 0).kept;
+	bool good = true;
+	(void)unused;
+	table_head("bar with dashpots: share of the amplitude after two periods");
+	for (size_t k = 0; k < sizeof times / sizeof *times; k++) {
+		char what[80];
+		snprintf(what, sizeof what, "damping %g s", times[k]);
+		good &= table_row(
+			what, ring(26, "gimp", 0.01, times[k]).kept / unseen, exp(-10 * w * w * times[k]), 0.005);
+	}
+	assert_true(good);
+}
+
+/* Kinetic energy of a block at random velocities after 300 steps, over that at the start. The step is `part` of the longest one,
+ * (w dt)^2 + 2 T w^2 dt = 4 with w^2 = (28/3) d K/rho h^2. */
+static double shake(double damping, double part, bool three) {
+	const double w2 = 28.0 / 3 * (three ? 3 : 2) * 50,
+				 step = part * (sqrt(damping * damping + 4 / w2) - damping);
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: %d, gravity: [0, 0%s], domain: {lower: [0, 0%s], upper: [12, 12%s], periodic: [true, true%s]},\n"
+		"time: {end: 1000, step: %.17g, force: true}, output: {every: 100},\n"
+		"continuum: {cell: 1, damping: %g, material: {elastic: {bulk_modulus: 50, density: 1}}, transfer: {picflip: {rate: 0}},\n"
+		"  fill: [{region: {box: {lower: [0, 0%s], upper: [12, 12%s]}}}]}}\n",
+		three ? 3 : 2, three ? ", 0" : "", three ? ", 0" : "", three ? ", 12" : "", three ? ", true" : "",
+		step, damping, three ? ", 0" : "", three ? ", 12" : "");
+	const quern_column v = harness_field(run, "point.velocity");
+	const uint32_t n = harness_count(run, "point"), dim = three ? 3 : 2;
+	double first = 0, last = 0;
+	for (uint32_t i = 0; i < n; i++)
+		for (uint32_t k = 0; k < dim; k++) {
+			v.real[k][i] = 1e-5 * (sin(37.7 * i * i + 11 * k) + sin(12.9 * i + k));
+			first += v.real[k][i] * v.real[k][i];
+		}
+	harness_steps(run, 300);
+	const quern_column u = harness_field(run, "point.velocity");
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		for (uint32_t k = 0; k < dim; k++) last += u.real[k][i] * u.real[k][i];
+	harness_close(run);
+	return last / first;
+}
+
+/* What dashpots see is the motion of the step before, and with them the step has to be shorter. */
+static void step_with_dashpots(void **unused) {
+	static const double times[] = { 0, 0.01, 0.1 };
+	(void)unused;
+	table_head("kinetic energy after 300 steps, over that at first");
+	for (int k = 0; k < 6; k++) {
+		const bool three = k % 2;
+		const double held = shake(times[k / 2], 0.9, three);
+		char what[80];
+		snprintf(
+			what, sizeof what, "%s, damping %g s, 0.9 of the limit", three ? "3-D" : "2-D", times[k / 2]);
+		table_note(what, held);
+		assert_true(held < 1.1);
+	}
 }
 
 /* ==== a standing wave, ten cells long ==== */
@@ -444,11 +504,11 @@ static void seams_keep_points_inside(void **state) {
 }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar),
-		cmocka_unit_test(xpic_damps_less_by_order), cmocka_unit_test(weight_at_rest),
-		cmocka_unit_test(layer_at_rest), cmocka_unit_test(weight_after_ringing),
-		cmocka_unit_test(thrown_and_fallen), cmocka_unit_test(lattice_is_uniform),
-		cmocka_unit_test(inside_out_ends_the_run), cmocka_unit_test(grid_follows_the_block),
-		cmocka_unit_test(seams_keep_points_inside) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(damped_bar),
+		cmocka_unit_test(step_with_dashpots), cmocka_unit_test(xpic_damps_less_by_order),
+		cmocka_unit_test(weight_at_rest), cmocka_unit_test(layer_at_rest),
+		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen),
+		cmocka_unit_test(lattice_is_uniform), cmocka_unit_test(inside_out_ends_the_run),
+		cmocka_unit_test(grid_follows_the_block), cmocka_unit_test(seams_keep_points_inside) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* gather - what the parts of the way from nodes to points share */
+#pragma once
+#include "../common/calm.h"
+#include "../common/cloud.h"
+#include "../common/trips.h"
+#include "mpm.h"
+
+typedef struct gather_work {
+	const mpm *p;
+	const quern_step *s;
+	const quern_grid_view *g;
+	const uint32_t *point;
+	cloud points;
+	const quern_row *motion;
+	trips trips;
+	calm calm;
+	bool answers;         /* volume does, to how full cells are */
+	bool counts;          /* the same of a continuum alone, in this step */
+	quern_real full;      /* from there on a cell is crowded */
+	quern_real still;     /* 1/s: sheared much faster, material flows */
+	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
+} gather_work;
+
+typedef struct gather_memory {
+	quern_row tile[QUERN_TILE_MOST];
+	trip_memory trip;
+	_Alignas(64) quern_real gradient[9][STENCIL], grid_density[STENCIL], density[STENCIL], moved[STENCIL];
+	_Alignas(64) quern_real kept[3][STENCIL], mean_pressure[STENCIL], stress[6][STENCIL];
+	/* by cell of the block: Pa and m^3 of its points, m^3 of those that are open, kg/m^3 of what it holds and of its points that
+	 * are not open */
+	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
+		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
+	fit_memory fit;                   /* where the transfer asks for it */
+	int32_t cell[STENCIL];            /* of the block, by point of a chunk */
+	quern_real said[QUERN_TILE_MOST]; /* kg/m^3 at the tile's nodes */
+	bool silent[QUERN_TILE_MOST];     /* those that bodies leave no room */
+} gather_memory;
