@@ -31,8 +31,13 @@ static bool any_outside(const quern_step *s, const outlets *o) {
 static void book_entry(const quern_step *s, const outlets *o, uint32_t i, uint32_t face) {
 	const quern_real mass = cloud_mass(&o->of, i);
 	booking b = { .mass = mass, .count = o->of.weight ? o->of.weight[i] : 1 };
-	quern_real each = 0.5 * cloud_square(o->velocity, i, s->dim) + (o->energy ? o->energy[i] : 0);
-	for (uint32_t k = 0; k < s->dim; k++) b.momentum[k] = mass * o->velocity->real[k][i];
+	quern_real each = o->energy ? o->energy[i] : 0;
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real lent = o->lent && o->lent->real[0] ? o->moving * o->lent->real[k][i] : 0,
+						 v = o->velocity->real[k][i] - lent;
+		b.momentum[k] = mass * v;
+		each += 0.5 * v * v;
+	}
 	if (o->spin && o->spin->real[0])
 		each += 0.5 * quern_radius_inertia(s->dim) * o->radius[i] * o->radius[i] *
 				cloud_square(o->spin, i, s->dim == 3 ? 3 : 1);

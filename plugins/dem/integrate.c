@@ -129,6 +129,17 @@ static void own_columns(const forces_shared *sh, const forces_work *w, const que
 	}
 }
 
+/* What a coupling will give in this step, ahead. */
+static void add_lent(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n) {
+	const quern_real *restrict m = w->grains[G_MASS];
+	for (uint32_t k = 0; k < sh->s->dim && sh->use[FORCE_LENT].real[0]; k++) {
+		const quern_real *restrict lent = sh->use[FORCE_LENT].real[k] + begin;
+		quern_real *restrict f = w->grains[G_FORCE + k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) f[i] += m[i] * lent[i];
+	}
+}
+
 static void integrate(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n) {
 	const quern_bound *bound = dem_integrator(sh->s);
 	const quern_column *u = sh->use;
@@ -181,6 +192,7 @@ void quern_dem_integrate(const forces_shared *sh, forces_work *w, uint32_t b, qu
 		load_grains(sh, w, begin, row, n);
 		for (uint32_t k = 0; k < sh->s->dim && sum->real[0]; k++)
 			memcpy(sum->real[k] + begin, w->grains[G_FORCE + k], n * sizeof(quern_real));
+		add_lent(sh, w, begin, n);
 		if (sh->looks) {
 			look_at_motion(sh, w, begin, n);
 			quern_dem_have(sh, w, begin, n, sums);

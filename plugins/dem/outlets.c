@@ -12,6 +12,7 @@ quern_status quern_dem_outlets(const void *self, const quern_step *s) {
 		.velocity = &u[OUT_VELOCITY],
 		.spin = &u[OUT_SPIN],
 		.radius = u[OUT_RADIUS].real[0],
+		.lent = &u[OUT_LENT],
 		.moving = ((quern_real)s->within + 1) * s->dt,
 		.pull = s->settling ? NULL : u[OUT_PULL].real[0],
 		.books = &u[LEFT_MASS] };

@@ -2,6 +2,7 @@
 /* back - what the exchange has changed, from the nodes to the grains, through a transfer */
 #include "../common/calm.h"
 #include "../common/trips.h"
+#include "lend.h"
 #include "meet.h"
 #include "solve.h"
 #include <math.h>
@@ -97,12 +98,13 @@ static void call_transfer(const back_work *w, back_memory *m, uint32_t n, bool l
  * substep after the share a of that. With the whole dt dv the scheme is unstable: docs/theory/hybrid.md, section 2. */
 quern_real quern_hybrid_move(const hybrid *h, const quern_step *s, int32_t i, const quern_real velocity[3]) {
 	const quern_column *u = s->use;
-	const quern_real share = (0.5 * (h->substeps + 1) - h->ahead) / h->substeps * s->dt;
+	const quern_real share = quern_hybrid_path(h, s);
 	quern_real way = 0;
 	for (uint32_t a = 0; a < s->dim; a++) {
 		const quern_real jump = velocity[a] - u[B_VELOCITY].real[a][i];
 		u[B_VELOCITY].real[a][i] = velocity[a];
 		u[B_POSITION].real[a][i] += share * jump;
+		u[B_LENT].real[a][i] = jump / s->dt;
 		const quern_real d = u[B_POSITION].real[a][i] - u[B_ANCHOR].real[a][i];
 		way += d * d;
 	}

@@ -269,6 +269,47 @@ bool quern_hybrid_contact_stress(const update *d, uint32_t cell, quern_real stre
 	return samples > 0;
 }
 
+/* A cell of which samples say what presses there. */
+static bool is_sampled(const update *d, int32_t c) {
+	return c >= 0 && d->u[U_ZONE].index[c] != QUERN_CONTINUUM && d->open[c] > 0.5 &&
+		   d->mass[c] > 0.5 * d->open[c] * d->full;
+}
+
+static bool add_pair(
+	const update *d, uint32_t here, const int32_t cell[3], const int32_t way[3], quern_real sum[6]) {
+	quern_real stress[2][6], from[3], to[3];
+	quern_hybrid_centre(d, cell, from);
+	for (int side = 0; side < 2; side++) {
+		int32_t at[3];
+		for (uint32_t k = 0; k < 3; k++) at[k] = cell[k] + (side ? -way[k] : way[k]);
+		quern_hybrid_centre(d, at, to);
+		const int32_t c = quern_grid_entry_back(d->g, at);
+		/* from either end: one farther from a body than two cells is not asked */
+		if (!is_sampled(d, c) || quern_hybrid_walled(d, NULL, (uint32_t)c, to, from) ||
+			quern_hybrid_walled(d, NULL, here, from, to))
+			return false;
+		quern_hybrid_contact_stress(d, (uint32_t)c, stress[side]);
+	}
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++)
+		sum[k] += stress[0][k] + stress[1][k];
+	return true;
+}
+
+enum { FAR = 2 };
+
+bool quern_hybrid_mean_stress(const update *d, uint32_t c, quern_real stress[6]) {
+	const int depth = d->s->dim == 3 ? FAR : 0;
+	int32_t cell[3], n = 1;
+	if (!quern_hybrid_contact_stress(d, c, stress)) return false;
+	if (!quern_grid_cell_of(d->g, c, cell)) return true;
+	for (int z = 0; z <= depth; z++)
+		for (int y = z ? -FAR : 0; y <= FAR; y++)
+			for (int x = z || y ? -FAR : 1; x <= FAR; x++)
+				if (add_pair(d, c, cell, (int32_t[3]) { x, y, z }, stress)) n += 2;
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, d->s->dim); k++) stress[k] /= n;
+	return true;
+}
+
 /* The unit vector along which the continuum's share grows at a cell, zero where it does not. */
 static void normal_of(const update *d, uint32_t c, quern_real n[3]) {
 	int32_t cell[3];

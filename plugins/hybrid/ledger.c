@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* ledger - what a cell holds but neither grains nor points carry: mass and momentum. docs/theory/hybrid.md, section 5 */
-#include "update.h"
+#include "lend.h"
 #include <math.h>
 #include <string.h>
 
@@ -34,7 +34,7 @@ static void take_over_stress(const update *d, uint32_t c) {
 	const uint32_t n = quern_shape_size(QUERN_SYMMETRIC, d->s->dim), begin = d->point_begin[c],
 				   end = d->point_begin[c + 1];
 	const quern_real share = old_share(d, (int32_t)c);
-	if (begin == end || !quern_hybrid_contact_stress(d, c, contact)) return;
+	if (begin == end || !quern_hybrid_mean_stress(d, c, contact)) return;
 	for (uint32_t q = begin; q < end; q++)
 		for (uint32_t k = 0; k < n; k++) {
 			quern_real *stress = &d->u[U_POINT_STRESS].real[k][d->point[q]];
@@ -43,18 +43,61 @@ static void take_over_stress(const update *d, uint32_t c) {
 	quern_hybrid_assign(d, (uint32_t)d->point[begin], end - begin); /* points of a cell lie together */
 }
 
+/* Whether a cell is on its way to all continuum. One that shall hold grains too keeps the mass of those that it has. */
+static bool gains(const update *d, uint32_t c) {
+	return d->wish[c] == QUERN_CONTINUUM && d->open[c] >= 0.125 && d->share[c] > old_share(d, (int32_t)c);
+}
+
+/* What grains give to the continuum, in the hats of the cells around that take some too, so that its centre stays: four discs lie anywhere in
+ * a cell, and points are made in the same places of each. */
+static void book_spread(const update *d, uint32_t c, uint32_t i, quern_real mass, const quern_real v[3]) {
+	const uint32_t dim = d->s->dim;
+	int32_t cell[3], step[3] = { 0 };
+	quern_real part[3] = { 0 }, centre[3], left = mass;
+	if (!gains(d, c) || !quern_grid_cell_of(d->g, c, cell)) {
+		quern_hybrid_book(d, c, mass, v);
+		return;
+	}
+	quern_hybrid_centre(d, cell, centre);
+	for (uint32_t k = 0; k < dim; k++) {
+		const quern_real t = quern_image_at(d->u[U_GRAIN_POSITION].real[k][i], centre[k], d->images.half[k],
+								 d->images.length[k]) -
+							 centre[k];
+		step[k] = t < 0 ? -1 : 1;
+		part[k] = fabs(t) / d->g->cell;
+	}
+	for (uint32_t corner = 1; corner < 1u << dim; corner++) {
+		int32_t at[3] = { cell[0], cell[1], cell[2] };
+		quern_real w = mass, there[3];
+		for (uint32_t k = 0; k < dim; k++) {
+			w *= corner >> k & 1 ? part[k] : 1 - part[k];
+			if (corner >> k & 1) at[k] += step[k];
+		}
+		quern_hybrid_centre(d, at, there);
+		const int32_t to = quern_grid_entry_back(d->g, at);
+		if (to < 0 || !gains(d, (uint32_t)to) || quern_hybrid_walled(d, NULL, c, centre, there)) continue;
+		quern_hybrid_book(d, (uint32_t)to, w, v);
+		left -= w;
+	}
+	quern_hybrid_book(d, c, left, v);
+}
+
 /* A particle gets the share of its cell, and what that changes is booked; returns its weight. */
 static quern_real weigh(const update *d, uint32_t c, quern_real share, quern_real *weight, quern_real mass,
-	quern_real *const v[3], uint32_t i) {
+	quern_real *const v[3], uint32_t i, bool spread) {
 	const quern_real change = share - weight[i];
 	quern_real at[3] = { 0 };
 	for (uint32_t k = 0; k < d->s->dim; k++) at[k] = v[k][i];
-	if (change != 0) quern_hybrid_book(d, c, -change * mass, at);
+	if (change < 0 && spread) book_spread(d, c, i, -change * mass, at);
+	else if (change != 0) quern_hybrid_book(d, c, -change * mass, at);
 	return weight[i] = share;
 }
 
-void quern_hybrid_weigh(update *d) {
+quern_status quern_hybrid_weigh(update *d) {
 	const quern_column *u = d->u;
+	quern_real *old = d->s->host->memory(d->s->run, ((size_t)d->n_grains + 1) * sizeof(quern_real));
+	if (!old) return QUERN_E_MEMORY;
+	memcpy(old, u[U_GRAIN_WEIGHT].real[0], d->n_grains * sizeof(quern_real));
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (u[U_ZONE].index[c] == QUERN_HYBRID && d->zone[c] == QUERN_CONTINUUM) take_over_stress(d, c);
 	for (uint32_t q = 0; q < d->n_grains; q++) {
@@ -63,20 +106,22 @@ void quern_hybrid_weigh(update *d) {
 		const int32_t c = d->grain_cell[i];
 		if (c < 0) continue;
 		const quern_real weight = weigh(d, (uint32_t)c, grain_share(d, (uint32_t)c),
-			u[U_GRAIN_WEIGHT].real[0], mass, u[U_GRAIN_VELOCITY].real, i);
+			u[U_GRAIN_WEIGHT].real[0], mass, u[U_GRAIN_VELOCITY].real, i, true);
 		d->drop_grain[i] = weight == 0;
 		d->in_grains[c] += weight * mass;
 	}
+	quern_hybrid_lend(d, old);
 	for (uint32_t q = 0; q < d->n_points; q++) {
 		const uint32_t i = quern_nth(d->point_order, q);
 		const quern_real mass = u[U_POINT_MASS].real[0][i];
 		const int32_t c = d->point_cell[i];
 		if (c < 0) continue;
 		const quern_real weight = weigh(d, (uint32_t)c, point_share(d, (uint32_t)c),
-			u[U_POINT_WEIGHT].real[0], mass, u[U_POINT_VELOCITY].real, i);
+			u[U_POINT_WEIGHT].real[0], mass, u[U_POINT_VELOCITY].real, i, false);
 		d->drop_point[i] = weight == 0;
 		d->in_points[c] += weight * mass;
 	}
+	return QUERN_OK;
 }
 
 /* The open neighbour with most in it, -1 if there is none. */

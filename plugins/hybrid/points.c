@@ -93,6 +93,8 @@ void quern_hybrid_create(update *d, uint32_t c, quern_real mass, const quern_rea
 	weigh_parts(d, c, cell, held);
 	while (any && count < parts && mass / d->nominal >= 1.5 * count) count *= 2;
 	count = any && count < open ? count : open;
+	quern_real stress[6];
+	quern_hybrid_mean_stress(d, c, stress);
 	for (uint32_t k = 0; k < count; k++) {
 		uint32_t best = parts;
 		for (uint32_t p = 0; p < parts; p++)
@@ -103,7 +105,7 @@ void quern_hybrid_create(update *d, uint32_t c, quern_real mass, const quern_rea
 		};
 		part_centre(d, cell, best, point.position);
 		memcpy(point.velocity, v, sizeof point.velocity);
-		quern_hybrid_contact_stress(d, c, point.stress);
+		memcpy(point.stress, stress, sizeof stress);
 		add_point(d, &point);
 	}
 }

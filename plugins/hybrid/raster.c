@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* raster - grains to nodes: mass and momentum of those that meet continuum */
+#include "lend.h"
 #include "meet.h"
 #include <string.h>
 
@@ -73,6 +74,8 @@ quern_status quern_hybrid_raster(const void *self, const quern_step *s) {
 		.node = (const quern_row *)(void *)u[R_NODE].real[0],
 		.motion = (const quern_row *)(void *)u[R_MOTION].real[0],
 		.mixture = (quern_row *)(void *)u[R_MIXTURE].real[0] };
+	const quern_status status = quern_hybrid_take_back(self, s);
+	if (status != QUERN_OK) return status;
 	if (!s->host->set(s->run, "point").n) return QUERN_OK;
 	if (!quern_hybrid_residents(s, &u[R_POSITION], u[R_FIXED].index, &w.at)) return QUERN_E_MEMORY;
 	stencil_by_colour(s, w.g, raster_one, &w);

@@ -16,6 +16,11 @@
 	X(U_GRAIN_MASS, "grain.mass", "kg", QUERN_UPDATE, QUERN_SCALAR) \
 	X(U_GRAIN_WEIGHT, "grain.weight", "1", QUERN_UPDATE, QUERN_SCALAR, .initial = 1, .flags = QUERN_SHOWN) \
 	X(U_GRAIN_FIXED, FIXED_USE) \
+	X(U_LENT, "grain.lent", "m/s^2", QUERN_UPDATE, QUERN_VECTOR, \
+		.doc = "What the coupling has given in the last long step, and gives ahead in this one.") \
+	X(U_BORNE, "contact.borne", "N", QUERN_READ, QUERN_VECTOR) \
+	X(U_CONTACT_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
+	X(U_CONTACT_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
 	X(U_GRAIN_ID, "grain.id", "1", QUERN_READ, QUERN_ID) \
 	X(U_GRAIN_NORMAL, "grain.zone_normal", "1", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Unit normal of the zone's level set.") \
@@ -99,14 +104,19 @@ QUERN_USE_ENUM(UPDATE_USES);
 	X(S_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
 	X(S_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR) \
 	X(S_FIXED, FIXED_USE) \
+	X(S_BORNE, "contact.borne", "N", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_RELEASED, \
+		.doc = "Force of the last substep before an update, whoever looks in between.") \
 	X(S_STRESS, "cell.stress", "Pa", QUERN_UPDATE, QUERN_SYMMETRIC, .flags = QUERN_RELEASED) \
 	X(S_SAMPLES, "total.samples", "1", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED) \
 	X(S_TOUCH_FEATURE, "touch.feature", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL)
 QUERN_USE_ENUM(SAMPLE_USES);
 
 #define RASTER_USES(X) \
-	X(R_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
-	X(R_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(R_POSITION, "grain.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
+	X(R_VELOCITY, "grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(R_LENT, "grain.lent", "m/s^2", QUERN_UPDATE, QUERN_VECTOR) \
+	X(R_ANCHOR, "grain.anchor", "m", QUERN_READ, QUERN_VECTOR) \
+	X(R_DISPLACEMENT, "total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY) \
 	X(R_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(R_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR) \
 	X(R_FIXED, FIXED_USE) \
@@ -137,6 +147,7 @@ QUERN_USE_ENUM(COUPLE_USES);
 	X(B_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(B_WEIGHT, "grain.weight", "1", QUERN_READ, QUERN_SCALAR) \
 	X(B_FIXED, FIXED_USE) \
+	X(B_LENT, "grain.lent", "m/s^2", QUERN_UPDATE, QUERN_VECTOR) \
 	X(B_ANCHOR, "grain.anchor", "m", QUERN_READ, QUERN_VECTOR) \
 	X(B_NODE, "node.mass", "kg", QUERN_READ, QUERN_SCALAR) \
 	X(B_MIXTURE, "mixture.mass", "kg", QUERN_READ, QUERN_SCALAR) \

@@ -3,6 +3,7 @@
 #include "../common/symmetric.h"
 #include "contacts.h"
 #include <math.h>
+#include <string.h>
 
 typedef struct {
 	const quern_step *s;
@@ -100,8 +101,16 @@ static void sample_touch(sampling *p, uint32_t q) {
 	add(p, quern_vec_sub(centre, branch), f, branch);
 }
 
+/* Looks at the grains between two steps write forces of their own. */
+static void keep_forces(const quern_step *s) {
+	const uint32_t n = s->host->set(s->run, "contact").n;
+	for (uint32_t k = 0; k < s->dim; k++)
+		memcpy(s->use[S_BORNE].real[k], s->use[S_FORCE].real[k], n * sizeof(quern_real));
+}
+
 quern_status quern_hybrid_sample(const void *self, const quern_step *s) {
 	const hybrid *h = self;
+	if (!s->settling && s->step % h->every == 0 && s->substep + 1 == s->n_substeps) keep_forces(s);
 	/* the first update comes after one step: it too must find a sample */
 	const bool first = s->step == 0 && s->substep + 1 == s->n_substeps;
 	if (s->settling || ((s->substep + 1) % h->sample_every && !first)) return QUERN_OK;

@@ -22,8 +22,8 @@ static quern_status reckon(update *d) {
 	if (status == QUERN_OK) status = quern_hybrid_zones(d);
 	if (status == QUERN_OK) status = quern_hybrid_limit_changes(d);
 	if (status == QUERN_OK) status = quern_hybrid_shares(d);
+	if (status == QUERN_OK) status = quern_hybrid_weigh(d);
 	if (status != QUERN_OK) return status;
-	quern_hybrid_weigh(d);
 	quern_hybrid_crowding(d);
 	status = quern_hybrid_hand_over(d);
 	if (status == QUERN_OK) status = quern_hybrid_grains(d);

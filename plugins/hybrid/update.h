@@ -36,6 +36,7 @@ typedef struct update {
 	const body_pose *pose;    /* by body */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
 	int32_t *zone;            /* by cell: the new one; the old one stands in the field until the end */
+	const int32_t *wish;      /* by cell: the zone that it goes to, in as many updates as it takes */
 	quern_real *near;         /* by cell: m to the nearest surface of any oracle */
 	quern_real *share;        /* by cell: the continuum's, in the new zone */
 	quern_real *asked;        /* by cell: what oracles ask for in its place, -1: nothing; NULL: nobody asks */
@@ -75,6 +76,9 @@ void quern_hybrid_fractions(update *);
 /* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is
  * none. */
 bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stress[6]);
+/* The same over the pairs of cells up to two to either side of it that both have samples: forces differ from chain to chain, and what
+ * grows evenly with depth stays. */
+bool quern_hybrid_mean_stress(const update *, uint32_t cell, quern_real stress[6]);
 /* Normals of the zone at every particle. After the sets have their new order. */
 quern_status quern_hybrid_normals(update *);
 
@@ -117,7 +121,7 @@ bool quern_hybrid_is_owed(const quern_column *, uint32_t cell, uint32_t dim);
 /* Adds to a cell's entry what is carried no longer, or takes from it what is carried now. */
 void quern_hybrid_book(const update *, uint32_t cell, quern_real mass, const quern_real v[3]);
 void quern_hybrid_pass(const update *, uint32_t from, uint32_t to);
-void quern_hybrid_weigh(update *);
+quern_status quern_hybrid_weigh(update *);
 quern_status quern_hybrid_hand_over(update *);
 /* All that a cell holds: carried by either, or owed. */
 QUERN_INLINE quern_real cell_holds(const update *d, uint32_t c) {

@@ -471,6 +471,7 @@ quern_status quern_hybrid_zones(update *d) {
 		if (status != QUERN_OK) return status;
 	}
 	d->changed = 0;
+	d->wish = w.low;
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		const int32_t old = d->u[U_ZONE].index[c];
 		int32_t new = old < w.low[c] ? w.low[c] : old > w.high[c] ? w.high[c] : old;
