@@ -26,10 +26,10 @@ typedef struct outlets {
 	cloud of;
 	const quern_column *position, *velocity, *spin; /* spin NULL or without columns: nothing turns */
 	const quern_real *radius, *energy;              /* m, of what turns; J/kg stored, NULL: nothing is */
-	const quern_column *lent;                       /* m/s^2 in v that is no motion of its own; NULL or without columns: none */
-	quern_real moving;                              /* s since gravity began to act in this long step */
-	quern_real *pull;                               /* kg s, sum of mass times `moving`; NULL: nobody asks */
-	const quern_column *books;                      /* first row of the book of faces */
+	const quern_column *lent;  /* m/s^2 in v that is no motion of its own; NULL or without columns: none */
+	quern_real moving;         /* s since gravity began to act in this long step */
+	quern_real *pull;          /* kg s, sum of mass times `moving`; NULL: nobody asks */
+	const quern_column *books; /* first row of the book of faces */
 } outlets;
 
 /* [stage] Entries that go keep the others' order, and lists that point at the set lose what pointed at them. */

@@ -45,7 +45,8 @@ static void take_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 quern_status quern_hybrid_take_back(const hybrid *h, const quern_step *s) {
 	const uint32_t n = s->host->set(s->run, "grain").n, chunks = (n + CHUNK - 1) / CHUNK;
 	taking t = { &s->use[R_POSITION], &s->use[R_VELOCITY], &s->use[R_LENT], &s->use[R_ANCHOR], s->dt,
-		quern_hybrid_path(h, s), s->host->memory(s->run, ((size_t)chunks + 1) * sizeof(quern_real)), n, s->dim };
+		quern_hybrid_path(h, s), s->host->memory(s->run, ((size_t)chunks + 1) * sizeof(quern_real)), n,
+		s->dim };
 	if (!t.farthest) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, chunks, take_chunk, &t);
 	quern_real *displacement = s->use[R_DISPLACEMENT].real[0];
@@ -66,8 +67,7 @@ void quern_hybrid_lend(const update *d, const quern_real *old) {
 	const quern_column *u = d->u;
 	const quern_real *new = u[U_GRAIN_WEIGHT].real[0], *mass = u[U_GRAIN_MASS].real[0];
 	const int32_t *fixed = u[U_GRAIN_FIXED].index;
-	const contact_list list =
-		contacts_of(d->s, U_BORNE, U_CONTACT_FIRST, U_CONTACT_SECOND, U_GRAIN_POSITION);
+	const contact_list list = contacts_of(d->s, U_BORNE, U_CONTACT_FIRST, U_CONTACT_SECOND, U_GRAIN_POSITION);
 	const uint32_t *by_place = d->s->host->parts(d->s->run, "contact")->by_place;
 	contact_seen c;
 	for (uint32_t k = 0; k < list.contacts.n_blocks; k++) {
