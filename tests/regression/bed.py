@@ -85,7 +85,8 @@ if __name__ == "__main__":
                 lab.run("bed", out, *NARROW, f"--set=hybrid.substeps={substeps}", *options)
                 # the bed still swings a little from the making of zones; docs/validation/bed.md has what is left after a million steps
                 made, sunk, kinetic, carried, floor = look(out, f"{shares}, n = {substeps}")
-                borne = rows(lab.frames(out)[-1])
+                borne = numpy.mean([rows(frame) for frame in lab.frames(out)[-15:]], 0)
                 print("    rows bear " + ", ".join(f"{row:.3f}" for row in borne))
                 assert abs(made) < 0.05 and abs(sunk) < 0.01 and kinetic < 1e-4 and carried < 2e-3 and abs(floor - 1) < 0.01
-                assert all(abs(row - 1) < 0.05 for row in borne), borne
+                # two rows lie at the zone's upper edge, where grains also get impulses of the exchange, which are in neither stress
+                assert all(abs(row - 1) < 0.01 for row in borne[:-2]) and all(abs(row - 1) < 0.15 for row in borne[-2:]), borne
