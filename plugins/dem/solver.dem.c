@@ -551,7 +551,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .
 	.looks = quern_dem_looks, .look = quern_dem_look_at_run, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.dem",
 	.brief = "Grains: discs and spheres with contact laws.",
