@@ -131,14 +131,15 @@ QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
 	return still > 0 ? share : 1;
 }
 
-/* Points do not feel that they lie one upon the other: as material is sheared, their density goes to their cell's, a part for each unit of
- * shear; if it went to the grid's at their own place it would take over that one's noise. A cell that bears nothing has no friction to lose,
- * and a point far denser than its cell is at a surface. Returned: by what share the point's density grows in this step,
- * `part` of what its cell has more. */
+/* Points do not feel that they lie one upon the other: as material is sheared, their densities go to the mean of their cell's points, and that goes
+ * to the cell's, a part for each unit of shear; if each went to the grid's at its own place it would take over that one's noise. A cell that
+ * bears nothing has no friction to lose, and points far denser than their cell are at a surface. Returned: by what share a point's density
+ * grows in this step, with `part` of what its cell has more. */
 QUERN_INLINE quern_real follow_cell(
-	quern_real level, quern_real held, quern_real own, quern_real part, quern_real solid) {
-	const quern_real off = held / own - 1, grown = part / (1 + part) * (off < 0.1 ? off : 0.1);
-	const bool follows = (level > 0) & (own >= solid) & (off >= -0.1);
+	quern_real level, quern_real held, quern_real mean, quern_real own, quern_real part, quern_real solid) {
+	const quern_real off = held / mean - 1, even = 1 - own / mean, evened = evening * part,
+		grown = part / (1 + part) * (off < 0.1 ? off : 0.1) + evened / (1 + evened) * even;
+	const bool follows = (level > 0) & (own >= solid) & (mean > 0) & (off >= -0.1);
 	return follows ? grown : 0;
 }
 
@@ -169,11 +170,12 @@ QUERN_INLINE void answer_chunk(
 					 soon = fmin(1, p->answer * dt);
 	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0] + (size_t)b * QUERN_BLOCK_CELLS;
 	const quern_real *stress[3];
-	quern_real crowded[STENCIL], holds[STENCIL], lack[STENCIL];
+	quern_real crowded[STENCIL], holds[STENCIL], lack[STENCIL], mean[STENCIL];
 	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
 	for (uint32_t i = 0; i < n; i++) {
 		crowded[i] = crowding[m->cell[i]];
 		holds[i] = m->held[m->cell[i]];
+		mean[i] = m->mean[m->cell[i]];
 		m->mean_pressure[i] = m->level[m->cell[i]];
 	}
 	for (int k = 0; k < dim; k++) stress[k] = w->s->use[GATHER_STRESS].real[k] + begin;
@@ -189,7 +191,7 @@ QUERN_INLINE void answer_chunk(
 						 flows = flowing_share(still, rate2);
 		/* of the deformation, what changes shape: what only changes volume does not even out densities */
 		const quern_real shape = rate2 / (rate2 > 0 ? rate2 + shaken * trace * trace : 1);
-		const quern_real followed = flows * follow_cell(m->mean_pressure[i], holds[i], m->density[i],
+		const quern_real followed = flows * follow_cell(m->mean_pressure[i], holds[i], mean[i], m->density[i],
 												follow * sqrt(rate2) * shape, solid);
 		/* a crowded cell's least pressure; at rest no mass arrives, and a bed is denser here than there */
 		const quern_real least = stiff * (crowded[i] - full);

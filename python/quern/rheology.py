@@ -180,14 +180,15 @@ def law_of(chutes: list[Rows]) -> Law:
 
 
 def slip_of(one: Rows) -> Slip:
-    """Bagnold's profile through the rows of the bulk, u = u_f + A (H^(3/2) - (H - y)^(3/2)), that is constant I; continued to the floor, u_f
-    and the shear rate 3/2 A H^(1/2). H is where the pressure ends."""
+    """Bagnold's profile through the rows of the bulk, u = u_f + A (H^(3/2) - (H - y)^(3/2)), that is constant I; shear rate at the floor
+    3/2 A H^(1/2). H is where the pressure ends. u_f is what makes the layer flow as fast as it does on the whole: the lowest rows are slower than
+    the bulk's profile, continued to the floor, would have them."""
     k = int(np.flatnonzero(one.bulk)[0])
     height = one.y[k] + one.pressure[k] / ((one.pressure[0] - one.pressure[k]) / (one.y[k] - one.y[0]))
-    y, u = one.y[one.bulk], one.velocity[one.bulk]
-    shape = height ** 1.5 - (height - y) ** 1.5
-    rise, velocity = np.polyfit(shape, u, 1)
-    rate = 1.5 * rise * math.sqrt(height)
+    shape = height ** 1.5 - np.clip(height - one.y, 0, None) ** 1.5
+    rise, _ = np.polyfit(shape[one.bulk], one.velocity[one.bulk], 1)
+    mass = np.where(one.y < height, one.density, 0)
+    velocity, rate = mass @ (one.velocity - rise * shape) / mass.sum(), 1.5 * rise * math.sqrt(height)
     return Slip(float(velocity), float(rate), float(velocity / rate))
 
 
