@@ -18,8 +18,9 @@
 static const double diameter = 2e-3, start = 14e-3;
 enum { CYCLES = 4, STRIDES = 20, STRIDE_UPDATES = 1 }; /* half a diameter per update */
 
-/* Of a settled state, the worst of all cycles, or the mean of that over states. Which grains come where is chance, and the worst update of
- * one state scatters by a fifth and more; the mean over states is what can be asked for: the columns of the page's summary. */
+/* Of a settled state, the worst of all cycles, of kinetic energy the mean over cycles of the largest in each, or the mean of that over states.
+ * Which grains come where is chance, and the worst update of one cycle scatters by a third and more; means are what can be asked for: the
+ * columns of the page's summary. */
 typedef struct swept {
 	double kinetic, lowest, highest, lost, carried,
 		left;    /* lost: diameters of height; left: carried mass off in the end */
@@ -73,7 +74,7 @@ static void put(
 }
 
 static void take_worst(swept *w, const book *b, double lost) {
-	w->kinetic = fmax(w->kinetic, b->kinetic);
+	w->kinetic += b->kinetic / CYCLES;
 	w->lowest = fmin(w->lowest, b->lowest);
 	w->highest = fmax(w->highest, b->highest);
 	w->carried = fmax(w->carried, fabs(b->carried));
