@@ -138,7 +138,7 @@ QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
 QUERN_INLINE quern_real follow_cell(
 	quern_real level, quern_real held, quern_real mean, quern_real own, quern_real part, quern_real solid) {
 	const quern_real off = held / mean - 1, even = 1 - own / mean, evened = evening * part,
-		grown = part / (1 + part) * (off < 0.1 ? off : 0.1) + evened / (1 + evened) * even;
+					 grown = part / (1 + part) * (off < 0.1 ? off : 0.1) + evened / (1 + evened) * even;
 	const bool follows = (level > 0) & (own >= solid) & (mean > 0) & (off >= -0.1);
 	return follows ? grown : 0;
 }
