@@ -110,7 +110,7 @@ static void keep_forces(const quern_step *s) {
 
 quern_status quern_hybrid_sample(const void *self, const quern_step *s) {
 	const hybrid *h = self;
-	if (!s->settling && s->step % h->every == 0 && s->substep + 1 == s->n_substeps) keep_forces(s);
+	if (!s->settling && s->step % h->every == 0 && s->within + 1 == s->n_substeps) keep_forces(s);
 	/* the first update comes after one step: it too must find a sample */
 	const bool first = s->step == 0 && s->substep + 1 == s->n_substeps;
 	if (s->settling || ((s->substep + 1) % h->sample_every && !first)) return QUERN_OK;

@@ -76,7 +76,7 @@ void quern_hybrid_fractions(update *);
 /* Mean over the samples, and over the room that bodies leave, of the contact stress in a cell; false if there is
  * none. */
 bool quern_hybrid_contact_stress(const update *, uint32_t cell, quern_real stress[6]);
-/* The same over the pairs of cells up to two to either side of it that both have samples: forces differ from chain to chain, and what
+/* The same over the pairs of cells up to two to either side of it that both hold grains and half of what fills them: forces differ from chain to chain, and what
  * grows evenly with depth stays. */
 bool quern_hybrid_mean_stress(const update *, uint32_t cell, quern_real stress[6]);
 /* Normals of the zone at every particle. After the sets have their new order. */

@@ -133,13 +133,16 @@ QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
 
 /* Points do not feel that they lie one upon the other: as material is sheared, their densities go to the mean of their cell's points, and that goes
  * to the cell's, a part for each unit of shear; if each went to the grid's at its own place it would take over that one's noise. A cell that
- * bears nothing has no friction to lose, and points far denser than their cell are at a surface. Returned: by what share a point's density
+ * bears nothing has no friction to lose, and one whose points are far denser than it is at a surface. Returned: by what share a point's density
  * grows in this step, with `part` of what its cell has more. */
 QUERN_INLINE quern_real follow_cell(
 	quern_real level, quern_real held, quern_real mean, quern_real own, quern_real part, quern_real solid) {
 	const quern_real off = held / mean - 1, even = 1 - own / mean, evened = evening * part,
-					 grown = part / (1 + part) * (off < 0.1 ? off : 0.1) + evened / (1 + evened) * even;
-	const bool follows = (level > 0) & (own >= solid) & (mean > 0) & (off >= -0.1);
+					 counted = off < -0.1  ? 0
+							   : off < 0.1 ? off
+										   : 0.1,
+					 grown = part / (1 + part) * counted + evened / (1 + evened) * even;
+	const bool follows = (level > 0) & (own >= solid) & (mean > 0);
 	return follows ? grown : 0;
 }
 

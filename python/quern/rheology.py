@@ -60,7 +60,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Slip:
-    """At the floor, of the profile that the bulk would have there."""
+    """At the floor, of the bulk's profile, moved so that the layer is as fast as a whole."""
     velocity: float  # m/s
     rate: float  # 1/s
     length: float  # m
