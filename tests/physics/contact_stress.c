@@ -318,8 +318,37 @@ static void beds_bear_their_weight(void **state) {
 	assert_true(good);
 }
 
+/* The update that comes after a step lends what contacts bore at that step's end, in a late step as in the first. */
+static void forces_kept_for_updates(void **state) {
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [0.04, 0.06], periodic: [true, false]},\n"
+		"time: {end: 10}, bodies: [{plane: {point: [0, 0], normal: [0, 1]}}],\n"
+		"continuum: {cell: %g, material: {elastic: {bulk_modulus: 1e6, density: 1900}}},\n"
+		"hybrid: {oracle: [{packing_fraction: {depth: 9 mm, half_width: 4 mm}}], substeps: 4, update: 12},\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, contact: {linear: {stiffness: 1e5, restitution: 0.5}},\n"
+		"  fill: [{region: {box: {lower: [0, 1 mm], upper: [0.04, 0.04]}}, settle: false}]}}\n",
+		cell);
+	(void)state;
+	for (int k = 0; k < 40; k++) {
+		harness_steps(run, 3); /* an update comes in every third step, after the first */
+		if (k == 0) harness_steps(run, 1);
+		const quern_column force = harness_field(run, "contact.force"),
+						   borne = harness_field(run, "contact.borne");
+		double off = 0, most = 0;
+		for (uint32_t i = 0; i < harness_count(run, "contact"); i++)
+			for (int a = 0; a < 2; a++) {
+				off = fmax(off, fabs(force.real[a][i] - borne.real[a][i]));
+				most = fmax(most, fabs(force.real[a][i]));
+			}
+		if (k == 39) table_note("largest force, N", most);
+		assert_true(off == 0 && (k < 39 || most > 0));
+	}
+	harness_close(run);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(pairs_of_grains), cmocka_unit_test(grains_on_planes),
+	const struct CMUnitTest tests[] = { cmocka_unit_test(forces_kept_for_updates),
+		cmocka_unit_test(pairs_of_grains), cmocka_unit_test(grains_on_planes),
 		cmocka_unit_test(strained_lattices), cmocka_unit_test(beds_bear_their_weight) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
