@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "../../plugins/mpm/damp.h"
 #include "harness.h"
 #include "table.h"
 #include <stdlib.h>
@@ -143,6 +144,39 @@ static void step_with_dashpots(void **unused) {
 			what, sizeof what, "%s, damping %g s, 0.9 of the limit", three ? "3-D" : "2-D", times[k / 2]);
 		table_note(what, held);
 		assert_true(held < 1.1);
+	}
+}
+
+/* What dashpots leave out of a stress's gain is what a stress gains that turns with the material: R s R^T with R = 1 + dt W. */
+static void dashpots_leave_turning_out(void **unused) {
+	static const double s[3][3] = { { -3, 0.7, 0.4 }, { 0.7, -5, -0.9 }, { 0.4, -0.9, -2 } }, dt = 1e-7;
+	static const int at[6][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 0, 1 }, { 1, 2 }, { 0, 2 } };
+	(void)unused;
+	for (int axis = 0; axis < 3; axis++) {
+		const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+		double l[3][3] = { { 0.3, 0.2, -0.1 }, { 0.2, -0.5, 0.4 },
+			{ -0.1, 0.4, 0.6 } }; /* strain does not count */
+		double r[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+		l[a][b] -= 2, l[b][a] += 2;
+		r[a][b] -= 2 * dt, r[b][a] += 2 * dt;
+		const symmetric turned =
+			damp_turned(3, (symmetric) { s[0][0], s[1][1], s[2][2], s[0][1], s[1][2], s[0][2] },
+				(tensor) { .xx = l[0][0],
+					.xy = l[0][1],
+					.xz = l[0][2],
+					.yx = l[1][0],
+					.yy = l[1][1],
+					.yz = l[1][2],
+					.zx = l[2][0],
+					.zy = l[2][1],
+					.zz = l[2][2] });
+		const double found[6] = { turned.xx, turned.yy, turned.zz, turned.xy, turned.yz, turned.xz };
+		for (int k = 0; k < 6; k++) {
+			double gain = -s[at[k][0]][at[k][1]];
+			for (int i = 0; i < 3; i++)
+				for (int j = 0; j < 3; j++) gain += r[at[k][0]][i] * s[i][j] * r[at[k][1]][j];
+			assert_true(fabs(gain / dt - found[k]) < 1e-5);
+		}
 	}
 }
 
@@ -505,10 +539,11 @@ static void seams_keep_points_inside(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(vibrating_bar), cmocka_unit_test(damped_bar),
-		cmocka_unit_test(step_with_dashpots), cmocka_unit_test(xpic_damps_less_by_order),
-		cmocka_unit_test(weight_at_rest), cmocka_unit_test(layer_at_rest),
-		cmocka_unit_test(weight_after_ringing), cmocka_unit_test(thrown_and_fallen),
-		cmocka_unit_test(lattice_is_uniform), cmocka_unit_test(inside_out_ends_the_run),
-		cmocka_unit_test(grid_follows_the_block), cmocka_unit_test(seams_keep_points_inside) };
+		cmocka_unit_test(step_with_dashpots), cmocka_unit_test(dashpots_leave_turning_out),
+		cmocka_unit_test(xpic_damps_less_by_order), cmocka_unit_test(weight_at_rest),
+		cmocka_unit_test(layer_at_rest), cmocka_unit_test(weight_after_ringing),
+		cmocka_unit_test(thrown_and_fallen), cmocka_unit_test(lattice_is_uniform),
+		cmocka_unit_test(inside_out_ends_the_run), cmocka_unit_test(grid_follows_the_block),
+		cmocka_unit_test(seams_keep_points_inside) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
