@@ -90,7 +90,7 @@ static quern_real density_of(const gather_work *w, const gather_memory *m, uint3
 	return counted > 0 ? centre + own_part * (counted * w->p->density - centre) : centre;
 }
 
-/* Of the stress-free density: a point less dense is open, its volume is the grid's. */
+/* Of the density of the loosest that bears: a point less dense is open, its volume is the grid's. */
 static const quern_real dense = 0.98;
 
 /* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
@@ -110,7 +110,7 @@ QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b
 		cells_of(w, b, place, n, dim, m->cell);
 		for (uint32_t i = 0; i < n; i++) {
 			const uint32_t at = begin + i, c = (uint32_t)m->cell[i];
-			const bool open = mass[at] < dense * w->p->density * volume[at];
+			const bool open = mass[at] < dense * w->p->loosest * volume[at];
 			m->level[c] += volume[at] * pressure_of(w, at);
 			m->mean[c] += open ? 0 : mass[at];
 			*(open ? &m->loose[c] : &m->room[c]) += volume[at];
@@ -120,7 +120,7 @@ QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b
 		const bool any = m->room[c] + m->loose[c] > 0;
 		m->held[c] = any ? density_of(w, m, b, c) : 0;
 		m->mean[c] = m->room[c] > 0 ? m->mean[c] / m->room[c] : 0;
-		const quern_real room = m->room[c] + (m->held[c] > dense * w->p->density ? m->loose[c] : 0);
+		const quern_real room = m->room[c] + (m->held[c] > dense * w->p->loosest ? m->loose[c] : 0);
 		m->level[c] = room > 0 ? m->level[c] / room : 0;
 	}
 }
@@ -152,7 +152,7 @@ static quern_real follow_alone(
 	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, quern_real rate) {
 	quern_real trace = 0;
 	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
-	if (!(rate > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) || m->density[i] < dense * w->p->density)
+	if (!(rate > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) || m->density[i] < dense * w->p->loosest)
 		return 0;
 	const quern_real sheared = rate * rate / (rate * rate + shaken * trace * trace),
 					 time = w->s->dt * COUNT_EVERY, shear = rate * sheared * time;
@@ -169,7 +169,7 @@ QUERN_INLINE void answer_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
 	const mpm *p = w->p;
 	const quern_real dt = w->s->dt, bulk = p->bulk, follow = p->follow * dt, full = w->full,
-					 solid = dense * p->density, still = w->still, stiff = p->relief * bulk,
+					 solid = dense * p->loosest, still = w->still, stiff = p->relief * bulk,
 					 soon = fmin(1, p->answer * dt);
 	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0] + (size_t)b * QUERN_BLOCK_CELLS;
 	const quern_real *stress[3];

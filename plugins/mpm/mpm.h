@@ -29,6 +29,7 @@ typedef struct mpm {
 	quern_real rest_alone;                /* 1/s: the same of a continuum alone, from sqrt(g/h) */
 	quern_real share_wall, share_next;    /* of a wall's nodes */
 	uint32_t dim;
+	quern_real loosest; /* kg/m^3, of what bears */
 	quern_real damping; /* s, of elastic waves */
 	bool damped;
 	bool rough, still; /* whether a body is */

@@ -341,10 +341,11 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 			"is plain, and %s makes a matrix that points send with their velocity: take auto", transfer->id);
 	p->affine = p->affine || p->matrix;
 	p->damped = p->damped || p->damping > 0;
-	((const quern_material_ops *)material->ops)
-		->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
-	p->alone = ((const quern_material_ops *)material->ops)->friction && (p->follow > 0 || p->alone) &&
-			   p->rest > 0 && !setup->host->keeps(setup, "hybrid");
+	const quern_material_ops *ops = material->ops;
+	ops->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
+	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
+	p->alone =
+		ops->friction && (p->follow > 0 || p->alone) && p->rest > 0 && !setup->host->keeps(setup, "hybrid");
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)

@@ -7,9 +7,13 @@
 
 typedef struct {
 	quern_real bulk_modulus, poisson, static_friction, limit_friction, inertial_number, diameter,
-		grain_density, critical_density, pressure_rate; /* from the scene */
-	quern_real shear;                                   /* G */
+		grain_density, critical_density, flow_density, dilation, pressure_rate; /* from the scene */
+	quern_real shear;                                                           /* G */
 } mu_i;
+
+/* Of flow that goes to a density of its own: by what share of it that falls at most; pressure over K for each unit of shear, and of what the
+ * density is off by as a share; how far off counts; by what share the pressure changes in a step at most. */
+static const quern_real widest = 0.2, steepness = 2, off_most = 0.1, step_most = 0.5;
 
 static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
 										  "Bulk modulus K; in 2-D lambda + G.", .from = "grain.bulk_modulus",
@@ -28,6 +32,11 @@ static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(mu_i, critical_density, "kg/m^3", "Below it the material is open and carries no stress.",
 		.from = "grain.critical_density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
+	QUERN_PARAM(mu_i, flow_density, "kg/m^3",
+		"Density without stress that slow flow comes to; 0: flow keeps the density that it has.", .max = 1e6),
+	QUERN_PARAM(mu_i, dilation, "1",
+		"How much looser than that flow is for each unit of the inertial number, as a share of it.",
+		.max = 10),
 	QUERN_PARAM(mu_i, pressure_rate, "1/s", "beta, pull of the pressure towards K ln(rho/rho_c).", .max = 1e9,
 		.flags = QUERN_ADVANCED),
 	QUERN_END_PARAMS };
@@ -50,6 +59,15 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (law->critical_density > law->grain_density)
 		return host->fail(err, QUERN_E_PARAM, "critical_density",
 			"%g kg/m^3 is above the density of a grain, %g", law->critical_density, law->grain_density);
+	if (law->flow_density > law->grain_density)
+		return host->fail(err, QUERN_E_PARAM, "flow_density", "%g kg/m^3 is above the density of a grain, %g",
+			law->flow_density, law->grain_density);
+	if (law->dilation > 0 && !(law->flow_density > 0))
+		return host->fail(
+			err, QUERN_E_PARAM, "dilation", "says how much looser than flow_density flow is: give that too");
+	if (law->flow_density > 0 && law->pressure_rate > 0)
+		return host->fail(err, QUERN_E_PARAM, "pressure_rate",
+			"pulls pressure to what critical_density says, and flow_density to another one: give one of them");
 	law->shear = shear_modulus(setup->dim, law->bulk_modulus, law->poisson);
 	return QUERN_OK;
 }
@@ -63,19 +81,38 @@ QUERN_INLINE quern_real flow_stress(quern_real s0, quern_real s2, quern_real tri
 	return s0 + 2 * u * v / (u + v + a + root);
 }
 
+QUERN_INLINE quern_real within(quern_real x, quern_real most) {
+	return x < -most ? -most : x < most ? x : most;
+}
+
+/* By which factor the pressure p of a point changes that shears by `strain` at this inertial number, and the density from which on such a flow
+ * bears. Implicit in p to first order: where p is little its inertial number answers faster than the step. */
+typedef struct {
+	quern_real grown, least;
+} dilatancy;
+QUERN_INLINE dilatancy dilate(
+	const mu_i *law, quern_real p, quern_real rho, quern_real strain, quern_real number) {
+	const quern_real loose = law->dilation * number, wide = loose < widest ? loose : widest,
+					 flow = law->flow_density * (1 - wide), share = p / law->bulk_modulus,
+					 off = rho / (flow * (1 + share)) - 1, gain = steepness * law->bulk_modulus * strain;
+	return (
+		dilatancy) { 1 + within(gain * within(off, off_most) / (p + gain * (0.5 * wide + share)), step_most),
+		flow < law->critical_density ? flow : law->critical_density };
+}
+
 QUERN_INLINE void put_outputs(const int dim, const mu_i *law, const quern_material_batch *b) {
 	put_wave_speeds(dim, law->bulk_modulus, law->shear, law->critical_density, b);
 	put_hypoelastic_energies(dim, law->bulk_modulus, law->shear, b);
 }
 
-/* `dim`, `rated`, `relaxed` and `mean` are constants in every caller. */
+/* `dim`, `rated`, `relaxed`, `mean` and `dilates` are constants in every caller. */
 QUERN_INLINE void kernel(const int dim, const bool rated, const bool relaxed, const bool mean,
-	const mu_i *self, const quern_material_batch *b) {
+	const bool dilates, const mu_i *self, const quern_material_batch *b) {
 	const mu_i law = *self;
 	const quern_real dt = b->dt, shear = law.shear, lambda = law.bulk_modulus - 2 * shear / dim;
 	const quern_real mu_s = law.static_friction, mu_2 = law.limit_friction;
-	const quern_real slowness = shear * law.inertial_number * dt /
-								(law.diameter * __builtin_sqrt(law.grain_density)); /* a over sqrt p */
+	const quern_real thick = law.diameter * __builtin_sqrt(law.grain_density);
+	const quern_real slowness = shear * law.inertial_number * dt / thick; /* a over sqrt p */
 	const quern_real per_strain = dt > 0 ? 1 / (shear * dt) : 0;
 	const quern_real critical = law.critical_density, one_over_critical = 1 / critical;
 	const quern_real pull = relaxed ? 1 - quern_exp(-law.pressure_rate * dt) : 0;
@@ -95,35 +132,48 @@ QUERN_INLINE void kernel(const int dim, const bool rated, const bool relaxed, co
 		const quern_real p = -symmetric_mean(dim, trial);
 		const symmetric s = symmetric_deviator(dim, trial);
 		const quern_real tau = __builtin_sqrt(symmetric_half_square(dim, s));
-		const bool dilute = rho<critical, flows = tau> mu_s * p;
-		const bool open = dilute | (p <= 0);
-		const quern_real around = mean ? mean_pressure[i] : p; /* of the inertial number */
-		const quern_real flow =
-			flow_stress(mu_s * p, mu_2 * p, tau, slowness * __builtin_sqrt(around > 0 ? around : p));
+		const bool flows = tau > mu_s * p;
+		const bool known = mean && mean_pressure[i] > 0;
+		const quern_real around = known ? mean_pressure[i] : p; /* of the inertial number */
+		const quern_real flow = flow_stress(mu_s * p, mu_2 * p, tau, slowness * __builtin_sqrt(around));
+		quern_real grown = 1, least = critical;
+		bool bore = false;
+		if (dilates) {
+			const bool slides = flows & (p > 0);
+			const quern_real now = (tau - (slides ? flow : 0)) * per_strain;
+			const dilatancy d = dilate(&law, slides ? p : law.bulk_modulus, rho, now * dt,
+				slides | known ? now * thick / __builtin_sqrt(around) : 0);
+			grown = slides ? d.grown : 1;
+			least = known ? d.least : critical;
+			bore = symmetric_mean(dim, old) < 0;
+		}
+		/* what flows bears though it is looser than what lies still; what has come to rest so goes on to bear */
+		const bool dilute = (rho < least) & !bore, open = dilute | (p <= 0);
 		/* an elastic stress keeps its bits, so that a point at rest stays as it is */
 		const symmetric closed =
-			symmetric_select(flows, symmetric_scale_shift(dim, flow / tau, s, -p), trial);
+			symmetric_select(flows, symmetric_scale_shift(dim, grown * (flow / tau), s, -(grown * p)), trial);
 		const symmetric stress = symmetric_select(open, (symmetric) { 0, 0, 0, 0, 0, 0 }, closed);
 		SYMMETRIC_PUT(b->stress, i, stress, dim);
-		const quern_real loose = grid_density[i] < critical ? grid_density[i] : critical;
+		const quern_real loose = grid_density[i] < least ? grid_density[i] : least;
 		density[i] = dilute ? loose : rho;
 		if (rated) rate[i] = (tau - (open ? 0 : flows ? flow : tau)) * per_strain;
 	}
 	put_outputs(dim, &law, b);
 }
 
+QUERN_INLINE void update_as(
+	const int dim, const bool rated, const bool mean, const mu_i *self, const quern_material_batch *b) {
+	if (self->flow_density > 0) kernel(dim, rated, false, mean, true, self, b);
+	else if (self->pressure_rate > 0) kernel(dim, rated, true, mean, false, self, b);
+	else kernel(dim, rated, false, mean, false, self, b);
+}
+
 QUERN_INLINE void update(const int dim, const void *self, const quern_material_batch *b) {
-	const bool rated = b->use[SHEAR_RATE].real[0] != NULL, relaxed = ((const mu_i *)self)->pressure_rate > 0;
-	const bool mean = b->mean_pressure != NULL;
-	if (rated) {
-		if (relaxed && mean) kernel(dim, true, true, true, self, b);
-		else if (relaxed) kernel(dim, true, true, false, self, b);
-		else if (mean) kernel(dim, true, false, true, self, b);
-		else kernel(dim, true, false, false, self, b);
-	} else if (relaxed && mean) kernel(dim, false, true, true, self, b);
-	else if (relaxed) kernel(dim, false, true, false, self, b);
-	else if (mean) kernel(dim, false, false, true, self, b);
-	else kernel(dim, false, false, false, self, b);
+	const bool rated = b->use[SHEAR_RATE].real[0] != NULL, mean = b->mean_pressure != NULL;
+	if (rated && mean) update_as(dim, true, true, self, b);
+	else if (rated) update_as(dim, true, false, self, b);
+	else if (mean) update_as(dim, false, true, self, b);
+	else update_as(dim, false, false, self, b);
 }
 static void update_2d(const void *self, const quern_material_batch *b) { update(2, self, b); }
 static void update_3d(const void *self, const quern_material_batch *b) { update(3, self, b); }
@@ -168,13 +218,20 @@ static void friction(const void *self, uint32_t dim, quern_real *slow, quern_rea
 	*density = law->grain_density;
 }
 
+static quern_real loosest(const void *self) {
+	const mu_i *law = self;
+	const quern_real flow = law->flow_density * (1 - (law->dilation > 0 ? widest : 0));
+	return flow > 0 && flow < law->critical_density ? flow : law->critical_density;
+}
+
 static const quern_material_ops ops = { .size = sizeof ops,
 	.update = { update_2d, update_3d },
 	.assign = { assign_2d, assign_3d },
 	.moduli = moduli,
-	.friction = friction };
+	.friction = friction,
+	.loosest = loosest };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.mu_i",
 	.brief = "Grains as a fluid whose friction grows with the rate of flow: mu(I).",
@@ -182,8 +239,9 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 		"Elastic in rates below the yield stress. Above it the shear stress over the pressure is mu(I), "
 		"solved "
 		"implicitly, so that viscosity never limits the step. It resists no tension, and below the critical "
-		"density nothing: such a point takes its volume from the grid until it is dense again.",
-	.cite = "Dunatunga & Kamrin 2015; Jop, Forterre & Pouliquen 2006",
+		"density nothing: such a point takes its volume from the grid until it is dense again. With flow_density "
+		"what flows comes to a density of its own, the looser the faster it flows.",
+	.cite = "Dunatunga & Kamrin 2015; Jop, Forterre & Pouliquen 2006; Pailha & Pouliquen 2009",
 	.instance_size = sizeof(mu_i),
 	.params = params,
 	.uses = uses,

@@ -14,7 +14,7 @@ import yaml
 
 from .chart_data import Curve, Picture
 from .program import call
-from .rheology import Bed, Grains, Law, Rows, Slide, law_of, slip_of
+from .rheology import Bed, Grains, Law, Looseness, Rows, Slide, law_of, looseness_of, slip_of
 from .workers import save
 
 AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is told
@@ -38,6 +38,16 @@ class Found:
         n = len(self.beds)
         return [law_of([rows[k] for rows in self.chutes.values() for k in range(n) if k != out]) for out in range(n)] if n > 1 else []
 
+    def bulk_modulus(self) -> float:
+        return float(np.mean([one.bulk_modulus for one in self.beds]))
+
+    def looseness(self) -> Looseness:
+        return looseness_of([one for rows in self.chutes.values() for one in rows], self.bulk_modulus())
+
+    def loosenesses(self) -> list[Looseness]:
+        """Of each seed."""
+        return [looseness_of([rows[k] for rows in self.chutes.values()], self.bulk_modulus()) for k in range(len(self.beds))]
+
 
 def spread(values) -> float:
     """Standard deviation of single seeds; NaN of one."""
@@ -58,7 +68,10 @@ def left_out(values) -> float:
 def constants(found: Found) -> dict[str, tuple[float, float, str]]:
     """Key of material.mu_i: value, standard error over seeds, unit."""
     law, laws, beds = found.law(), found.laws(), found.beds
+    loose, each = found.looseness(), found.loosenesses()
     return {"critical_density": (*mean([one.density for one in beds]), "kg/m^3"),
+            "flow_density": (loose.density, mean([one.density for one in each])[1], "kg/m^3"),
+            "dilation": (max(0.0, loose.dilation), mean([one.dilation for one in each])[1], ""),
             "static_friction": (law.mu_s, left_out([one.mu_s for one in laws]), ""),
             "limit_friction": (law.mu_2, left_out([one.mu_2 for one in laws]), ""),
             "inertial_number": (law.i_0, left_out([one.i_0 for one in laws]), ""),

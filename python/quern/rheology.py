@@ -59,6 +59,13 @@ class Law:
 
 
 @dataclass(frozen=True)
+class Looseness:
+    """Density of flow with no stress on it, density (1 - dilation I)."""
+    density: float
+    dilation: float
+
+
+@dataclass(frozen=True)
 class Slip:
     """At the floor, of the bulk's profile, moved so that the layer is as fast as a whole."""
     velocity: float  # m/s
@@ -177,6 +184,14 @@ def law_of(chutes: list[Rows]) -> Law:
     """Of some chutes, each a point: the mean of its rows. Friction is the same in all of them and I is what scatters, so that a fit over
     rows would take its scatter for a gentler slope."""
     return fit_law(*(np.array([getattr(one, name)[one.bulk].mean() for one in chutes]) for name in ("inertia", "friction")))
+
+
+def looseness_of(chutes: list[Rows], bulk_modulus: float) -> Looseness:
+    """A straight line through all chutes, the mean of the bulk's I and stress-free density each."""
+    inertia = np.array([one.inertia[one.bulk].mean() for one in chutes])
+    free = np.array([(one.density * np.exp(-one.pressure / bulk_modulus))[one.bulk].mean() for one in chutes])
+    fall, density = np.polyfit(inertia, free, 1)
+    return Looseness(float(density), float(-fall / density))
 
 
 def slip_of(one: Rows) -> Slip:

@@ -97,6 +97,7 @@ void call(const law *m, cloud *c, int hook, double dt, uint32_t first, uint32_t 
 	for (uint32_t k = 0; k < 6; k++) b.stress[k] = c->stress[k] ? c->stress[k] + first : NULL;
 	b.grid_density = update ? c->grid_density + first : NULL;
 	b.density = c->density + first;
+	b.mean_pressure = update && c->mean_pressure ? c->mean_pressure + first : NULL;
 	b.wave_speed = c->wave_speed ? c->wave_speed + first : NULL;
 	b.energy = c->energy ? c->energy + first : NULL;
 	for (uint32_t r = 0; m->plugin->uses[r].field; r++)

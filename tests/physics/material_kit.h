@@ -29,7 +29,8 @@ void free_law(law *);
 typedef struct cloud {
 	uint32_t n, cap, n_fields, n_columns;
 	quern_real *memory, *gradient[9], *grid_density, *density, *stress[6], *wave_speed, *energy;
-	const char *field[FIELDS]; /* of history and output, by name */
+	const quern_real *mean_pressure; /* NULL: none, and a test's own */
+	const char *field[FIELDS];       /* of history and output, by name */
 	quern_column history[FIELDS], use[2 * FIELDS];
 } cloud;
 

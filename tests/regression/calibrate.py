@@ -8,6 +8,7 @@ import pathlib
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 
@@ -63,6 +64,9 @@ def check_fit():
     assert made_up(math.radians(22), 0.5)[0].word == "fast" and made_up(math.radians(16), -0.4)[0].word == "slows"
     line = rheology.fit_law(np.array([0.02, 0.1, 0.2]), 0.3 + 0.8 * np.array([0.02, 0.1, 0.2]))
     assert abs(line(0.15) - 0.42) < 2e-3 and line.i_0 > 4, line
+    loose = [replace(one, density=np.where(one.density > 0, 2040 * (1 - 0.4 * one.inertia) * np.exp(one.pressure / 1e5), 0)) for one in chutes]
+    slow = rheology.looseness_of(loose, 1e5)
+    assert abs(slow.density / 2040 - 1) < 1e-9 and abs(slow.dilation / 0.4 - 1) < 1e-9, slow
     y = np.linspace(0, 0.04, 50)
     assert abs(rheology.modulus(y, -3000 / 1e5 * (0.05 * y - y ** 2 / 2), 0.05, 3000) / 1e5 - 1) < 1e-12
     print("ok  flows that are not steady are told, a straight law is a straight law, a modulus is found again")
@@ -124,6 +128,7 @@ def check_command(here):
     value = {key.rsplit(".", 1)[1]: float(text) for key, text in options.items()}
     print("    " + ", ".join(f"{key} {text:g}" for key, text in value.items()))
     assert 1900 < value["critical_density"] < 2080 and value["diameter"] == 2e-3 and value["grain_density"] == 2500
+    assert 1900 < value["flow_density"] < 2150 and 0.1 < value["dilation"] < 1, value
     law = rheology.Law(value["static_friction"], value["limit_friction"], value["inertial_number"])
     assert 0.28 < law(0.1) < 0.41, law
     assert 0.1 < value["bulk_modulus"] / 2e4 < 0.6, value

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: MIT */
+/* material.mu_i whose flow comes to a density of its own: docs/theory/materials.md, section 3 */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "material_kit.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const double bulk = 1e6, diameter = 2e-3, grain = 2500, critical = 2000, slow = 2040, loosened = 0.4;
+
+static law sand(uint32_t dim) {
+	const alone_value values[] = { { "bulk_modulus", bulk }, { "diameter", diameter },
+		{ "grain_density", grain }, { "critical_density", critical }, { "flow_density", slow },
+		{ "dilation", loosened }, { NULL, 0 } };
+	return make_law(ids[MU_I], dim, values);
+}
+
+static wide pressure_of(uint32_t dim, const cloud *c, uint32_t i) {
+	return -trace(dim, get(dim, c->stress, i)) / dim;
+}
+
+static wide loosest(wide number) { return slow * (1 - fminl(loosened * number, 0.2L)); }
+
+/* A step from any state is the one of the page: what shears bears more or less than it would by the factor of the page, pressure and shear stress
+ * alike; what does not is elastic; what bore nothing and is looser than the flow around it would be stays open. */
+static void steps(void **unused) {
+	(void)unused;
+	const double dt = 1e-4;
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		law m = sand(dim);
+		cloud c = make_cloud(&m, POINTS), was = make_cloud(&m, POINTS);
+		static quern_real mean[POINTS];
+		const wide mu_s = param(&m, "static_friction"), mu_2 = param(&m, "limit_friction");
+		const wide i0 = param(&m, "inertial_number"), shear = m.shear;
+		wide worst = 0;
+		int open = 0, loose = 0, flowing = 0, still = 0;
+		state = 88172645463325252u + dim;
+		randomise(MU_I, &m, &was, 0.03);
+		for (uint32_t i = 0; i < was.n; i++) {
+			const wide p = pressure_of(dim, &was, i);
+			mean[i] = i % 7 ? (double)(p * between(0.5, 2)) : 0;
+			was.density[i] = critical * between(0.85, 1.08);
+			if (i % 3 == 0) put(dim, was.stress, i, none);
+			if (i % 3 == 0) mean[i] = bulk * sized(-14, -4);
+		}
+		memcpy(c.memory, was.memory, was.cap * was.n_columns * sizeof(quern_real));
+		c.mean_pressure = mean;
+		update(&m, &c, dt);
+		for (uint32_t i = 0; i < c.n; i++) {
+			const matrix l = get_gradient(dim, &c, i), old = get(dim, was.stress, i),
+						 now = get(dim, c.stress, i);
+			const matrix w = scaled(dim, 0.5L, plus(dim, l, -1, transposed(l)));
+			const matrix e = scaled(dim, 0.5L, plus(dim, l, 1, transposed(l)));
+			const matrix r = times(inverse(dim, plus(dim, unit, -dt / 2, w)), plus(dim, unit, dt / 2, w));
+			matrix trial = plus(dim, times(times(r, old), transposed(r)), 2 * dt * shear, e);
+			trial = plus(dim, trial, dt * (m.bulk - 2 * shear / dim) * trace(dim, l), unit);
+			const wide p = -trace(dim, trial) / dim, tau = shear_of(dim, trial),
+					   scale = norm(old) + m.bulk * dt * norm(l);
+			const wide around = mean[i] > 0 ? mean[i] : p;
+			wide flow = tau;
+			if (p > 0 && tau > mu_s * p) {
+				const wide a = shear * i0 * dt * sqrtl(around / grain) / diameter, u = (mu_2 - mu_s) * p,
+						   v = tau - mu_s * p;
+				flow =
+					mu_s * p + 2 * u * v / (u + v + a + sqrtl((u - v) * (u - v) + a * a + 2 * a * (u + v)));
+			}
+			const bool slides = p > 0 && tau > mu_s * p;
+			const wide strain =
+				(tau - (slides ? flow : 0)) / shear; /* what bears nothing shears as a whole */
+			const wide number =
+				mean[i] > 0 ? strain / dt * diameter * sqrtl(grain / mean[i]) : 0; /* of what bears nothing */
+			const wide most = fminl(mean[i] > 0 ? loosest(number) : critical, critical);
+			if (fabsl(p) < 1e-12L * scale || fabsl(was.density[i] - most) < 1e-9L) continue;
+			if ((was.density[i] < most && norm(old) == 0) || p <= 0) {
+				open++;
+				assert_true(norm(now) == 0);
+				continue;
+			}
+			wide grown = 1;
+			if (slides) {
+				const wide of = loosest(strain / dt * diameter * sqrtl(grain / around)),
+						   gain = 2 * bulk * strain;
+				const wide off = fmaxl(-0.1L, fminl(was.density[i] / (of * (1 + p / bulk)) - 1, 0.1L));
+				grown =
+					1 + fmaxl(-0.5L, fminl(gain * off / (p + gain * ((1 - of / slow) / 2 + p / bulk)), 0.5L));
+				flowing++;
+			} else still++;
+			loose += was.density[i] < critical;
+			const matrix expected =
+				plus(dim, scaled(dim, grown * flow / tau, deviator(dim, trial)), -grown * p, unit);
+			worst = largest(worst, norm(plus(dim, now, -1, expected)) / (scale + norm(expected)));
+			assert_true(c.density[i] == was.density[i]);
+		}
+		printf("  %uD: %d open, %d flow, %d are still; %d of these are looser than at rest\n", dim, open,
+			flowing, still, loose);
+		assert_true(open > 500 && flowing > 500 && still > 500 && loose > 500);
+		assert_true(table_row("stress after a step", (double)worst, 0, 1e-13));
+		free_cloud(&c), free_cloud(&was), free_law(&m);
+	}
+}
+
+/* Sheared in a volume that is kept, a point comes to the pressure that its density has in such a flow, from above and from below, and to mu(I); at
+ * one too small for the flow it bears nothing. */
+static void kept_volume(void **unused) {
+	(void)unused;
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		law m = sand(dim);
+		const double mu_s = param(&m, "static_friction"), mu_2 = param(&m, "limit_friction"),
+					 i0 = param(&m, "inertial_number");
+		for (int k = 0; k < 6; k++) {
+			const double rate = pow(10, k / 2 - 1), density = slow * (k % 2 ? 1.002 : 0.985),
+						 dt = 2e-5 / rate;
+			cloud c = make_cloud(&m, 1);
+			matrix l = none;
+			l.x[0][1] = rate;
+			put(dim, c.stress, 0, scaled(dim, k % 3 ? -100 : -5000, unit));
+			put_gradient(dim, &c, 0, l);
+			c.density[0] = c.grid_density[0] = density;
+			for (int step = 0; step < 1000000; step++) update(&m, &c, dt);
+			const matrix s = get(dim, c.stress, 0);
+			const double p = (double)(-trace(dim, s) / dim);
+			if (p == 0) {
+				printf("  %uD at %g 1/s, %g kg/m^3: bears nothing\n", dim, rate, density);
+				assert_true(density < slow && rate < 1); /* slow flow is denser */
+			} else {
+				/* an elastic stress that turns with the shear lags behind it: tau' = G (rate) s_xy/tau is what flow takes up */
+				const double slides = (double)(s.x[0][1] / shear_of(dim, s)) * rate;
+				const double number = slides * diameter * sqrt(grain / p);
+				const double wanted = slow * (1 - fmin(loosened * number, 0.2)) * (1 + p / bulk);
+				const double mu = mu_s + (mu_2 - mu_s) / (1 + i0 / number),
+							 found = (double)(shear_of(dim, s) / p);
+				printf("  %uD at %g 1/s, %g kg/m^3: %.6g Pa, I %.4g: of %.8g kg/m^3; friction off by %.1e\n",
+					dim, rate, density, p, number, wanted, found / mu - 1);
+				assert_true(fabs(wanted / density - 1) < 1e-8 && fabs(found / mu - 1) < 1e-6);
+			}
+			free_cloud(&c);
+		}
+		free_law(&m);
+	}
+}
+
+/* Slow flow comes there as exp(-2 (shear)): a strain of a few times K/p. */
+static void approach(void **unused) {
+	(void)unused;
+	const double rate = 1e-3, density = slow * 1.01, end = 0.01 * bulk / 1.0;
+	double gap[2];
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		law m = sand(dim);
+		for (int k = 0; k < 2; k++) {
+			const int steps_of = 500 << k;
+			const double dt = 1 / (rate * steps_of), first = 2 * end;
+			cloud c = make_cloud(&m, 1);
+			matrix l = none;
+			l.x[0][1] = rate;
+			put_gradient(dim, &c, 0, l);
+			matrix s = scaled(dim, -first, unit);
+			s.x[0][1] = s.x[1][0] = param(&m, "static_friction") * first; /* flows from the first step on */
+			put(dim, c.stress, 0, s);
+			c.density[0] = c.grid_density[0] = density;
+			for (int step = 0; step < steps_of; step++) update(&m, &c, dt);
+			/* of the linear law, p' = 2 rate (K off - p (1 + off)/(1 + p/K)), by small steps of the same at one more order */
+			double p = first;
+			for (int step = 0; step < 100000; step++) {
+				const double h = 1e-5;
+				double mid = p;
+				for (int stage = 0; stage < 2; stage++)
+					mid = p + (stage + 1) * 0.5 * h * 2 * bulk *
+								  (density / (slow * (1 - loosened * rate * diameter * sqrt(grain / mid)) *
+												 (1 + mid / bulk)) -
+									  1);
+				p = mid;
+			}
+			gap[k] = fabs((double)pressure_of(dim, &c, 0) / p - 1);
+			printf(
+				"  %uD, %d steps of a shear of 1: from %g to %.6g Pa, off by %.2e; exp(-2) would leave %.6g\n",
+				dim, steps_of, first, (double)pressure_of(dim, &c, 0), gap[k], end + (first - end) * exp(-2));
+			assert_true(fabs(p / (end + (first - end) * exp(-2)) - 1) < 0.01);
+			free_cloud(&c);
+		}
+		assert_true(gap[1] < 0.01 && gap[0] / gap[1] > 1.7 && gap[0] / gap[1] < 2.3);
+		free_law(&m);
+	}
+}
+
+/* A flow that stops stays as loose as it is, and goes on to bear; pulled apart it opens. */
+static void stops(void **unused) {
+	(void)unused;
+	for (uint32_t dim = 2; dim <= 3; dim++) {
+		law m = sand(dim);
+		cloud c = make_cloud(&m, 1);
+		const quern_real mean = 1000;
+		c.mean_pressure = &mean;
+		put(dim, c.stress, 0, scaled(dim, -1000, unit));
+		c.density[0] = c.grid_density[0] = 0.97 * critical;
+		for (int step = 0; step < 10; step++) update(&m, &c, 1e-4);
+		assert_true(pressure_of(dim, &c, 0) == 1000 && c.density[0] == 0.97 * critical);
+		put_gradient(dim, &c, 0, scaled(dim, 20, unit));
+		update(&m, &c, 1e-4);
+		assert_true(pressure_of(dim, &c, 0) == 0);
+		/* open, and as loose as that: it does not bear when it is pressed, unless it shears as fast as such a flow does */
+		const double fast = 0.09 / (loosened * diameter) * sqrt(mean / grain);
+		for (int shears = 0; shears < 2; shears++) {
+			matrix l = scaled(dim, -1, unit);
+			put(dim, c.stress, 0, none);
+			l.x[0][1] = shears ? 4 * fast : 0;
+			put_gradient(dim, &c, 0, l);
+			c.density[0] = 0.97 * critical;
+			update(&m, &c, 1e-4);
+			assert_true((pressure_of(dim, &c, 0) > 0) == shears);
+		}
+		free_cloud(&c), free_law(&m);
+	}
+}
+
+/* What does not fit together is refused. */
+static void refusals(void **unused) {
+	(void)unused;
+	const struct {
+		double flow, dilation, rate;
+	} bad[] = { { 0, 0.4, 0 }, { 2600, 0, 0 }, { 2040, 0.4, 10 } };
+	for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+		const alone_value values[] = { { "bulk_modulus", bulk }, { "diameter", diameter },
+			{ "grain_density", grain }, { "critical_density", critical }, { "flow_density", bad[k].flow },
+			{ "dilation", bad[k].dilation }, { "pressure_rate", bad[k].rate }, { NULL, 0 } };
+		quern_status status = QUERN_OK;
+		law m = try_law(ids[MU_I], 2, values, &status);
+		assert_int_equal(status, QUERN_E_PARAM);
+		free_law(&m);
+	}
+}
+
+int main(void) {
+	const struct CMUnitTest tests[] = { cmocka_unit_test(steps), cmocka_unit_test(kept_volume),
+		cmocka_unit_test(approach), cmocka_unit_test(stops), cmocka_unit_test(refusals) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
