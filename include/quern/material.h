@@ -38,7 +38,8 @@ typedef struct quern_material_ops {
 	 * inertial number I = rate x diameter x sqrt(density/pressure); density, kg/m^3, is that of a grain */
 	void (*friction)(const void *self, uint32_t dim, quern_real *slow, quern_real *fast, quern_real *number,
 		quern_real *density);
-	/* since 2.1; NULL: the density without stress. [setup] kg/m^3: what is looser bears nothing, however it flows */
+	/* since 2.1; NULL: the density without stress. [setup] kg/m^3, at most that density: what is looser
+	 * bears nothing, however it flows */
 	quern_real (*loosest)(const void *self);
 } quern_material_ops;
 

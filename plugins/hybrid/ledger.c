@@ -28,7 +28,15 @@ void quern_hybrid_pass(const update *d, uint32_t from, uint32_t to) {
 
 /* ---- weights ---- */
 
-/* Only the shares' sum is the material's stress; points that will carry all of it take it on. */
+/* kg/m^3: what is looser has no density but that of its stress; none has where flow has no density of its own. */
+static quern_real loosest_flow(const update *d) {
+	const quern_bound *material = &d->s->slot[SLOT_MATERIAL][0];
+	const quern_material_ops *ops = material->ops;
+	const quern_real least = ops->loosest ? ops->loosest(material->self) : d->h->packed;
+	return least < d->h->packed ? least : INFINITY;
+}
+
+/* Only the shares' sum is the material's stress; points that will carry all of it take it on. What flows at a density of its own keeps its room. */
 static void take_over_stress(const update *d, uint32_t c) {
 	quern_real contact[6];
 	const uint32_t n = quern_shape_size(QUERN_SYMMETRIC, d->s->dim), begin = d->point_begin[c],
@@ -40,7 +48,14 @@ static void take_over_stress(const update *d, uint32_t c) {
 			quern_real *stress = &d->u[U_POINT_STRESS].real[k][d->point[q]];
 			*stress = (1 - share) * contact[k] + share * *stress;
 		}
-	quern_hybrid_assign(d, (uint32_t)d->point[begin], end - begin); /* points of a cell lie together */
+	const quern_real loosest = loosest_flow(d), *mass = d->u[U_POINT_MASS].real[0];
+	quern_real *volume = d->u[U_POINT_VOLUME].real[0];
+	for (uint32_t q = begin; q < end; q++) {
+		const int32_t i = d->point[q];
+		const quern_real room = volume[i];
+		quern_hybrid_assign(d, (uint32_t)i, 1);
+		if (quern_hybrid_presses(d, i) && mass[i] >= loosest * room) volume[i] = room;
+	}
 }
 
 /* Whether a cell is on its way to all continuum. One that shall hold grains too keeps the mass of those that it has. */

@@ -189,7 +189,7 @@ static void split(update *d, uint32_t c) {
 	add_point(d, &point);
 }
 
-static bool presses(const update *d, int32_t i) {
+bool quern_hybrid_presses(const update *d, int32_t i) {
 	quern_real trace = 0;
 	for (uint32_t k = 0; k < d->s->dim; k++) trace += d->u[U_POINT_STRESS].real[k][i];
 	return trace < 0;
@@ -198,13 +198,13 @@ static bool presses(const update *d, int32_t i) {
 /* The nearest point of the cell, if there is one then of those that are open or closed like it. */
 static int32_t partner_of(const update *d, uint32_t c, int32_t light) {
 	const quern_column *x = &d->u[U_POINT_POSITION];
-	const bool closed = presses(d, light);
+	const bool closed = quern_hybrid_presses(d, light);
 	int32_t near = -1;
 	quern_real least = INFINITY;
 	bool unlike = true;
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
-		const bool other = presses(d, i) != closed;
+		const bool other = quern_hybrid_presses(d, i) != closed;
 		quern_real d2 = 0;
 		if (i == light) continue;
 		for (uint32_t k = 0; k < d->s->dim; k++)

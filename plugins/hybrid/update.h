@@ -151,6 +151,8 @@ quern_status quern_hybrid_points(update *);
 /* As many points as the mass is worth, in a cell that has none. */
 void quern_hybrid_create(update *, uint32_t cell, quern_real mass, const quern_real v[3]);
 void quern_hybrid_assign(const update *, uint32_t begin, uint32_t n);
+/* Whether the mean of the normal stresses of point i is a pressure. */
+bool quern_hybrid_presses(const update *, int32_t i);
 quern_status quern_hybrid_apply_points(update *);
 
 /* ---- absorb.c ---- */

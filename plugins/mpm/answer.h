@@ -90,8 +90,11 @@ static quern_real density_of(const gather_work *w, const gather_memory *m, uint3
 	return counted > 0 ? centre + own_part * (counted * w->p->density - centre) : centre;
 }
 
-/* Of the density of the loosest that bears: a point less dense is open, its volume is the grid's. */
+/* Of the density from which on a point bears: one less dense is open, its volume is the grid's. What presses may be as loose as the loosest flow. */
 static const quern_real dense = 0.98;
+QUERN_INLINE quern_real closed_from(const mpm *p, quern_real pressure) {
+	return dense * (pressure > 0 ? p->loosest : p->density);
+}
 
 /* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
  * where the cell is full; in one that is not they are spray beside it. */
@@ -110,8 +113,9 @@ QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b
 		cells_of(w, b, place, n, dim, m->cell);
 		for (uint32_t i = 0; i < n; i++) {
 			const uint32_t at = begin + i, c = (uint32_t)m->cell[i];
-			const bool open = mass[at] < dense * w->p->loosest * volume[at];
-			m->level[c] += volume[at] * pressure_of(w, at);
+			const quern_real pressure = pressure_of(w, at);
+			const bool open = mass[at] < closed_from(w->p, pressure) * volume[at];
+			m->level[c] += volume[at] * pressure;
 			m->mean[c] += open ? 0 : mass[at];
 			*(open ? &m->loose[c] : &m->room[c]) += volume[at];
 		}
@@ -120,7 +124,7 @@ QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b
 		const bool any = m->room[c] + m->loose[c] > 0;
 		m->held[c] = any ? density_of(w, m, b, c) : 0;
 		m->mean[c] = m->room[c] > 0 ? m->mean[c] / m->room[c] : 0;
-		const quern_real room = m->room[c] + (m->held[c] > dense * w->p->loosest ? m->loose[c] : 0);
+		const quern_real room = m->room[c] + (m->held[c] > closed_from(w->p, m->level[c]) ? m->loose[c] : 0);
 		m->level[c] = room > 0 ? m->level[c] / room : 0;
 	}
 }
@@ -148,11 +152,11 @@ QUERN_INLINE quern_real follow_cell(
 
 /* A continuum alone: densities of points go to the mean of their cell's, which keeps the volume of all, much faster
  * than that goes to what the cell holds. Each by itself would take over the noise of its own gradient. */
-static quern_real follow_alone(
-	const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i, quern_real rate) {
+static quern_real follow_alone(const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i,
+	quern_real pressure, quern_real rate) {
 	quern_real trace = 0;
 	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
-	if (!(rate > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) || m->density[i] < dense * w->p->loosest)
+	if (!(rate > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) || m->density[i] < closed_from(w->p, pressure))
 		return 0;
 	const quern_real sheared = rate * rate / (rate * rate + shaken * trace * trace),
 					 time = w->s->dt * COUNT_EVERY, shear = rate * sheared * time;
@@ -169,8 +173,8 @@ QUERN_INLINE void answer_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
 	const mpm *p = w->p;
 	const quern_real dt = w->s->dt, bulk = p->bulk, follow = p->follow * dt, full = w->full,
-					 solid = dense * p->loosest, still = w->still, stiff = p->relief * bulk,
-					 soon = fmin(1, p->answer * dt);
+					 solid = closed_from(p, 0), soft = closed_from(p, 1), still = w->still,
+					 stiff = p->relief * bulk, soon = fmin(1, p->answer * dt);
 	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0] + (size_t)b * QUERN_BLOCK_CELLS;
 	const quern_real *stress[3];
 	quern_real crowded[STENCIL], holds[STENCIL], lack[STENCIL], mean[STENCIL];
@@ -189,13 +193,14 @@ QUERN_INLINE void answer_chunk(
 			pressure -= stress[k][i] / dim;
 			trace += m->gradient[(dim + 1) * k][i];
 		}
+		const quern_real closed = pressure > 0 ? soft : solid;
 		pressure -= bulk * trace * dt; /* what the flow itself will make of it */
 		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim),
 						 flows = flowing_share(still, rate2);
 		/* of the deformation, what changes shape: what only changes volume does not even out densities */
 		const quern_real shape = rate2 / (rate2 > 0 ? rate2 + shaken * trace * trace : 1);
 		const quern_real followed = flows * follow_cell(m->mean_pressure[i], holds[i], mean[i], m->density[i],
-												follow * sqrt(rate2) * shape, solid);
+												follow * sqrt(rate2) * shape, closed);
 		/* a crowded cell's least pressure; at rest no mass arrives, and a bed is denser here than there */
 		const quern_real least = stiff * (crowded[i] - full);
 		const bool short_of = (least > 0) & (least > pressure);
@@ -222,7 +227,7 @@ QUERN_INLINE void measure_chunk(
 		const uint32_t c = (uint32_t)m->cell[i];
 		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim);
 		u[GATHER_FOLLOWING].real[0][begin + i] =
-			flowing_share(w->still, rate2) * follow_alone(w, m, c, i, sqrt(rate2));
+			flowing_share(w->still, rate2) * follow_alone(w, m, c, i, pressure_of(w, begin + i), sqrt(rate2));
 		u[GATHER_AROUND].real[0][begin + i] = m->level[c];
 	}
 }

@@ -308,7 +308,7 @@ static quern_real fastest_given(const mpm *p, const quern_step *s) {
 /* 1/s, of stress waves: omega^2 = chi max(d K, 2 G)/rho for any arrangement of points. */
 static quern_real frequency(const mpm *p) {
 	const quern_real modulus = p->dim * p->bulk > 2 * p->shear ? p->dim * p->bulk : 2 * p->shear;
-	return sqrt(p->stiffness * modulus / p->density) / p->cell;
+	return sqrt(p->stiffness * modulus / p->loosest) / p->cell;
 }
 
 /* 1/s; with advection dt (omega/2 + |v|/h) < 1. Dashpots, which see the motion of the step before, ask for (omega dt)^2 + 2 T omega^2 dt < 4. */

@@ -62,6 +62,10 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (law->flow_density > law->grain_density)
 		return host->fail(err, QUERN_E_PARAM, "flow_density", "%g kg/m^3 is above the density of a grain, %g",
 			law->flow_density, law->grain_density);
+	if (law->flow_density > 0 && law->flow_density < 0.5 * law->critical_density)
+		return host->fail(err, QUERN_E_PARAM, "flow_density",
+			"%g kg/m^3 is less than half of critical_density, %g: no sand flows so loosely",
+			law->flow_density, law->critical_density);
 	if (law->dilation > 0 && !(law->flow_density > 0))
 		return host->fail(
 			err, QUERN_E_PARAM, "dilation", "says how much looser than flow_density flow is: give that too");
@@ -85,6 +89,12 @@ QUERN_INLINE quern_real within(quern_real x, quern_real most) {
 	return x < -most ? -most : x < most ? x : most;
 }
 
+/* kg/m^3: what is looser bears nothing, however it flows. */
+QUERN_INLINE quern_real loosest_of(const mu_i *law) {
+	const quern_real flow = law->flow_density * (1 - (law->dilation > 0 ? widest : 0));
+	return flow > 0 && flow < law->critical_density ? flow : law->critical_density;
+}
+
 /* By which factor the pressure p of a point changes that shears by `strain` at this inertial number, and the density from which on such a flow
  * bears. Implicit in p to first order: where p is little its inertial number answers faster than the step. */
 typedef struct {
@@ -101,7 +111,7 @@ QUERN_INLINE dilatancy dilate(
 }
 
 QUERN_INLINE void put_outputs(const int dim, const mu_i *law, const quern_material_batch *b) {
-	put_wave_speeds(dim, law->bulk_modulus, law->shear, law->critical_density, b);
+	put_wave_speeds(dim, law->bulk_modulus, law->shear, loosest_of(law), b);
 	put_hypoelastic_energies(dim, law->bulk_modulus, law->shear, b);
 }
 
@@ -114,7 +124,8 @@ QUERN_INLINE void kernel(const int dim, const bool rated, const bool relaxed, co
 	const quern_real thick = law.diameter * __builtin_sqrt(law.grain_density);
 	const quern_real slowness = shear * law.inertial_number * dt / thick; /* a over sqrt p */
 	const quern_real per_strain = dt > 0 ? 1 / (shear * dt) : 0;
-	const quern_real critical = law.critical_density, one_over_critical = 1 / critical;
+	const quern_real critical = law.critical_density, one_over_critical = 1 / critical,
+					 loosest = loosest_of(&law);
 	const quern_real pull = relaxed ? 1 - quern_exp(-law.pressure_rate * dt) : 0;
 	const quern_real *restrict grid_density = b->grid_density, *restrict mean_pressure = b->mean_pressure;
 	quern_real *restrict density = b->density, *restrict rate = rated ? b->use[SHEAR_RATE].real[0] : NULL;
@@ -145,7 +156,7 @@ QUERN_INLINE void kernel(const int dim, const bool rated, const bool relaxed, co
 				slides | known ? now * thick / __builtin_sqrt(around) : 0);
 			grown = slides ? d.grown : 1;
 			least = known ? d.least : critical;
-			bore = symmetric_mean(dim, old) < 0;
+			bore = (symmetric_mean(dim, old) < 0) & (rho >= loosest);
 		}
 		/* what flows bears though it is looser than what lies still; what has come to rest so goes on to bear */
 		const bool dilute = (rho < least) & !bore, open = dilute | (p <= 0);
@@ -218,11 +229,7 @@ static void friction(const void *self, uint32_t dim, quern_real *slow, quern_rea
 	*density = law->grain_density;
 }
 
-static quern_real loosest(const void *self) {
-	const mu_i *law = self;
-	const quern_real flow = law->flow_density * (1 - (law->dilation > 0 ? widest : 0));
-	return flow > 0 && flow < law->critical_density ? flow : law->critical_density;
-}
+static quern_real loosest(const void *self) { return loosest_of(self); }
 
 static const quern_material_ops ops = { .size = sizeof ops,
 	.update = { update_2d, update_3d },
