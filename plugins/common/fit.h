@@ -12,8 +12,8 @@ typedef struct fit_memory {
 	stencil there; /* where the points go */
 } fit_memory;
 
-/* Below this share of a squared cell D says nothing: a point that nearly sits on a node sees no other. There the shape
- * function is a hat, whose own slope is the same fit without the quotient. */
+/* D is taken for no less than this share of a squared cell. A point that nearly sits on a node, as gimp has it at a wall alone, hardly sees
+ * another: what that one moves like is its own affair, and a slope that came of it would stay with the point. */
 static const quern_real fit_least = 1.0 / 64;
 
 /* D along an axis, over the squared cell, from the way to the first node, in cells, and the weights. */
@@ -28,21 +28,18 @@ QUERN_INLINE void fit_slopes(
 	for (int a = 0; a < dim; a++) {
 		const int32_t *restrict first = s->first[a];
 		const quern_real *restrict x = s->position[a], *restrict w0 = s->value[a][0],
-								   *restrict w1 = s->value[a][1], *restrict w2 = s->value[a][2],
-								   *restrict g0 = s->slope[a][0], *restrict g1 = s->slope[a][1],
-								   *restrict g2 = s->slope[a][2];
+								   *restrict w1 = s->value[a][1], *restrict w2 = s->value[a][2];
 		quern_real *restrict f0 = f->slope[a][0], *restrict f1 = f->slope[a][1],
 							 *restrict f2 = f->slope[a][2], *restrict moment = f->moment[a];
 		QUERN_SIMD
 		for (uint32_t i = 0; i < n; i++) {
 			const quern_real way = first[i] - x[i] * inverse_cell, d = fit_moment(way, w0[i], w1[i], w2[i]);
-			const bool flat = !(d >= fit_least);
-			const quern_real over = inverse_cell / (flat ? 1 : d);
+			const quern_real held = d > fit_least ? d : fit_least, over = inverse_cell / held;
 			const quern_real low = w0[i] * way * over, high = w2[i] * (way + 2) * over;
-			moment[i] = d;
-			f0[i] = flat ? g0[i] : low;
-			f1[i] = flat ? g1[i] : -(low + high);
-			f2[i] = flat ? g2[i] : high;
+			moment[i] = held;
+			f0[i] = low;
+			f1[i] = -(low + high);
+			f2[i] = high;
 		}
 	}
 }
@@ -68,8 +65,7 @@ QUERN_INLINE void fit_shift(uint32_t n, const int dim, quern_real inverse_cell, 
 		for (uint32_t i = 0; i < n; i++) {
 			const quern_real way = first[i] - x[i] * inverse_cell,
 							 there = fit_moment(way, w0[i], w1[i], w2[i]);
-			const bool flat = !(here[i] >= fit_least) | !(there >= fit_least);
-			shift[i] = flat ? 1 : here[i] / (flat ? 1 : there);
+			shift[i] = here[i] / (there > fit_least ? there : fit_least);
 		}
 	}
 }

@@ -113,6 +113,10 @@ QUERN_INLINE bool one_leaves(
 	return leaves;
 }
 
+/* Of a volume in one step: what grows by more is no number any longer, and found out behind. A point that light nodes pull at once at a wall, in
+ * spray, grows by some times, opens and is as before. */
+static const quern_real most_growth = 1000;
+
 /* x += dt sum S v; V *= det(1 + dt L); true density m/V */
 QUERN_INLINE void move_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
@@ -145,7 +149,7 @@ QUERN_INLINE void move_chunk(
 				  dt * l2[i] * (dt * l3[i] * dt * l7[i] - e * dt * l6[i]);
 		}
 		volume[i] *= det;
-		moved[i] = volume[i];
+		moved[i] = det <= most_growth ? volume[i] : NAN;
 		density[i] = mass[i] / volume[i];
 	}
 }
@@ -297,6 +301,11 @@ static quern_status lost(const gather_work *w, int32_t i) {
 	if (!isfinite(v2))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 			"point.velocity is not a number after %s: is the step of %.3g s too long?", material, s->dt);
+	if (isnan(volume))
+		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
+			"point.volume at (%.4g, %.4g) m grows more than %g times in one step of %.3g s (%s): unstable, or "
+			"the step is too long",
+			x, y, most_growth, s->dt, material);
 	if (!(volume > 0 && volume < INFINITY))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
 			"point.volume at (%.4g, %.4g) m is turned inside out by one step of %.3g s (%s): unstable, or "
