@@ -5,7 +5,9 @@
 #include <math.h>
 #include <sched.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 /* Quota over period of a container, in processors; INFINITY where there is none. */
@@ -50,4 +52,15 @@ char *quern_platform_program(void) {
 	if (n <= 0) return NULL;
 	path[n] = 0;
 	return quern_copy(path);
+}
+
+void *quern_platform_memory(size_t bytes) {
+	const size_t page = (size_t)2 << 20, line = 64, unit = bytes < page / 2 ? line : page;
+	if (bytes > SIZE_MAX - page) return NULL;
+	const size_t size = (bytes + unit - 1) / unit * unit;
+	void *memory = aligned_alloc(unit, size);
+#ifdef MADV_HUGEPAGE
+	if (memory && unit == page) madvise(memory, size, MADV_HUGEPAGE); /* without them it is memory all the same */
+#endif
+	return memory;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* platform - what differs between operating systems, processors and builds */
 #pragma once
+#include <stddef.h>
 #include <stdint.h>
 
 /* A sanitizer has handlers of its own, needs more memory than any limit allows, and starts processes to report. */
@@ -18,3 +19,6 @@ uint32_t quern_platform_processors(void);
 void quern_platform_pause(void);
 /* The file of the running program; free(). NULL: it cannot be known. */
 char *quern_platform_program(void);
+/* Memory of that many bytes, more than none, that begins with a line of the cache; free(). Where the system has large pages, a large
+ * block lies in them: it would otherwise need more entries than a processor keeps of a page's place. NULL: there is none. */
+void *quern_platform_memory(size_t bytes);

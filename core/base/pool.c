@@ -204,7 +204,7 @@ void *quern_pool_scratch(quern_pool *p, uint32_t worker, size_t bytes) {
 	if (own->bytes >= bytes) return own->memory;
 	free(own->memory);
 	own->bytes = (bytes + bytes / 4 + 4095) & ~(size_t)4095;
-	own->memory = aligned_alloc(64, own->bytes);
+	own->memory = quern_platform_memory(own->bytes);
 	if (!own->memory) own->bytes = 0;
 	return own->memory;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* host - the table of services that plugins get */
+#include "platform.h"
 #include "random.h"
 #include "run.h"
 #include "start.h"
@@ -41,7 +42,7 @@ static void *host_memory(quern_run *run, size_t bytes) {
 		memory = a->data + a->used;
 		a->used += size;
 	} else {
-		memory = aligned_alloc(64, size);
+		memory = quern_platform_memory(size);
 		if (!memory) return NULL;
 		a->extra = quern_grow(a->extra, a->n_extra, &a->extra_capacity, sizeof(void *));
 		a->extra[a->n_extra++] = memory;

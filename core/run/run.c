@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "run.h"
 #include "identity.h"
+#include "platform.h"
 #include "run_episodes.h"
 #include "start.h"
 #include "text.h"
@@ -61,7 +62,7 @@ static void arena_reset(quern_arena *a) {
 	if (a->n_extra) {
 		const size_t wanted = (a->used + a->extra_bytes) * 5 / 4;
 		free(a->data);
-		a->data = aligned_alloc(64, (wanted + 63) & ~(size_t)63);
+		a->data = quern_platform_memory((wanted + 63) & ~(size_t)63);
 		a->capacity = a->data ? (wanted + 63) & ~(size_t)63 : 0;
 	}
 	a->used = a->n_extra = a->extra_bytes = 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "field.h"
+#include "platform.h"
 #include "text.h"
 #include <stdlib.h>
 #include <string.h>
@@ -19,16 +20,12 @@ void quern_store_init(quern_store *store, quern_pool *pool) { *store = (quern_st
 
 void quern_store_finish(quern_store *store) {
 	if (!store) return;
-	for (size_t i = 0; i < store->n_fields; i++)
-		for (int copy = 0; copy < 2; copy++)
-			for (int k = 0; k < 9; k++) free(store->fields[i].data[copy][k]);
 	for (size_t i = 0; i < store->n_sets; i++) {
+		free(store->sets[i].columns);
 		free(store->sets[i].block);
 		free(store->sets[i].by_place);
 		free(store->sets[i].entry);
 		free(store->sets[i].row);
-		free(store->sets[i].spare[0]);
-		free(store->sets[i].spare[1]);
 	}
 	free(store->fields);
 	free(store->sets);
@@ -70,17 +67,18 @@ static double initial_of(const quern_field *field, int component) {
 	return field->initial;
 }
 
-static void *take_column(uint32_t cap, size_t bytes) {
-	const size_t size = (((size_t)cap + QUERN_LANES) * bytes + 127) & ~(size_t)63;
-	void *column = aligned_alloc(64, size);
-	if (column) memset(column, 0, size);
-	return column;
+/* Loops walk through dozens of columns side by side: their beginnings lie 17 lines apart in the sets of a cache, so that they do not
+ * push each other out. */
+static size_t column_bytes(uint32_t cap, size_t bytes) {
+	enum { LINE = 64, AROUND = 64 * LINE, APART = 17 * LINE };
+	const size_t size = (((size_t)cap + QUERN_LANES) * bytes + LINE + LINE - 1) & ~(size_t)(LINE - 1);
+	return size + (AROUND + APART - size % AROUND) % AROUND;
 }
 
 static bool owns(const quern_field *field, int set) { return field->set == set && !field->local; }
 
 typedef struct {
-	void **column, *fresh;
+	void **column;
 	size_t bytes;
 	bool carried;
 } place;
@@ -95,13 +93,13 @@ static size_t places_of(quern_store *store, int set, place *out) {
 		if (!owns(field, set)) continue;
 		for (int copy = 0; copy <= field->twice; copy++)
 			for (uint8_t k = 0; k < field->n_components; k++)
-				out[n++] = (place) { &field->data[copy][k], NULL, quern_field_bytes(field), true };
+				out[n++] = (place) { &field->data[copy][k], quern_field_bytes(field), true };
 	}
 	return n;
 }
 
-/* Columns of a set always have its capacity, so that they can trade places with the spare ones. All new columns are
- * there before an old one goes. */
+/* Columns of a set always have its capacity, so that they can trade places with the spare ones; they lie in one block of memory, since
+ * many small ones would have no large pages. All new columns are there before an old one goes. */
 static quern_status reserve(quern_store *store, int set, uint32_t n) {
 	quern_set_store *s = &store->sets[set];
 	if (n <= s->cap && s->spare[0]) return QUERN_OK;
@@ -109,17 +107,20 @@ static quern_status reserve(quern_store *store, int set, uint32_t n) {
 	const uint32_t cap = n + n / 4 + 64;
 	place *places = calloc(store->n_fields * 18 + 2, sizeof *places);
 	const size_t n_places = places ? places_of(store, set, places) : 0;
-	bool good = places != NULL;
-	for (size_t i = 0; i < n_places && good; i++)
-		good = (places[i].fresh = take_column(cap, places[i].bytes));
+	size_t bytes = 0;
+	for (size_t i = 0; i < n_places; i++) bytes += column_bytes(cap, places[i].bytes);
+	char *columns = places ? quern_platform_memory(bytes) : NULL, *at = columns;
+	if (!columns) return free(places), QUERN_E_MEMORY;
+	memset(columns, 0, bytes);
 	for (size_t i = 0; i < n_places; i++) {
-		place *p = &places[i];
-		if (good && p->carried && *p->column) memcpy(p->fresh, *p->column, s->n * p->bytes);
-		free(good ? *p->column : p->fresh);
-		if (good) *p->column = p->fresh;
+		const place *p = &places[i];
+		if (p->carried && *p->column) memcpy(at, *p->column, s->n * p->bytes);
+		*p->column = at;
+		at += column_bytes(cap, p->bytes);
 	}
 	free(places);
-	if (!good) return QUERN_E_MEMORY;
+	free(s->columns);
+	s->columns = columns;
 	store->version++;
 	s->cap = cap;
 	return QUERN_OK;
@@ -390,7 +391,7 @@ quern_status quern_store_rows(quern_store *store, int set, uint32_t n) {
 	quern_set_store *s = &store->sets[set];
 	if (n > s->cap) {
 		const size_t cap = (size_t)n + n / 4 + 64;
-		double *row = cap > UINT32_MAX ? NULL : aligned_alloc(64, cap * 64);
+		double *row = cap > UINT32_MAX ? NULL : quern_platform_memory(cap * 64);
 		if (!row) return QUERN_E_MEMORY;
 		free(s->row);
 		s->row = row;
