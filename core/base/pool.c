@@ -17,18 +17,23 @@ typedef struct {
 	size_t bytes;
 } scratch;
 
+/* A worker's share of a round: the round's number in the high 32 bits, how many indices are left in the low ones. */
+typedef struct {
+	_Alignas(64) _Atomic uint64_t ticket;
+} share;
+
 typedef struct {
 	quern_pool *pool;
 	pthread_t thread;
 	uint32_t number;
 } helper;
 
-/* A round is one call of quern_pool_each. The ticket holds its number in the high 32 bits and how many indices are left in
- * the low ones. Who takes one by compare-and-swap has read body, arg and n of this round: the caller changes them only
- * while none is left and all are done. So nobody waits for a thread that has taken nothing: the caller does the work of a
- * thread that sleeps, or that has to wait for a processor. */
+/* A round is one call of quern_pool_each. Every worker has a share of the indices, the same part of them in every round, so that what it
+ * worked on lies in its own cache the next time; who has done his own helps the others. Who takes an index by compare-and-swap has read
+ * body, arg and n of this round: the caller changes them only while none is left and all are done. So nobody waits for a thread that
+ * has taken nothing: others do the work of one that sleeps, or that has to wait for a processor. */
 struct quern_pool {
-	_Alignas(64) _Atomic uint64_t ticket;
+	_Alignas(64) _Atomic uint32_t round;
 	_Alignas(64) _Atomic uint32_t done;
 	_Alignas(64) _Atomic uint32_t n;
 	void (*_Atomic body)(void *, uint32_t, uint32_t);
@@ -40,27 +45,35 @@ struct quern_pool {
 	uint32_t workers, started;
 	helper *helpers;
 	scratch *scratch;
+	share *shares;
 };
 
-static uint32_t round_of(uint64_t ticket) { return (uint32_t)(ticket >> 32); }
+/* The first index of a worker's share; that of the one behind the last is n. */
+static uint32_t begin_of(const quern_pool *p, uint32_t n, uint32_t worker) {
+	return (uint32_t)((uint64_t)n * worker / p->workers);
+}
 
-/* Takes indices of one round until there is none left. */
-static void take_part(quern_pool *p, uint32_t round, uint32_t worker) {
-	uint64_t ticket = atomic_load(&p->ticket);
-	while (round_of(ticket) == round) {
+/* Takes indices of one share until there is none left. */
+static void take_from(quern_pool *p, uint32_t round, uint32_t owner, uint32_t worker) {
+	_Atomic uint64_t *share = &p->shares[owner].ticket;
+	uint64_t ticket = atomic_load(share);
+	while (ticket >> 32 == round && (uint32_t)ticket) {
 		const uint32_t left = (uint32_t)ticket, n = atomic_load(&p->n);
 		void (*body)(void *, uint32_t, uint32_t) = atomic_load(&p->body);
 		void *arg = atomic_load(&p->arg);
-		if (!left) return;
-		if (!atomic_compare_exchange_weak(&p->ticket, &ticket, ticket - 1)) continue;
-		body(arg, n - left, worker);
+		if (!atomic_compare_exchange_weak(share, &ticket, ticket - 1)) continue;
+		body(arg, begin_of(p, n, owner + 1) - left, worker);
 		if (atomic_fetch_add(&p->done, 1) + 1 == n && atomic_load(&p->caller_waits)) {
 			pthread_mutex_lock(&p->lock);
 			pthread_cond_signal(&p->end);
 			pthread_mutex_unlock(&p->lock);
 		}
-		ticket = atomic_load(&p->ticket);
+		ticket = atomic_load(share);
 	}
+}
+
+static void take_part(quern_pool *p, uint32_t round, uint32_t worker) {
+	for (uint32_t k = 0; k < p->workers; k++) take_from(p, round, (worker + k) % p->workers, worker);
 }
 
 /* Looks for a change of `word` for a while: awake first, then giving way to whoever wants the processor. */
@@ -82,17 +95,17 @@ static void *help(void *arg) {
 	uint32_t round = 0;
 	atomic_fetch_add(&p->begun, 1);
 	for (;;) {
-		WAIT_WHILE(round_of(atomic_load(&p->ticket)) == round && !atomic_load(&p->stop))
-		if (round_of(atomic_load(&p->ticket)) == round) {
+		WAIT_WHILE(atomic_load(&p->round) == round && !atomic_load(&p->stop))
+		if (atomic_load(&p->round) == round) {
 			pthread_mutex_lock(&p->lock);
 			atomic_fetch_add(&p->asleep, 1);
-			while (round_of(atomic_load(&p->ticket)) == round && !atomic_load(&p->stop))
+			while (atomic_load(&p->round) == round && !atomic_load(&p->stop))
 				pthread_cond_wait(&p->work, &p->lock);
 			atomic_fetch_sub(&p->asleep, 1);
 			pthread_mutex_unlock(&p->lock);
 		}
 		if (atomic_load(&p->stop)) return NULL;
-		round = round_of(atomic_load(&p->ticket));
+		round = atomic_load(&p->round);
 		take_part(p, round, h->number);
 	}
 }
@@ -138,9 +151,14 @@ quern_pool *quern_pool_create(uint32_t workers) {
 	if (!p) return NULL;
 	*p = (quern_pool) { .workers = wished(workers) };
 	p->scratch = aligned_alloc(64, p->workers * sizeof(scratch));
+	p->shares = aligned_alloc(64, p->workers * sizeof(share));
 	p->helpers = calloc(p->workers, sizeof(helper));
-	if (!p->scratch || !p->helpers) return free(p->scratch), free(p->helpers), free(p), NULL;
-	for (uint32_t i = 0; i < p->workers; i++) p->scratch[i] = (scratch) { 0 };
+	if (!p->scratch || !p->shares || !p->helpers)
+		return free(p->scratch), free(p->shares), free(p->helpers), free(p), NULL;
+	for (uint32_t i = 0; i < p->workers; i++) {
+		p->scratch[i] = (scratch) { 0 };
+		atomic_init(&p->shares[i].ticket, 0);
+	}
 	pthread_mutex_init(&p->lock, NULL);
 	pthread_cond_init(&p->work, NULL);
 	pthread_cond_init(&p->end, NULL);
@@ -158,6 +176,7 @@ void quern_pool_destroy(quern_pool *p) {
 	pthread_cond_destroy(&p->work);
 	pthread_cond_destroy(&p->end);
 	free(p->scratch);
+	free(p->shares);
 	free(p->helpers);
 	free(p);
 }
@@ -176,12 +195,14 @@ static void wait_for_all(quern_pool *p, uint32_t n) {
 }
 
 static void run_round(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, uint32_t), void *arg) {
-	const uint32_t round = round_of(atomic_load(&p->ticket)) + 1;
+	const uint32_t round = atomic_load(&p->round) + 1;
 	atomic_store(&p->done, 0);
 	atomic_store(&p->body, body);
 	atomic_store(&p->arg, arg);
 	atomic_store(&p->n, n);
-	atomic_store(&p->ticket, (uint64_t)round << 32 | n);
+	for (uint32_t w = 0; w < p->workers; w++)
+		atomic_store(&p->shares[w].ticket, (uint64_t)round << 32 | (begin_of(p, n, w + 1) - begin_of(p, n, w)));
+	atomic_store(&p->round, round);
 	wake(p);
 	take_part(p, round, 0);
 	wait_for_all(p, n);
