@@ -14,6 +14,7 @@ typedef struct {
 	size_t used;
 } carver;
 
+/* A line of the cache or more lies free behind it. */
 static void *carve(carver *c, size_t bytes) {
 	void *memory = c->base ? c->base + c->used : NULL;
 	c->used += (bytes + 127) & ~(size_t)63;
@@ -85,6 +86,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	w->first = carve(&c, cap * sizeof(int32_t));
 	w->second = carve(&c, cap * sizeof(int32_t));
 	w->slot = carve(&c, cap * sizeof(int32_t));
+	w->near = carve(&c, (cap / COMPRESS + 1) * sizeof(compress_bits));
 	if (sh->d->features) w->feature = carve(&c, cap * sizeof(int32_t));
 	carve_columns(&c, w->grains, N_GRAIN_COLUMNS, GRAINS);
 	const quern_bound *integrator = dem_integrator(sh->s);

@@ -2,6 +2,7 @@
 /* forces - what the parts of the force stage share: pairs of grains, grains on bodies, integration */
 #pragma once
 #include "../bodies/books.h"
+#include "../common/compress.h"
 #include "dem.h"
 #include <quern/space.h>
 
@@ -87,6 +88,7 @@ typedef struct forces_work {
 		*drag_torque[3];
 	law_row *rows; /* of all laws, one after the other */
 	int32_t *first, *second, *slot, *feature;
+	compress_bits *near; /* who of a chunk's slots is looked at */
 	/* per grain of the block, one more for partners outside, and three that are read with the last; couples, and from lane 3 on what of them damps */
 	quern_real (*row)[8], (*drag_row)[8], (*couple_row)[8];
 	quern_real *grains[N_GRAIN_COLUMNS];
@@ -100,6 +102,7 @@ typedef struct contact_chunk {
 	int32_t item;               /* of the pairs of materials that have parameters of their own, or -1 */
 	uint32_t begin, n_slots, n; /* entries begin .. begin + n_slots of the list, of which n are looked at */
 	quern_real *held;           /* by slot: what springs held in the last step; NULL: nobody asks */
+	const compress_bits *near;  /* who of the entries is looked at; NULL: all are */
 } contact_chunk;
 
 /* Makes the rows of grains of block b that contacts read, of its own and of its neighbours. */

@@ -8,6 +8,23 @@ bool quern_dem_is_history(const quern_use *row) { return !strncmp(row->field, "c
 /* The row says that there are couples; they are the solver's own column. */
 static bool is_couple(const quern_use *row) { return !strcmp(row->field, "contact.couple"); }
 
+#ifdef __AVX512VL__
+/* Whether it is known bit by bit whose numbers these are, which is of use with AVX-512 alone. */
+static bool by_bits(const contact_chunk *c, uint8_t shape) {
+	return c->near && shape != QUERN_INDEX && shape != QUERN_ID;
+}
+#endif
+
+static void recall(const forces_work *w, const contact_chunk *c, uint8_t shape, void *to, const void *whole) {
+#ifdef __AVX512VL__
+	if (by_bits(c, shape)) {
+		quern_compress_real(c->n_slots, c->near, (const quern_real *)whole + c->begin, to);
+		return;
+	}
+#endif
+	quern_gather(shape, to, whole, c->begin, w->slot, c->n);
+}
+
 /* Own columns of the contacts, or of both grains; against a body both are the first's. */
 static void gather_rows(const forces_shared *sh, const forces_work *w, const contact_chunk *c,
 	const quern_bound *law, law_row *rows, quern_column *use, quern_column *use_second) {
@@ -20,8 +37,8 @@ static void gather_rows(const forces_shared *sh, const forces_work *w, const con
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim) && !is_couple(row); k++) {
 			const void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole) continue;
-			quern_gather(row->shape, rows[r].mine[k], whole, history ? c->begin : 0,
-				history ? w->slot : w->first, c->n);
+			if (history) recall(w, c, row->shape, rows[r].mine[k], whole);
+			else quern_gather(row->shape, rows[r].mine[k], whole, 0, w->first, c->n);
 			quern_set_component(&use[r], row->shape, k, rows[r].mine[k]);
 			if (history) continue;
 			if (paired) quern_gather(row->shape, rows[r].other[k], whole, 0, w->second, c->n);
@@ -40,6 +57,17 @@ static void forget(uint8_t shape, void *column, uint32_t begin, uint32_t n, quer
 	}
 }
 
+static void remember(const forces_work *w, const contact_chunk *c, const quern_use *row, void *whole, const void *mine) {
+#ifdef __AVX512VL__
+	if (by_bits(c, row->shape)) {
+		quern_expand_real(c->n_slots, c->near, mine, (quern_real *)whole + c->begin, row->initial);
+		return;
+	}
+#endif
+	if (c->n < c->n_slots) forget(row->shape, whole, c->begin, c->n_slots, row->initial);
+	quern_scatter(row->shape, whole, mine, c->begin, w->slot, c->n);
+}
+
 /* Contacts that were left out forget, contacts that were kept remember. */
 static void scatter_rows(const forces_shared *sh, const forces_work *w, const contact_chunk *c,
 	const quern_bound *law, const law_row *rows) {
@@ -50,8 +78,7 @@ static void scatter_rows(const forces_shared *sh, const forces_work *w, const co
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
 			void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole || row->shape == QUERN_ID) continue;
-			if (c->n < c->n_slots) forget(row->shape, whole, c->begin, c->n_slots, row->initial);
-			quern_scatter(row->shape, whole, rows[r].mine[k], c->begin, w->slot, c->n);
+			remember(w, c, row, whole, rows[r].mine[k]);
 		}
 	}
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* neighbours.cells - linked cells as wide as the farthest pair; blocks of 16 x 16 or 8 x 8 x 8 of them.
  * docs/theory/grains.md, section 4 */
+#include "../common/compress.h"
 #include "cell_grid.h"
 
 typedef struct {
@@ -60,7 +61,7 @@ static uint32_t beside(
 enum { CANDIDATES = 128 };
 typedef struct {
 	uint32_t n;
-	int32_t grain[CANDIDATES], near[CANDIDATES], hit[CANDIDATES];
+	int32_t grain[CANDIDATES], near[CANDIDATES];
 	_Alignas(64) quern_real x[CANDIDATES], y[CANDIDATES], z[CANDIDATES], radius[CANDIDATES];
 } candidates;
 
@@ -80,7 +81,6 @@ QUERN_INLINE void find(finding *f, candidates *c, int32_t i, const int dim) {
 	const quern_real own = job->radius[i], beyond = job->reach;
 	const quern_images images = f->images;
 	const int32_t begin = f->begin;
-	uint32_t hits = 0;
 	QUERN_SIMD
 	for (uint32_t q = 0; q < c->n; q++) {
 		const quern_vec apart = { at.x - c->x[q], at.y - c->y[q], dim == 3 ? at.z - c->z[q] : 0 };
@@ -88,12 +88,9 @@ QUERN_INLINE void find(finding *f, candidates *c, int32_t i, const int dim) {
 		const quern_real reach = own + c->radius[q] + beyond;
 		c->near[q] = (quern_vec_dot(d, d, dim) < reach * reach) & ((c->grain[q] < begin) | (c->grain[q] > i));
 	}
-	for (uint32_t q = 0; q < c->n; q++) {
-		c->hit[hits] = (int32_t)q;
-		hits += (uint32_t)c->near[q];
-	}
+	const uint32_t hits = quern_compress_numbers(c->n, c->near, c->near, NULL);
 	for (uint32_t h = 0; h < hits; h++, f->n++)
-		if (f->n < f->cap) f->out[f->n] = (quern_pair) { i, c->grain[c->hit[h]] };
+		if (f->n < f->cap) f->out[f->n] = (quern_pair) { i, c->grain[c->near[h]] };
 }
 
 /* The same for all grains of a cell; then there is room for others. */

@@ -95,6 +95,19 @@ QUERN_INLINE void put_distances(const forces_shared *sh, const forces_work *w, u
 	packed_put(w->overlap + to, &d[dim]);
 }
 
+/* Those that are near among n slots, where `slot` says who is; the numbers of the slots take its place. */
+QUERN_INLINE uint32_t keep_near(forces_work *w, const int32_t *first, const int32_t *second, uint32_t n) {
+	int32_t *slot = w->slot;
+	const uint32_t kept = quern_compress_numbers(n, slot, slot, w->near);
+#ifdef __AVX512VL__
+	quern_compress_index(n, w->near, first, w->first);
+	quern_compress_index(n, w->near, second, w->second);
+#else
+	for (uint32_t q = 0; q < kept; q++) w->first[q] = first[slot[q]], w->second[q] = second[slot[q]];
+#endif
+	return kept;
+}
+
 /* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what
  * it held is booked. */
 QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n,
@@ -107,7 +120,6 @@ QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t 
 	const quern_real reach = sh->d->reach;
 	const quern_images p = sh->images;
 	int32_t *restrict near = w->slot;
-	uint32_t kept = 0;
 	for (uint32_t k = 0; k + 4 <= n; k += 4) put_distances(sh, w, k, first + k, second + k, dim);
 	for (uint32_t k = n & ~3u; k < n; k += 4) { /* what is left of four, filled up with the last one */
 		const int32_t last[2][4] = { { first[k], first[k + 1 < n ? k + 1 : n - 1], first[n - 1] },
@@ -124,13 +136,7 @@ QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t 
 		QUERN_SIMD
 		for (uint32_t k = 0; k < n; k++) near[k] |= held[k] > 0;
 	}
-	for (uint32_t k = 0; k < n; k++) {
-		const int32_t is = near[k];
-		w->first[kept] = first[k];
-		w->second[kept] = second[k];
-		near[kept] = (int32_t)k;
-		kept += (uint32_t)is;
-	}
+	const uint32_t kept = keep_near(w, first, second, n);
 	for (uint32_t q = kept; q < kept + 3; q++) w->first[q] = w->second[q] = (int32_t)sh->grain[0];
 	return kept;
 }
@@ -299,7 +305,8 @@ QUERN_INLINE void block(
 			.item = item_at(sh, begin),
 			.begin = begin,
 			.n_slots = n,
-			.held = quern_dem_held(sh, FORCE_CONTACT_SHEARED, begin) };
+			.held = quern_dem_held(sh, FORCE_CONTACT_SHEARED, begin),
+			.near = w->near };
 		c.n = compact(sh, w, begin, c.n_slots, c.held, dim);
 		geometry(sh, w, c.n, dim);
 		motion(sh->motion, w, w->velocity, w->spin, c.n, dim, spin);
