@@ -60,7 +60,8 @@ void *quern_platform_memory(size_t bytes) {
 	const size_t size = (bytes + unit - 1) / unit * unit;
 	void *memory = aligned_alloc(unit, size);
 #ifdef MADV_HUGEPAGE
-	if (memory && unit == page) madvise(memory, size, MADV_HUGEPAGE); /* without them it is memory all the same */
+	if (memory && unit == page)
+		madvise(memory, size, MADV_HUGEPAGE); /* without them it is memory all the same */
 #endif
 	return memory;
 }

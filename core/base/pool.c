@@ -201,7 +201,8 @@ static void run_round(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, 
 	atomic_store(&p->arg, arg);
 	atomic_store(&p->n, n);
 	for (uint32_t w = 0; w < p->workers; w++)
-		atomic_store(&p->shares[w].ticket, (uint64_t)round << 32 | (begin_of(p, n, w + 1) - begin_of(p, n, w)));
+		atomic_store(
+			&p->shares[w].ticket, (uint64_t)round << 32 | (begin_of(p, n, w + 1) - begin_of(p, n, w)));
 	atomic_store(&p->round, round);
 	wake(p);
 	take_part(p, round, 0);

@@ -39,15 +39,6 @@ QUERN_INLINE uint32_t quern_compress_numbers(
 }
 
 #ifdef __AVX512VL__
-/* Numbers of the wanted ones of n entries, one after the other; there is room behind `to` for seven more. */
-QUERN_INLINE void quern_compress_index(
-	uint32_t n, const compress_bits *bits, const int32_t *from, int32_t *to) {
-	for (uint32_t k = 0; k < n; k += COMPRESS) {
-		const compress_bits is = bits[k / COMPRESS];
-		_mm512_storeu_si512(to, _mm512_maskz_compress_epi32(is, _mm512_maskz_loadu_epi32(is, from + k)));
-		to += __builtin_popcount(is);
-	}
-}
 QUERN_INLINE void quern_compress_real(
 	uint32_t n, const compress_bits *bits, const quern_real *from, quern_real *to) {
 	for (uint32_t k = 0; k < n; k += 8) {
@@ -61,9 +52,10 @@ QUERN_INLINE void quern_expand_real(
 	uint32_t n, const compress_bits *bits, const quern_real *from, quern_real *to, quern_real other) {
 	const __m512d rest = _mm512_set1_pd(other);
 	for (uint32_t k = 0; k < n; k += 8) {
-		const __mmask8 is = (__mmask8)(bits[k / COMPRESS] >> k % COMPRESS),
-					   there = (__mmask8)(n - k < 8 ? (1u << (n - k)) - 1 : 0xff);
-		_mm512_mask_storeu_pd(to + k, there, _mm512_mask_expand_pd(rest, is, _mm512_loadu_pd(from)));
+		const __mmask8 is = (__mmask8)(bits[k / COMPRESS] >> k % COMPRESS);
+		const __m512d all = _mm512_mask_expand_pd(rest, is, _mm512_loadu_pd(from));
+		if (n - k >= 8) _mm512_storeu_pd(to + k, all);
+		else _mm512_mask_storeu_pd(to + k, (__mmask8)((1u << (n - k)) - 1), all);
 		from += __builtin_popcount(is);
 	}
 }

@@ -199,6 +199,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->twists = !sh->looks && s->use[FORCE_TWIST].real[0];
 	sh->sums = s->host->memory(s->run, (size_t)grains.n_blocks * N_ENERGIES * sizeof(quern_real));
 	sh->farthest = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(quern_real));
+	sh->ways = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(ways));
 	sh->turned = s->host->memory(s->run, (size_t)grains.n_blocks * 2 * sizeof(quern_real));
 	sh->bad = s->host->memory(s->run, (size_t)grains.n_blocks * sizeof(int32_t));
 	quern_dem_decide_checks(sh);
@@ -211,25 +212,49 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	if (!sh->bad || !sh->outside) return false;
 	for (uint32_t b = 0; b < grains.n_blocks; b++) sh->bad[b] = sh->outside[b] = -1;
 	return body_books_open(&sh->books_of_bodies, s, grains.n_blocks, sh->n_bodies) && sh->sums &&
-		   sh->farthest && sh->turned;
+		   sh->farthest && sh->ways && sh->turned;
 }
 
-/* How far bodies have come at most since the last list: at the speed at the beginning of the step or at its end. A list holds
- * while neither two grains, nor a grain and a body, have used up the skin. */
-static quern_real farthest_with_bodies(const forces_shared *sh, quern_real farthest) {
+/* Half of how far two grains can have come nearer: half the diagonal of the box in which all ways lie. Grains that flow together have
+ * come far, and no nearer. */
+static quern_real nearer_by_half(const forces_shared *sh, uint32_t n_blocks) {
+	quern_real square = 0;
+	for (uint32_t k = 0; k < sh->s->dim; k++) {
+		quern_real least = sh->ways[0].along[k][0], most = sh->ways[0].along[k][1];
+		for (uint32_t b = 1; b < n_blocks; b++) {
+			const quern_real *range = sh->ways[b].along[k];
+			least = range[0] < least ? range[0] : least;
+			most = range[1] > most ? range[1] : most;
+		}
+		square += (most - least) * (most - least);
+	}
+	return 0.5 * sqrt(square);
+}
+
+/* How far bodies have come at most since the last list: at the speed at the beginning of the step or at its end. */
+static quern_real sweep(const forces_shared *sh) {
 	const quern_step *s = sh->s;
 	quern_real *swept = sh->use[FORCE_SWEPT].real[0];
-	if (!swept || s->settling) return farthest;
+	if (!swept || s->settling) return 0;
 	const quern_real now = s->time + (quern_real)s->within * s->dt;
 	*swept += quern_bodies_speed(s, SLOT_BODIES, now - s->dt, now + 2 * s->dt) * s->dt;
-	return fmax(farthest, 0.5 * (farthest + *swept));
+	return *swept;
+}
+
+/* A list holds while neither two grains, nor a grain and a body, have used up the skin. Where a coupling moves grains as well, and says
+ * how far from where the list was made, only such ways count. */
+static quern_real used_of_skin(const forces_shared *sh, uint32_t n_blocks, quern_real farthest) {
+	const bool alone = !sh->use[FORCE_WEIGHT].real[0] && !sh->use[FORCE_LENT].real[0];
+	const quern_real swept = sweep(sh),
+					 pair = alone ? fmin(farthest, nearer_by_half(sh, n_blocks)) : farthest;
+	return sh->n_bodies ? fmax(pair, 0.5 * (farthest + swept)) : pair;
 }
 
 /* Blocks in the order of their places, so that sums do not depend on who did what. */
 static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	const quern_step *s = sh->s;
 	const quern_column *u = sh->use;
-	quern_real farthest = u[FORCE_DISPLACEMENT].real[0][0];
+	quern_real farthest = 0, *displacement = u[FORCE_DISPLACEMENT].real[0];
 	quern_real energy[N_ENERGIES] = { 0 };
 	for (uint32_t q = 0; q < n_blocks; q++) {
 		const uint32_t b = quern_nth(sh->by_place, q);
@@ -240,7 +265,7 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	if (!s->settling)
 		body_books_close(&sh->books_of_bodies, s, n_blocks, sh->by_place, &u[FORCE_IMPULSE], &u[FORCE_TWIST],
 			&u[FORCE_WORK], &u[FORCE_SUPPORT]);
-	u[FORCE_DISPLACEMENT].real[0][0] = farthest_with_bodies(sh, farthest);
+	*displacement = fmax(*displacement, used_of_skin(sh, n_blocks, farthest));
 	if (u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
 	if (u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
 }

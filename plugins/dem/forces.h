@@ -22,7 +22,8 @@ enum {
 	G_NEW_POSITION,
 	G_NEW_VELOCITY = 21,
 	G_NEW_SPIN = 24,
-	N_GRAIN_COLUMNS = 27
+	G_ALONG = 27,
+	N_GRAIN_COLUMNS = 30
 };
 /* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in
  * 3-D have a row of their own. */
@@ -33,6 +34,11 @@ enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGI
 typedef quern_real lanes8 __attribute__((vector_size(64)));
 /* Half a row, which most processors hold in one register. */
 typedef quern_real lanes4 __attribute__((vector_size(32)));
+
+/* m, the least and the largest way of a block's grains since the last list, along each axis. */
+typedef struct ways {
+	quern_real along[3][2];
+} ways;
 
 /* A contact deeper than is allowed. */
 typedef struct deep_contact {
@@ -64,6 +70,7 @@ typedef struct forces_shared {
 	body_books books_of_bodies;              /* the last one of a block: by fixed grains */
 	quern_real *sums;                        /* [block][N_ENERGIES] */
 	quern_real *farthest;                    /* [block] square of the way since the last list */
+	ways *ways;                              /* [block] */
 	quern_real *turned;     /* [block][2] sums of m v.v', of old and new velocity, and of m */
 	int32_t *bad;           /* [block] first grain that is lost, or -1 */
 	lanes4 *place, *motion; /* rows by grain: packed.h */

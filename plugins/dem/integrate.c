@@ -22,7 +22,27 @@ static quern_real most_of(quern_real *restrict column, uint32_t n) {
 	return column[0];
 }
 
-/* The square of the way since the last list; how much of the velocity on the way of this step is kept on that of the next; and 1
+/* The least and the largest of n numbers, at most GRAINS, of any order. */
+static void range_of(quern_real *restrict column, uint32_t n, quern_real *least, quern_real *most) {
+	enum { LANES = 8 };
+	quern_real low[LANES], high[LANES];
+	for (uint32_t i = n; i % LANES; i++) column[i] = column[0];
+	for (uint32_t k = 0; k < LANES; k++) low[k] = high[k] = column[k];
+	for (uint32_t i = LANES; i < n; i += LANES) {
+		QUERN_SIMD
+		for (uint32_t k = 0; k < LANES; k++) {
+			low[k] = column[i + k] < low[k] ? column[i + k] : low[k];
+			high[k] = column[i + k] > high[k] ? column[i + k] : high[k];
+		}
+	}
+	*least = low[0], *most = high[0];
+	for (uint32_t k = 1; k < LANES; k++) {
+		*least = low[k] < *least ? low[k] : *least;
+		*most = high[k] > *most ? high[k] : *most;
+	}
+}
+
+/* The way since the last list and its square; how much of the velocity on the way of this step is kept on that of the next; and 1
  * where a grain is lost: what leaves this stage must be finite, and slower than a radius per step. */
 QUERN_INLINE void compare(
 	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n, const int dim) {
@@ -44,6 +64,8 @@ QUERN_INLINE void compare(
 	const quern_real dt = sh->s->dt, waits = sh->waits;
 	quern_real *restrict way = w->grains[G_WAY], *restrict kept = w->grains[G_KEPT],
 						 *restrict whole = w->grains[G_WHOLE], *restrict lost = w->grains[G_LOST];
+	quern_real *restrict along_x = w->grains[G_ALONG], *restrict along_y = w->grains[G_ALONG + 1],
+						 *restrict along_z = w->grains[G_ALONG + 2];
 	QUERN_SIMD
 	for (uint32_t i = 0; i < n; i++) {
 		const quern_vec d = { x[i] - ax[i], y[i] - ay[i], dim == 3 ? z[i] - az[i] : 0 };
@@ -52,20 +74,37 @@ QUERN_INLINE void compare(
 						next = quern_vec_axpy(waits, quern_vec_sub(now, old), now);
 		const quern_real step = quern_vec_dot(now, now, dim) * dt * dt, most = radius[i] * radius[i];
 		way[i] = quern_vec_dot(d, d, dim);
+		along_x[i] = d.x;
+		along_y[i] = d.y;
+		if (dim == 3) along_z[i] = d.z;
 		kept[i] = mass[i] * quern_vec_dot(old, next, dim);
 		whole[i] = mass[i];
 		lost[i] = step <= most ? 0 : 1; /* an unordered comparison finds a NaN too */
 	}
 }
 
+/* Between what ways along each axis those of a block's grains lie. */
+static void spread(const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
+	for (uint32_t k = 0; k < sh->s->dim; k++) {
+		quern_real *range = sh->ways[b].along[k], least, most;
+		range_of(w->grains[G_ALONG + k], n, &least, &most);
+		const bool first = begin == sh->grain[b];
+		range[0] = first || least < range[0] ? least : range[0];
+		range[1] = first || most > range[1] ? most : range[1];
+	}
+}
+
 static void check_grains(
 	const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
+	quern_real none, lost;
 	if (sh->s->dim == 2) compare(sh, w, begin, n, 2);
 	else compare(sh, w, begin, n, 3);
-	for (uint32_t i = 0; i < n && sh->bad[b] < 0; i++)
+	range_of(w->grains[G_LOST], n, &none, &lost);
+	for (uint32_t i = 0; lost > 0 && i < n && sh->bad[b] < 0; i++)
 		if (w->grains[G_LOST][i] > 0) sh->bad[b] = (int32_t)(begin + i);
 	const quern_real farthest = most_of(w->grains[G_WAY], n);
 	sh->farthest[b] = farthest > sh->farthest[b] ? farthest : sh->farthest[b];
+	spread(sh, b, begin, n, w);
 	sh->turned[2 * b] += sum_up(w->grains[G_KEPT], n);
 	sh->turned[2 * b + 1] += sum_up(w->grains[G_WHOLE], n);
 }
@@ -102,7 +141,9 @@ static void hold_fixed(
 	const quern_column *u = sh->use;
 	const int32_t *fixed = u[FORCE_FIXED].index;
 	quern_real *support = body_booked(&sh->books_of_bodies, b, sh->n_bodies);
-	for (uint32_t i = 0; i < n && fixed; i++) {
+	int32_t any = 0;
+	for (uint32_t i = 0; i < n && fixed; i++) any |= fixed[begin + i];
+	for (uint32_t i = 0; i < n && any; i++) {
 		if (!fixed[begin + i]) continue;
 		for (uint32_t k = 0; k < sh->s->dim; k++) {
 			support[k] -= w->grains[G_FORCE + k][i] * sh->s->dt;

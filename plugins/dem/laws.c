@@ -17,7 +17,7 @@ static bool by_bits(const contact_chunk *c, uint8_t shape) {
 
 static void recall(const forces_work *w, const contact_chunk *c, uint8_t shape, void *to, const void *whole) {
 #ifdef __AVX512VL__
-	if (by_bits(c, shape)) {
+	if (by_bits(c, shape) && 3 * c->n > c->n_slots) { /* of a few one by one is faster */
 		quern_compress_real(c->n_slots, c->near, (const quern_real *)whole + c->begin, to);
 		return;
 	}
@@ -57,7 +57,8 @@ static void forget(uint8_t shape, void *column, uint32_t begin, uint32_t n, quer
 	}
 }
 
-static void remember(const forces_work *w, const contact_chunk *c, const quern_use *row, void *whole, const void *mine) {
+static void remember(
+	const forces_work *w, const contact_chunk *c, const quern_use *row, void *whole, const void *mine) {
 #ifdef __AVX512VL__
 	if (by_bits(c, row->shape)) {
 		quern_expand_real(c->n_slots, c->near, mine, (quern_real *)whole + c->begin, row->initial);

@@ -99,12 +99,7 @@ QUERN_INLINE void put_distances(const forces_shared *sh, const forces_work *w, u
 QUERN_INLINE uint32_t keep_near(forces_work *w, const int32_t *first, const int32_t *second, uint32_t n) {
 	int32_t *slot = w->slot;
 	const uint32_t kept = quern_compress_numbers(n, slot, slot, w->near);
-#ifdef __AVX512VL__
-	quern_compress_index(n, w->near, first, w->first);
-	quern_compress_index(n, w->near, second, w->second);
-#else
 	for (uint32_t q = 0; q < kept; q++) w->first[q] = first[slot[q]], w->second[q] = second[slot[q]];
-#endif
 	return kept;
 }
 

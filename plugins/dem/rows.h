@@ -8,7 +8,7 @@
 /* clang-format off */
 #define DISPLACEMENT_USE \
 	"total.displacement", "m", QUERN_UPDATE, QUERN_SCALAR, .initial = INFINITY, \
-	.doc = "Farthest way of a grain since the last list; infinite: the list is stale."
+	.doc = "Half of how far two grains can have come nearer since the last list; infinite: the list is stale."
 #define SWEPT_USE(access) \
 	"total.swept", "m", access, QUERN_SCALAR, .when = "moving", \
 	.doc = "Farthest way of a body's surface since the last list, at most."
