@@ -8,43 +8,11 @@
 
 #include <cmocka.h>
 
-#include "harness.h"
+#include "seen.h"
 #include "table.h"
 #include <math.h>
-#include <observe.h>
-#include <string.h>
 
 static const double pi = 3.141592653589793;
-
-/* A run and what its observers say now. */
-typedef struct seen {
-	quern_run *run;
-	quern_series series;
-} seen;
-
-static void look(seen *s) {
-	harness_look(s->run);
-	assert_int_equal(quern_series_add(&s->series, s->run), QUERN_OK);
-}
-
-static seen watch(quern_run *run) {
-	seen s = { .run = run };
-	assert_int_equal(quern_series_init(&s.series, run, 0), QUERN_OK);
-	look(&s);
-	return s;
-}
-
-static double value(const seen *s, const char *column) {
-	for (size_t c = 0; c < s->series.n; c++)
-		if (!strcmp(s->series.column[c].name, column)) return s->series.column[c].last;
-	fail_msg("no column %s", column);
-	return 0;
-}
-
-static void leave(seen *s) {
-	quern_series_finish(&s->series);
-	harness_close(s->run);
-}
 
 /* Grains without gravity in a domain of one metre; `more` begins with the observers. */
 static seen grains(int dim, const char *more, const char *place) {
