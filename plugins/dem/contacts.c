@@ -186,6 +186,7 @@ void quern_dem_act(const forces_shared *sh, forces_work *w, const contact_chunk 
 	const bool paired = c->body < 0;
 	quern_dem_call_laws(sh, w, c);
 	if (sh->deep) quern_dem_check_contacts(sh, w, c);
+	if (sh->boxed && !sh->looks) quern_dem_box_book(sh, w, c, sums);
 	if (dim == 2 && sh->spin) add_both(sh, w, c, 2, true);
 	else if (dim == 2) add_both(sh, w, c, 2, false);
 	else if (sh->spin) add_both(sh, w, c, 3, true);

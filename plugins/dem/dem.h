@@ -35,6 +35,10 @@ typedef struct dem {
 	bool outlets, sources;
 	bool blends; /* some sources pour several materials */
 	bool settles;
+	bool boxed; /* the domain is strained: box.c */
+	quern_real box_shear, box_pressure, box_packing, box_rate, box_inertia,
+		box_damping; /* from the scene; NaN: not given */
+	int32_t box_along;
 	quern_real reach;   /* m, of the laws beyond touching */
 	quern_real largest; /* m, radius of the largest grain that the scene itself brings */
 	quern_real height;  /* m, of the fill, or of the domain where there is none */
@@ -155,6 +159,26 @@ quern_real quern_dem_limit(const void *self, const quern_step *, quern_real *har
 /* s, the recommended step before there are grains, from parameters alone: of the lightest grains that the materials in the bits of
  * `expected` may bring. The step's slots, gravity and domain are looked at, and no set. INFINITY: no law limits it. */
 quern_real quern_dem_expected_step(const dem *, const quern_step *, uint64_t expected);
+
+/* ---- box.c ---- */
+/* Whether the scene may strain the domain; says in `boxed` whether it does. */
+quern_status quern_dem_box_check(dem *, const quern_setup *, quern_err *);
+quern_status quern_dem_box_bodies(const dem *, const quern_setup *, uint32_t n_bodies, quern_err *);
+/* The box is the domain once all grains are there. */
+quern_status quern_dem_box_begin(const dem *, const quern_step *);
+/* Whether a box read from a file, with rows of dem.fill, is one to go on with. */
+bool quern_dem_box_holds(const quern_step *);
+quern_status quern_dem_box_strain(const void *self, const quern_step *);
+/* With rows of dem.neighbours, like all that follow: brings grains back into the box, with the velocities of the images that they are then. */
+void quern_dem_box_bring_back(const quern_step *);
+/* Makes of a job one whose images lie along the axes, in which all pairs that are near are near too; false if memory is gone. */
+bool quern_dem_box_straighten(const quern_step *, quern_neighbour_job *);
+/* Keeps of n pairs those whose nearest images are closer than the sum of their radii and `reach`; returns how many. */
+uint32_t quern_dem_box_keep_near(const quern_step *, quern_real reach, uint32_t n, quern_pair *);
+/* Notes the box for which a list was made, and the largest distance (m) at which two grains act on each other. */
+void quern_dem_box_list(const quern_step *, quern_real widest);
+/* m, such as `way`, the farthest way of a grain beside the box's own strain, with what that strain does to pairs. */
+quern_real quern_dem_box_moved(const quern_step *, quern_real way);
 
 /* ---- grain_file.c ---- */
 typedef struct grain_table {

@@ -489,6 +489,7 @@ quern_status quern_dem_fill(const void *self, const quern_step *s) {
 	if (status == QUERN_OK) status = read_file(f.d, s, &table);
 	if (status == QUERN_OK) status = open_placer(&f, &table);
 	if (status == QUERN_OK) status = fill_all(&f, &table);
+	if (status == QUERN_OK) status = quern_dem_box_begin(f.d, s);
 	if (status == QUERN_OK) warn_of_softness(f.d, s);
 	quern_placer_finish(&f.placer);
 	quern_grain_table_finish(&table);

@@ -66,6 +66,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	carve_columns(&c, &w->weight, 1, cap);
 	carve_columns(&c, w->force, dim, cap);
 	if (sh->works || sh->books) carve_columns(&c, w->wall, dim, cap);
+	if (sh->boxed) carve_columns(&c, w->crossed, dim, cap);
 	carve_columns(&c, w->arm, 2, cap);
 	if (sh->spin) {
 		carve_columns(&c, w->spin, dim == 3 ? 3 : 1, cap);
@@ -161,6 +162,16 @@ static bool asks_for_means(const quern_step *s) {
 	return false;
 }
 
+static bool prepare_box(forces_shared *sh, quern_real ahead, uint32_t n_blocks) {
+	const quern_step *s = sh->s;
+	sh->boxed = true;
+	sh->box = dem_box_at(s, &s->use[FORCE_BOX_LENGTH]);
+	sh->box_then = dem_box_after(&sh->box, (1 - ahead) * s->dt);
+	for (uint32_t k = 0; k < s->dim; k++) quern_images_set(&sh->images, k, true, sh->box.length[k]);
+	sh->box_sums = s->host->memory(s->run, (size_t)n_blocks * N_BOX_SUMS * sizeof(quern_real));
+	return sh->box_sums;
+}
+
 static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	const quern_step *s = sh->s;
 	const quern_set_view contacts = s->host->set(s->run, "contact"), touches = s->host->set(s->run, "touch");
@@ -190,6 +201,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 		sh->most_grains = n > sh->most_grains ? n : sh->most_grains;
 	}
 	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
+	if (sh->d->boxed && !prepare_box(sh, ahead, grains.n_blocks)) return false;
 	/* an integrator in two parts has moved the grains on already: bodies are where they will be then */
 	const quern_real now = s->time + ((quern_real)s->within + (sh->looks ? 0 : ahead)) * s->dt;
 	sh->pose = quern_body_poses(s, SLOT_BODIES, now, now);
@@ -242,9 +254,9 @@ static quern_real sweep(const forces_shared *sh) {
 }
 
 /* A list holds while neither two grains, nor a grain and a body, have used up the skin. Where a coupling moves grains as well, and says
- * how far from where the list was made, only such ways count. */
+ * how far from where the list was made, or where ways are those beside a box's own flow, only such ways count. */
 static quern_real used_of_skin(const forces_shared *sh, uint32_t n_blocks, quern_real farthest) {
-	const bool alone = !sh->use[FORCE_WEIGHT].real[0] && !sh->use[FORCE_LENT].real[0];
+	const bool alone = !sh->use[FORCE_WEIGHT].real[0] && !sh->use[FORCE_LENT].real[0] && !sh->boxed;
 	const quern_real swept = sweep(sh),
 					 pair = alone ? fmin(farthest, nearer_by_half(sh, n_blocks)) : farthest;
 	return sh->n_bodies ? fmax(pair, 0.5 * (farthest + swept)) : pair;
@@ -266,6 +278,7 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 		body_books_close(&sh->books_of_bodies, s, n_blocks, sh->by_place, &u[FORCE_IMPULSE], &u[FORCE_TWIST],
 			&u[FORCE_WORK], &u[FORCE_SUPPORT]);
 	*displacement = fmax(*displacement, used_of_skin(sh, n_blocks, farthest));
+	if (sh->boxed) quern_dem_box_collect(sh, n_blocks);
 	if (u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
 	if (u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];
 }

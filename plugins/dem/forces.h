@@ -3,6 +3,7 @@
 #pragma once
 #include "../bodies/books.h"
 #include "../common/compress.h"
+#include "box.h"
 #include "dem.h"
 #include <quern/space.h>
 
@@ -28,6 +29,7 @@ enum {
 /* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in
  * 3-D have a row of their own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
+enum { BOX_LOAD, BOX_WORK = 3, N_BOX_SUMS };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
 /* A row at once: the same bits for any instruction set. */
@@ -63,6 +65,9 @@ typedef struct forces_shared {
 	bool books;            /* losses of this step are booked */
 	bool looks;            /* nothing moves: forces and energies of the state as it is */
 	bool starts;           /* losses will be booked from now on: what springs hold is noted */
+	bool boxed;            /* the domain is strained */
+	dem_box box, box_then; /* where forces are looked at, and after the step */
+	quern_real *box_sums;  /* [block][N_BOX_SUMS] */
 	quern_images images;
 	const int32_t *material; /* NULL: no two contacts of a list have parameters of their own */
 	const uint32_t *grain, *contact, *touch; /* partitions */
@@ -91,6 +96,7 @@ typedef struct forces_work {
 	quern_real *overlap, *normal[3], *velocity[3], *spin[3], *turn[3], *radius, *mass, *weight, *arm[2];
 	quern_real *mean_velocity[3], *mean_spin[3]; /* those of `velocity` and `spin` where they are the same */
 	quern_real *wall[3];                         /* velocity of a body that moves, where it is touched */
+	quern_real *crossed[3]; /* of a box that is strained: how many of its lengths lie between both */
 	quern_real *force[3], *couple[3], *dashpot[3], *drag_couple[3], *stored, *sheared, *rubbed, *torque[3],
 		*drag_torque[3];
 	law_row *rows; /* of all laws, one after the other */
@@ -137,6 +143,20 @@ void quern_dem_check_contacts(const forces_shared *, const forces_work *, const 
 void quern_dem_check_grains(const forces_shared *, uint32_t b);
 quern_status quern_dem_judge_contacts(const forces_shared *, uint32_t n_blocks);
 quern_status quern_dem_judge_grains(const forces_shared *, uint32_t n_blocks);
+
+/* ---- box.c ---- */
+/* Differences in `normal` become those of nearest images; notes in `crossed`, which may be NULL, which those are. */
+void quern_dem_box_bring(
+	const forces_shared *, const forces_work *, uint32_t n, quern_real *const crossed[3]);
+/* Takes the velocities of images from `velocity`, that of the first less that of the second. */
+void quern_dem_box_motion(
+	const forces_shared *, const forces_work *, quern_real *const velocity[3], uint32_t n);
+/* What contacts bear, and what they do on images; of a pair across blocks the first grain's block keeps the books. */
+void quern_dem_box_book(const forces_shared *, const forces_work *, const contact_chunk *, quern_real *sums);
+void quern_dem_box_collect(const forces_shared *, uint32_t n_blocks);
+/* Squares of ways beside the box's own strain since the list, of which `listed` holds lengths and offset; `anchor` from `begin` on. */
+void quern_dem_box_ways(const dem_box *, const quern_column *listed, uint32_t begin, uint32_t n,
+	quern_real *const x[3], quern_real *const anchor[3], quern_real *way);
 
 /* ---- energy.c ---- */
 /* What contacts hold; of a pair across blocks the first grain's block keeps the books. */

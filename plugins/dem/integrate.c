@@ -99,6 +99,12 @@ static void check_grains(
 	quern_real none, lost;
 	if (sh->s->dim == 2) compare(sh, w, begin, n, 2);
 	else compare(sh, w, begin, n, 3);
+	if (sh->boxed) {
+		quern_real *const *to = sh->use[FORCE_POSITION].real;
+		quern_dem_box_ways(&sh->box_then, &sh->use[FORCE_BOX_LISTED], begin, n,
+			(quern_real *const[3]) { to[0] + begin, to[1] + begin, sh->s->dim == 3 ? to[2] + begin : NULL },
+			sh->use[FORCE_ANCHOR].real, w->grains[G_WAY]);
+	}
 	range_of(w->grains[G_LOST], n, &none, &lost);
 	for (uint32_t i = 0; lost > 0 && i < n && sh->bad[b] < 0; i++)
 		if (w->grains[G_LOST][i] > 0) sh->bad[b] = (int32_t)(begin + i);

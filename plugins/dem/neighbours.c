@@ -32,13 +32,16 @@ typedef struct {
 
 /* ---- sorting ---- */
 
+static quern_real skin_of(const dem *d) { return d->skin * 2 * d->material[0].radii.mean; }
+static quern_real reach_of(const dem *d) { return skin_of(d) + d->reach; }
+
 static quern_real largest_radius(const quern_real *radius, uint32_t n) {
 	quern_real most = 0;
 	for (uint32_t i = 0; i < n; i++) most = radius[i] > most ? radius[i] : most;
 	return most;
 }
 
-static void set_job(listing *l) {
+static bool set_job(listing *l) {
 	const quern_step *s = l->s;
 	const dem *d = l->d;
 	const quern_set_view grains = s->host->set(s->run, "grain");
@@ -52,12 +55,13 @@ static void set_job(listing *l) {
 	}
 	l->job.radius = s->use[NEAR_RADIUS].real[0];
 	l->job.largest = largest_radius(l->job.radius, grains.n);
-	l->job.reach = d->skin * 2 * d->material[0].radii.mean + d->reach;
+	l->job.reach = reach_of(d);
 	l->job.n_blocks = grains.n_blocks;
 	l->job.block = grains.block;
 	l->fixed = s->use[NEAR_FIXED].index;
 	l->material = d->pairs.n ? s->use[NEAR_MATERIAL].index : NULL;
 	l->id = s->use[NEAR_ID].id;
+	return !d->boxed || quern_dem_box_straighten(s, &l->job);
 }
 
 #ifdef QUERN_PERMUTED_BLOCKS
@@ -85,7 +89,7 @@ static uint32_t *places_of(
 /* Grains of one place keep the order that they had by their blocks' places. */
 static quern_status sort_grains(listing *l) {
 	const quern_step *s = l->s;
-	set_job(l);
+	if (!set_job(l)) return QUERN_E_MEMORY;
 	const uint32_t n = l->job.n;
 	uint64_t *key = s->host->memory(s->run, ((size_t)n + 1) * sizeof(uint64_t));
 	int32_t *from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
@@ -109,7 +113,7 @@ static quern_status sort_grains(listing *l) {
 	if (status == QUERN_OK) status = s->host->arrange(s->run, "grain", by_place);
 	if (status != QUERN_OK) return status;
 	l->by_place = by_place;
-	set_job(l);
+	if (!set_job(l)) return QUERN_E_MEMORY;
 	l->job.memory = s->host->memory(s->run, wanted + 64);
 	if (!l->job.memory) return QUERN_E_MEMORY;
 	if (l->ops->index) l->ops->index(l->search->self, &l->job);
@@ -161,8 +165,9 @@ static void find_pairs(void *arg, uint32_t b, uint32_t worker) {
 		l->found[b] = n;
 		return;
 	}
+	const uint32_t near = l->d->boxed ? quern_dem_box_keep_near(l->s, reach_of(l->d), n, out) : n;
 	uint32_t kept = 0;
-	for (uint32_t i = 0; i < n; i++)
+	for (uint32_t i = 0; i < near; i++)
 		if (!l->fixed || !l->fixed[out[i].first] || !l->fixed[out[i].second]) out[kept++] = out[i];
 	l->found[b] = sort_pairs(l, out, kept, worker) ? kept : UINT32_MAX;
 }
@@ -405,12 +410,12 @@ static quern_status list_touches(listing *l) {
 static quern_status check_periodic(const listing *l) {
 	const quern_step *s = l->s;
 	for (uint32_t k = 0; k < s->dim; k++)
-		if (s->periodic[k] && s->upper[k] - s->lower[k] < 2 * (2 * l->job.largest + l->job.reach))
+		if (s->periodic[k] && l->job.upper[k] - l->job.lower[k] < 2 * (2 * l->job.largest + l->job.reach))
 			return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
 				"the domain is periodic along axis %u and only %.3g m wide there: it must hold two largest "
 				"grains "
 				"and their skins, %.3g m",
-				k, s->upper[k] - s->lower[k], 2 * (2 * l->job.largest + l->job.reach));
+				k, l->job.upper[k] - l->job.lower[k], 2 * (2 * l->job.largest + l->job.reach));
 	return QUERN_OK;
 }
 
@@ -424,6 +429,10 @@ quern_status quern_dem_left(const quern_step *s, int64_t id, uint32_t axis, quer
 /* A closed domain has bodies that keep grains inside; periodic axes bring them back here, where lists are remade. */
 static quern_status keep_inside(const listing *l) {
 	const quern_step *s = l->s;
+	if (l->d->boxed) {
+		quern_dem_box_bring_back(s);
+		return QUERN_OK;
+	}
 	const uint32_t n = s->host->set(s->run, "grain").n;
 	const int32_t *fixed = s->use[NEAR_FIXED].index;
 	const uint32_t *order = s->host->parts(s->run, "grain")->entry;
@@ -456,7 +465,8 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 	l.ops = l.search->ops;
 	quern_real *grown = s->use[NEAR_GROWN].real[0];
 	const quern_real moved = s->use[NEAR_DISPLACEMENT].real[0][0] + (grown ? *grown : 0);
-	if (moved < 0.5 * l.d->skin * 2 * l.d->material[0].radii.mean && !is_release(s)) return QUERN_OK;
+	if ((l.d->boxed ? quern_dem_box_moved(s, moved) : moved) < 0.5 * skin_of(l.d) && !is_release(s))
+		return QUERN_OK;
 	quern_status status = keep_inside(&l);
 	if (status == QUERN_OK) status = sort_grains(&l);
 	if (status == QUERN_OK) status = check_periodic(&l);
@@ -466,6 +476,8 @@ quern_status quern_dem_neighbours(const void *self, const quern_step *s) {
 	for (uint32_t k = 0; k < s->dim; k++)
 		memcpy(
 			s->use[NEAR_ANCHOR].real[k], s->use[NEAR_POSITION].real[k], (size_t)l.job.n * sizeof(quern_real));
+	if (l.d->boxed)
+		quern_dem_box_list(s, 2 * largest_radius(s->use[NEAR_RADIUS].real[0], l.job.n) + l.d->reach);
 	s->use[NEAR_DISPLACEMENT].real[0][0] = 0;
 	if (grown && !s->settling) *grown = 0;
 	if (s->use[NEAR_SWEPT].real[0]) s->use[NEAR_SWEPT].real[0][0] = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* open - the integrator's part before the forces, where it has one */
-#include "dem.h"
+#include "forces.h"
 #include <math.h>
 #include <string.h>
 
@@ -11,6 +11,8 @@ typedef struct {
 	const quern_bound *bound;
 	uint32_t n, n_spin;
 	quern_real *farthest; /* by chunk: square of the way since the last list */
+	bool boxed;
+	dem_box box;
 } opening;
 
 typedef struct {
@@ -77,13 +79,18 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 		keep(u[OPEN_POSITION].real[k] + begin, w->position[k], held, n);
 		keep(u[OPEN_VELOCITY].real[k] + begin, w->velocity[k], held, n);
 	}
+	if (o->boxed)
+		quern_dem_box_ways(&o->box, &u[OPEN_BOX_LISTED], begin, n,
+			(quern_real *const[3]) { w->position[0], w->position[1], w->position[2] }, u[OPEN_ANCHOR].real,
+			way);
 	for (uint32_t k = 0; k < o->n_spin; k++) keep(u[OPEN_SPIN].real[k] + begin, w->spin[k], held, n);
 	o->farthest[chunk] = most_of(way, held, n);
 }
 
 quern_status quern_dem_open(const void *self, const quern_step *s) {
 	opening o = { .s = s, .bound = dem_integrator(s), .n = s->host->set(s->run, "grain").n };
-	(void)self;
+	o.boxed = ((const dem *)self)->boxed;
+	if (o.boxed) o.box = dem_box_at(s, &s->use[OPEN_BOX_LENGTH]);
 	if (!((const quern_integrator_ops *)o.bound->ops)->open[s->dim - 2] || !o.n) return QUERN_OK;
 	o.n_spin = s->use[OPEN_SPIN].real[0] ? (s->dim == 3 ? 3 : 1) : 0;
 	const uint32_t chunks = (o.n + CHUNK - 1) / CHUNK;

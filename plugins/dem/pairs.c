@@ -121,6 +121,7 @@ QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t 
 			{ second[k], second[k + 1 < n ? k + 1 : n - 1], second[n - 1] } };
 		put_distances(sh, w, k, last[0], last[1], dim);
 	}
+	if (sh->boxed) quern_dem_box_bring(sh, w, n, NULL);
 	QUERN_SIMD
 	for (uint32_t k = 0; k < n; k++) {
 		const quern_vec d = quern_vec_image((quern_vec) { dx[k], dy[k], dim == 3 ? dz[k] : 0 }, p, dim);
@@ -167,6 +168,7 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
 	quern_real *restrict arm_i = w->arm[0], *restrict arm_j = w->arm[1];
 	load_places(sh, w, n, dim);
+	if (sh->boxed) quern_dem_box_bring(sh, w, n, w->crossed);
 	QUERN_SIMD
 	for (uint32_t q = 0; q < n; q++) {
 		const quern_vec d = quern_vec_image((quern_vec) { nx[q], ny[q], dim == 3 ? nz[q] : 0 }, p, dim);
@@ -306,6 +308,8 @@ QUERN_INLINE void block(
 		geometry(sh, w, c.n, dim);
 		motion(sh->motion, w, w->velocity, w->spin, c.n, dim, spin);
 		if (sh->mean) motion(sh->mean, w, w->mean_velocity, w->mean_spin, c.n, dim, spin);
+		if (sh->boxed) quern_dem_box_motion(sh, w, w->velocity, c.n);
+		if (sh->boxed && sh->mean) quern_dem_box_motion(sh, w, w->mean_velocity, c.n);
 		masses(sh, w, c.n);
 		quern_dem_act(sh, w, &c, sums);
 	}

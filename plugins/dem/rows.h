@@ -19,6 +19,24 @@
 #define ENERGY_USE(name, access, text) \
 	"total." name, "J", access, QUERN_SCALAR, .flags = QUERN_OPTIONAL | QUERN_RELEASED, .doc = text
 
+#define BOX_ROWS(X, NAME, lengths, speeds) \
+	X(NAME##_LENGTH, "total.box_length", "m", lengths, QUERN_VECTOR, .when = "boxed", \
+		.doc = "Of the periodic box that is strained.") \
+	X(NAME##_SPEED, "total.box_speed", "m/s", speeds, QUERN_VECTOR, .when = "boxed", .doc = "Rate of its lengths.") \
+	X(NAME##_OFFSET, "total.box_offset", "m", lengths, QUERN_SCALAR, .when = "boxed", \
+		.doc = "By which the image across y lies further along x.") \
+	X(NAME##_SLIDE, "total.box_slide", "m/s", speeds, QUERN_SCALAR, .when = "boxed", .doc = "Rate of the offset.")
+#define BOX_LISTED_ROWS(X, NAME, access) \
+	X(NAME##_LISTED, "total.box_listed", "m", access, QUERN_VECTOR, .when = "boxed", \
+		.doc = "Lengths of the box when the list was made.") \
+	X(NAME##_LISTED_OFFSET, "total.box_listed_offset", "m", access, QUERN_SCALAR, .when = "boxed", \
+		.doc = "Its offset then.")
+#define BOX_BOOK_ROWS(X, NAME, access) \
+	X(NAME##_WORK, "total.box_work", "J", access, QUERN_SCALAR, .when = "boxed", \
+		.doc = "Done on the grains by the box so far.") \
+	X(NAME##_IMPULSE, "total.box_impulse", "N s", access, QUERN_VECTOR, .when = "boxed", \
+		.doc = "That the box has given to the grains so far.")
+
 #define FILL_USES(X) \
 	X(FILL_POSITION, "grain.position", "m", QUERN_WRITE, QUERN_VECTOR, .flags = QUERN_SHOWN, .doc = "Centre.") \
 	X(FILL_VELOCITY, "grain.velocity", "m/s", QUERN_WRITE, QUERN_VECTOR, .doc = "Velocity.") \
@@ -40,8 +58,32 @@
 	X(FILL_LEFT, "grain_face.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
 	X(FILL_POURED, "grain_source.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "sources") \
 	X(FILL_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL) \
-	X(FILL_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL)
+	X(FILL_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain", .flags = QUERN_OPTIONAL) \
+	BOX_ROWS(X, FILL_BOX, QUERN_WRITE, QUERN_WRITE) \
+	BOX_LISTED_ROWS(X, FILL_BOX, QUERN_WRITE) \
+	BOX_BOOK_ROWS(X, FILL_BOX, QUERN_WRITE) \
+	X(FILL_BOX_SOLID, "total.box_solid", "1", QUERN_WRITE, QUERN_SCALAR, .when = "boxed", \
+		.doc = "Volume of all grains, in m^2 or m^3.") \
+	X(FILL_BOX_MASS, "total.box_mass", "kg", QUERN_WRITE, QUERN_SCALAR, .when = "boxed", .doc = "Of all grains.") \
+	X(FILL_BOX_STRAIN, "total.box_strain", "1", QUERN_WRITE, QUERN_SCALAR, .when = "boxed", \
+		.doc = "Shear strain of the box so far.") \
+	X(FILL_BOX_LOAD, "total.box_load", "J", QUERN_WRITE, QUERN_VECTOR, .when = "boxed", \
+		.doc = "Sum of force times branch over contacts, by axis, at the last step.") \
+	X(FILL_BOX_WIDEST, "total.box_widest", "m", QUERN_WRITE, QUERN_SCALAR, .when = "boxed", \
+		.doc = "Largest distance at which two grains may act on each other.")
 QUERN_USE_ENUM(FILL_USES);
+
+#define STRAIN_USES(X) \
+	X(STRAIN_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(STRAIN_VELOCITY, "grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR) \
+	X(STRAIN_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	BOX_ROWS(X, STRAIN_BOX, QUERN_UPDATE, QUERN_UPDATE) \
+	BOX_BOOK_ROWS(X, STRAIN_BOX, QUERN_UPDATE) \
+	X(STRAIN_BOX_SOLID, "total.box_solid", "1", QUERN_READ, QUERN_SCALAR, .when = "boxed") \
+	X(STRAIN_BOX_MASS, "total.box_mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "boxed") \
+	X(STRAIN_BOX_STRAIN, "total.box_strain", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "boxed") \
+	X(STRAIN_BOX_LOAD, "total.box_load", "J", QUERN_READ, QUERN_VECTOR, .when = "boxed")
+QUERN_USE_ENUM(STRAIN_USES);
 
 #define OPEN_USES(X) \
 	X(OPEN_POSITION, "grain.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
@@ -49,7 +91,9 @@ QUERN_USE_ENUM(FILL_USES);
 	X(OPEN_SPIN, "grain.spin", "rad/s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
 	X(OPEN_ANCHOR, "grain.anchor", "m", QUERN_READ, QUERN_VECTOR) \
 	X(OPEN_FIXED, FIXED_USE(QUERN_READ)) \
-	X(OPEN_DISPLACEMENT, DISPLACEMENT_USE)
+	X(OPEN_DISPLACEMENT, DISPLACEMENT_USE) \
+	BOX_ROWS(X, OPEN_BOX, QUERN_READ, QUERN_READ) \
+	BOX_LISTED_ROWS(X, OPEN_BOX, QUERN_READ)
 QUERN_USE_ENUM(OPEN_USES);
 
 #define OUTLET_USES(X) \
@@ -109,7 +153,13 @@ QUERN_USE_ENUM(POUR_USES);
 	X(NEAR_GRAIN, "touch.grain", "1", QUERN_WRITE, QUERN_INDEX, .target = "grain", .doc = "The grain.") \
 	X(NEAR_BODY, "touch.body", "1", QUERN_WRITE, QUERN_INDEX, .target = "body", .doc = "The body.") \
 	X(NEAR_FEATURE, "touch.feature", "1", QUERN_WRITE, QUERN_INDEX, .when = "features", \
-		.doc = "The body's face, edge or vertex.")
+		.doc = "The body's face, edge or vertex.") \
+	X(NEAR_VELOCITY, "grain.velocity", "m/s", QUERN_UPDATE, QUERN_VECTOR, .when = "boxed") \
+	X(NEAR_MASS, "grain.mass", "kg", QUERN_READ, QUERN_SCALAR, .when = "boxed") \
+	BOX_ROWS(X, NEAR_BOX, QUERN_UPDATE, QUERN_UPDATE) \
+	BOX_LISTED_ROWS(X, NEAR_BOX, QUERN_UPDATE) \
+	BOX_BOOK_ROWS(X, NEAR_BOX, QUERN_UPDATE) \
+	X(NEAR_BOX_WIDEST, "total.box_widest", "m", QUERN_UPDATE, QUERN_SCALAR, .when = "boxed")
 QUERN_USE_ENUM(NEAR_USES);
 
 /* Forces of the state as it is: what a look at them takes and what a step does. */
@@ -145,7 +195,8 @@ QUERN_USE_ENUM(NEAR_USES);
 		.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step.") \
 	X(FORCE_TOUCH_SHEARED, "touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, \
 		.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step.") \
-	X(FORCE_ID, "grain.id", "1", QUERN_READ, QUERN_ID)
+	X(FORCE_ID, "grain.id", "1", QUERN_READ, QUERN_ID) \
+	BOX_ROWS(X, FORCE_BOX, moves, QUERN_READ)
 #define LOOK_USES(X) STATE_USES(X, QUERN_READ, QUERN_UPDATE)
 QUERN_USE_ENUM(LOOK_USES);
 
@@ -167,7 +218,10 @@ QUERN_USE_ENUM(LOOK_USES);
 	X(FORCE_DEEP_SECOND, "total.deep_second", "1", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", \
 		.doc = "Id of its partner; -1 - k for body k.") \
 	X(FORCE_DEEP_TIME, "total.deep_time", "s", QUERN_UPDATE, QUERN_SCALAR, .when = "overlap.most", \
-		.doc = "For how long the contact has been deep.")
+		.doc = "For how long the contact has been deep.") \
+	BOX_LISTED_ROWS(X, FORCE_BOX, QUERN_READ) \
+	X(FORCE_BOX_WORK, "total.box_work", "J", QUERN_UPDATE, QUERN_SCALAR, .when = "boxed") \
+	X(FORCE_BOX_LOAD, "total.box_load", "J", QUERN_UPDATE, QUERN_VECTOR, .when = "boxed")
 QUERN_USE_ENUM_FROM(LOOK_USES_ROWS, MOVE_USES);
 
 #define ENERGY_USES(X) \

@@ -7,6 +7,7 @@
 #include <quern/math.h>
 #include <stdio.h>
 
+static const char *const box_axes[] = { "all", "y", NULL };
 static const char *const radius_laws[] = { "normal", "uniform", NULL };
 static const quern_param mix_rows[] = { QUERN_PARAM_AS(dem_share, name, "material", NULL, "Which material.",
 											.flags = QUERN_REQUIRED),
@@ -99,6 +100,28 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		.flags = QUERN_MIN_OPEN),
 	QUERN_PARAM_AS(dem, settle_most, "settle.most", "1",
 		"Most steps of settling; then the run goes on with a warning.", .def = 1e6, .min = 1, .max = 2e9),
+	QUERN_PARAM_AS(dem, box_shear, "box.shear", "1/s",
+		"Shear rate du_x/dy of a domain that is periodic along every axis and strained with all its grains.",
+		.flags = QUERN_MAYBE),
+	QUERN_PARAM_AS(dem, box_pressure, "box.pressure", "Pa",
+		"Normal stress that the domain is kept at by what changes of it (box.along); in 2-D force per length.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12, .unless = "box.packing"),
+	QUERN_PARAM_AS(dem, box_packing, "box.packing", "1",
+		"Packing fraction that the domain is brought to at box.rate and kept at: volume of all grains over its own.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1, .unless = "box.pressure"),
+	QUERN_PARAM_AS(dem, box_rate, "box.rate", "1/s",
+		"Rate of change of the lengths, over themselves, on the way there.",
+		.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e9),
+	QUERN_PARAM_AS(dem, box_along, "box.along", "1", "Which lengths change for box.pressure and box.packing.",
+		.choices = box_axes),
+	QUERN_PARAM_AS(dem, box_inertia, "box.inertia", "1",
+		"Mass of what pushes for box.pressure, over that of the grains.", .def = 0.1, .min = 0.001,
+		.max = 1e3, .flags = QUERN_ADVANCED),
+	QUERN_PARAM_AS(dem, box_damping, "box.damping", "1",
+		"Its damping rate, over the frequency that it would have on a gas of that pressure.", .def = 10,
+		.min = 0.1, .max = 1e3, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(dem, boxed, NULL, "Strain the domain; set by itself where a key of box says how.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(dem, fixed, NULL,
 		"Keep a flag for grains that do not move; set by itself where one is needed.",
 		.flags = QUERN_ADVANCED),
@@ -205,6 +228,7 @@ static const quern_slot slots[] = {
 static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
 static const quern_use pour_uses[] = QUERN_USE_ROWS(POUR_USES);
 static const quern_use outlet_uses[] = QUERN_USE_ROWS(OUTLET_USES);
+static const quern_use strain_uses[] = QUERN_USE_ROWS(STRAIN_USES);
 static const quern_use open_uses[] = QUERN_USE_ROWS(OPEN_USES);
 static const quern_use near_uses[] = QUERN_USE_ROWS(NEAR_USES);
 static const quern_use force_uses[] = QUERN_USE_ROWS(FORCE_USES);
@@ -222,6 +246,12 @@ static const quern_stage stages[] = { { .name = "dem.fill",
 		.uses = pour_uses,
 		.run = quern_dem_pour,
 		.when = "sources" },
+	{ .name = "dem.strain",
+		.doc = "How fast the box changes, and the box's own flow to the grains.",
+		.phase = QUERN_SUBSTEP,
+		.uses = strain_uses,
+		.run = quern_dem_box_strain,
+		.when = "boxed" },
 	{ .name = "dem.open",
 		.doc = "The integrator's part before the forces, if it has one.",
 		.phase = QUERN_SUBSTEP,
@@ -318,6 +348,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 		return setup->host->fail(
 			err, QUERN_E_PARAM, NULL, "no grains: give fill, place, file, from or source");
 	if (quern_sources_check(&d->source, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	if (quern_dem_box_check(d, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	d->outlets = d->outlets || outlets_any(setup->open);
 	d->sources = d->sources || d->source.n;
 	setup->host->publish(setup, "grain.sources", "1", d->source.n);
@@ -476,6 +507,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	const quern_status status = quern_dem_pair_up(d, setup, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err);
 	if (status != QUERN_OK) return status;
 	if (check_above(d, setup, n_slot[SLOT_BODIES], err) != QUERN_OK) return QUERN_E_PARAM;
+	if (quern_dem_box_bodies(d, setup, n_slot[SLOT_BODIES], err) != QUERN_OK) return QUERN_E_PARAM;
 	d->features = false;
 	d->moving = n_slot[SLOT_BODIES] && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	for (uint32_t b = 0; b < n_slot[SLOT_BODIES]; b++)
@@ -533,7 +565,13 @@ static quern_status accept(const void *self, const quern_step *s) {
 	if (!radii_hold(s, s->use[FILL_RADIUS].real[0], n))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 			"grain.radius holds a radius of no grain, or far wider than the domain");
-	if (!quern_positions_hold(s, &s->use[FILL_POSITION], n))
+	if (d->boxed && !quern_dem_box_holds(s))
+		return s->host->stop(
+			s->run, QUERN_E_NUMERIC, NULL, -1, "total.box_length and its like hold the numbers of no box");
+	quern_step now = *s;
+	for (uint32_t k = 0; k < s->dim && d->boxed; k++)
+		now.upper[k] = s->lower[k] + s->use[FILL_BOX_LENGTH].real[k][0];
+	if (!quern_positions_hold(&now, &s->use[FILL_POSITION], n))
 		return s->host->stop(
 			s->run, QUERN_E_NUMERIC, NULL, -1, "grain.position holds a position far outside of the domain");
 	return QUERN_OK;

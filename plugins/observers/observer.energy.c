@@ -24,6 +24,7 @@ static const quern_param params[] = { QUERN_END_PARAMS };
 	X(DAMPED, "total.damped", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(RUBBED, "total.rubbed", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
+	X(STRAINED, "total.box_work", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(EXCHANGED, "total.exchanged", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(GRAINS_LEFT, "grain_face.energy", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
 	X(GRAINS_LEFT_HEIGHT, "grain_face.potential", "J", QUERN_READ, QUERN_SCALAR, .flags = QUERN_WANTED) \
@@ -64,7 +65,9 @@ static const quern_output outputs[] = { { .name = "grains", .unit = "J", .doc = 
 		.unit = "J",
 		.doc = "Lost to sliding contacts so far, and to those that yield or whose liquid forms a bridge." },
 	{ .name = "exchanged", .unit = "J", .doc = "Taken by the coupling so far." },
-	{ .name = "driven", .unit = "J", .doc = "Done by bodies that move so far, with a minus." },
+	{ .name = "driven",
+		.unit = "J",
+		.doc = "Done by bodies that move and by a box that is strained so far, with a minus." },
 	{ .name = "passed",
 		.unit = "J",
 		.doc = "Taken out through open faces, less what sources brought: of motion, of height and stored in "
@@ -91,6 +94,7 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 			  to[] = { SPRINGS, TANGENTIAL, DASHPOTS, SLIDING, COUPLING };
 	for (int k = 0; k < 5; k++) out[to[k]] = u[rows[k]].real[0] ? u[rows[k]].real[0][0] : 0;
 	for (uint32_t i = 0; u[WORK].real[0] && i < b->count[WORK]; i++) out[BODIES] -= u[WORK].real[0][i];
+	if (u[STRAINED].real[0]) out[BODIES] -= u[STRAINED].real[0][0];
 	for (int row = GRAINS_LEFT; row <= POINTS_POURED_HEIGHT; row++)
 		out[PASSED] += (row < GRAINS_POURED ? 1 : -1) * book_total(u[row].real[0], b->count[row]);
 	for (int k = 0; k < SUM; k++) out[SUM] += out[k];

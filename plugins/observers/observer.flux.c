@@ -36,7 +36,8 @@ static const quern_param params[] = { QUERN_PARAM(observer, axis, "1",
 	X(SEEN, "total.seen", "s", QUERN_UPDATE, QUERN_SCALAR, .initial = -1, \
 		.doc = "Time of the last observation; -1: there was none.") \
 	X(SEEN_BEFORE, "total.seen_before", "s", QUERN_UPDATE, QUERN_SCALAR, .initial = -1, \
-		.doc = "Time of the observation before that.")
+		.doc = "Time of the observation before that.") \
+	X(BOX, "total.box_length", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
 static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
@@ -132,6 +133,7 @@ static bool flow(const observer *o, const quern_observer_batch *b, bool point, q
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
+	if (refuse_box(&b->use[BOX], "observer.flux", host, run) != QUERN_OK) return QUERN_E_PARAM;
 	const observer *o = self;
 	if (b->time != b->use[SEEN].real[0][0]) take_stock(b);
 	return flow(o, b, false, out, host, run) && flow(o, b, true, out, host, run) ? QUERN_OK : QUERN_E_MEMORY;

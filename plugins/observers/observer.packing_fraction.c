@@ -20,7 +20,8 @@ static const quern_param params[] = { REGION_PARAMS(observer, QUERN_REQUIRED),
 	X(GRAIN_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
 	X(GRAIN_RADIUS, "grain.radius", "m", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
 	X(POINT_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
-	X(POINT_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL)
+	X(POINT_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(BOX, "total.box_length", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
 static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
@@ -156,6 +157,7 @@ static quern_real volume_in(const observer *o, quern_real *const *x, uint32_t i,
 
 static quern_status whole(const void *self, const quern_observer_batch *b, quern_real *out,
 	const quern_host *host, quern_run *run) {
+	if (refuse_box(&b->use[BOX], "observer.packing_fraction", host, run) != QUERN_OK) return QUERN_E_PARAM;
 	const observer *o = self;
 	const quern_column *u = b->use;
 	const cloud grains = observed(b, false), points = observed(b, true);

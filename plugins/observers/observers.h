@@ -24,6 +24,16 @@ QUERN_INLINE cloud observed(const quern_observer_batch *b, bool point) {
 		point ? NULL : u[GRAIN_FIXED].index, u[row].real[0] ? b->count[row] : 0, point ? "point" : "grain" };
 }
 
+/* For observers that count images of a domain which keeps its shape; `box`: the column of total.box_length. */
+static inline quern_status refuse_box(
+	const quern_column *box, const char *id, const quern_host *host, quern_run *run) {
+	if (!box->real[0]) return QUERN_OK;
+	return host->stop(run, QUERN_E_PARAM, NULL, -1,
+		"observe: %s looks at a domain that keeps its shape, and grains.box strains it: take observer.box and "
+		"observer.stress",
+		id);
+}
+
 /* Both, for sums; false if memory is gone. */
 static inline bool observe_clouds(const quern_observer_batch *b, const quern_host *host, quern_run *run,
 	cloud_sums *grains, cloud_sums *points) {
