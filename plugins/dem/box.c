@@ -327,11 +327,12 @@ quern_real quern_dem_box_moved(const quern_step *s, quern_real way) {
 void quern_dem_box_ways(const dem_box *b, const quern_column *listed, uint32_t begin, uint32_t n,
 	quern_real *const x[3], quern_real *const anchor[3], quern_real *way) {
 	const box_matrix f = since_list(b, listed);
+	const quern_real middle = b->lower[1] + 0.5 * listed[0].real[1][0]; /* about which it shears */
 	for (uint32_t i = 0; i < n; i++) {
 		quern_real sum = 0;
 		for (uint32_t k = 0; k < b->dim; k++) {
 			const quern_real carried = f.on[k] * (anchor[k][begin + i] - b->lower[k]) +
-									   (k == 0 ? f.xy * (anchor[1][begin + i] - b->lower[1]) : 0);
+									   (k == 0 ? f.xy * (anchor[1][begin + i] - middle) : 0);
 			const quern_real gone = x[k][i] - b->lower[k] - carried;
 			sum += gone * gone;
 		}

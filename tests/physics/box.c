@@ -42,7 +42,7 @@ static double nearest(int dim, const double d[3], const double length[3], double
 
 /* ---- lists ---- */
 
-static text scatter(int dim, const char *search, const char *integrator) {
+static text scatter(int dim, double speed, const char *search, const char *integrator) {
 	text t = { 0 };
 	uint64_t state = 5 + (uint64_t)dim;
 	const double size[3] = { 26, 15, 11 };
@@ -59,7 +59,8 @@ static text scatter(int dim, const char *search, const char *integrator) {
 		double v[3];
 		for (bool clear = false; !clear;) { /* no centre in another grain */
 			clear = true;
-			for (int k = 0; k < 3; k++) x[i][k] = size[k] * uniform(&state), v[k] = 2 * uniform(&state) - 1;
+			for (int k = 0; k < 3; k++)
+				x[i][k] = size[k] * uniform(&state), v[k] = speed * (2 * uniform(&state) - 1);
 			for (int j = 0; j < i; j++) {
 				const double d[3] = { x[i][0] - x[j][0], x[i][1] - x[j][1], x[i][2] - x[j][2] };
 				clear = clear && nearest(dim, d, size, 0) > 0.8;
@@ -124,7 +125,8 @@ static void lists(void **state) {
 	table_head("pairs of a sheared box that shrinks, against all images: missing, too far, not listed");
 	for (int dim = 2; dim <= 3; dim++)
 		for (int k = 0; k < 3; k++) {
-			const text t = scatter(dim, searches[k], integrators[k]);
+			/* where nothing but the box moves grains, it alone makes lists stale */
+			const text t = scatter(dim, k == 2 ? 0 : 1, searches[k], integrators[k]);
 			quern_run *run = harness_open(1, "%s", t.data);
 			tally of = { 0 };
 			for (int step = 0; step < 400; step++) {

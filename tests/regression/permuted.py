@@ -71,6 +71,7 @@ SCENES = {
     "a hopper that is filled and runs out": ("hopper", flow.HOPPER),
     "a drum that turns": ("drum", ["--set=model=grains", "--set=time.end=0.05", "--set=output.every=10 ms"]),
     "two materials": ("mixture", ["--set=time.end=0.05"]),
+    "a box that is strained": ("plane_shear", ["--set=time.end=0.1 s", "--set=output.every=10 ms"]),
 }
 
 
