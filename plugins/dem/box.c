@@ -94,8 +94,8 @@ bool quern_dem_box_holds(const quern_step *s) {
 			return false;
 		if (!(listed > 1e-3 * width && listed < 1e3 * width)) return false;
 	}
-	return fabs(b.offset) <= 2 * b.length[0] &&
-		   fabs(s->use[FILL_BOX_LISTED_OFFSET].real[0][0]) <= 2 * b.length[0] &&
+	return fabs(b.offset) <= 1e6 * b.length[0] &&
+		   fabs(s->use[FILL_BOX_LISTED_OFFSET].real[0][0]) <= 1e6 * b.length[0] &&
 		   !quern_too_fast((const quern_real[3]) { b.slide, 0, 0 }, 1);
 }
 

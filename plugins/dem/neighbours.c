@@ -409,13 +409,22 @@ static quern_status list_touches(listing *l) {
 /* A periodic image is found as the nearest one, which is right only if a pair cannot meet twice through the seam. */
 static quern_status check_periodic(const listing *l) {
 	const quern_step *s = l->s;
-	for (uint32_t k = 0; k < s->dim; k++)
-		if (s->periodic[k] && l->job.upper[k] - l->job.lower[k] < 2 * (2 * l->job.largest + l->job.reach))
-			return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
-				"the domain is periodic along axis %u and only %.3g m wide there: it must hold two largest "
-				"grains "
-				"and their skins, %.3g m",
-				k, l->job.upper[k] - l->job.lower[k], 2 * (2 * l->job.largest + l->job.reach));
+	const quern_real least = 2 * (2 * l->job.largest + l->job.reach);
+	for (uint32_t k = 0; k < s->dim; k++) {
+		const quern_real length = l->job.upper[k] - l->job.lower[k];
+		if (!s->periodic[k] || !(length < least)) continue;
+		if (l->d->boxed)
+			return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+				"the box that is strained (grains.box) is only %.3g m long along axis %u: at its offset it must be %.3g m, "
+				"room for two largest grains and their skins; begin with a larger domain, or one that is less long along x "
+				"than along y",
+				length, k, least);
+		return s->host->stop(s->run, QUERN_E_PARAM, NULL, -1,
+			"the domain is periodic along axis %u and only %.3g m wide there: it must hold two largest "
+			"grains "
+			"and their skins, %.3g m",
+			k, length, least);
+	}
 	return QUERN_OK;
 }
 

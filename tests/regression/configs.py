@@ -183,8 +183,26 @@ def heap(place):
     assert 15 < angles[0.15] < 40 and angles[0.15] > angles[0] + 2, angles
 
 
+def plane_shear(place):
+    """The box is as deep as the normal stress wants it, the shear stress is that of discs at this inertial number, and all books close."""
+    out = place / "plane_shear"
+    lab.run("plane_shear", out)
+    header, rows = lab.series(out)
+    column = {name.split(" [")[0]: [row[k] for row in rows] for k, name in enumerate(header)}
+    flows = [k for k, strain in enumerate(column["box.strain"]) if strain > 0.5]
+    mean = {name: sum(numbers[k] for k in flows) / len(flows) for name, numbers in column.items()}
+    normal, shear = (mean[f"stress.{name}"] + mean[f"stress.kinetic_{name}"] for name in ("yy", "xy"))
+    near("plane_shear: normal stress, Pa", normal, 1, 0.1)                # of thousand grains over 1.5 strains: 0.02 by chance
+    near("plane_shear: shear over normal stress", -shear / normal, 0.37, 0.08)     # docs/validation/plane_shear.md
+    near("plane_shear: packing fraction", mean["box.packing"], 0.786, 0.01)
+    drift = column["energy.budget"][-1] - column["energy.budget"][1]
+    left = [column[f"momentum.{k}"][-1] - column[f"box.impulse_{k}"][-1] for k in "xy"]
+    print(f"plane_shear: budget of energy {drift / column['box.work'][-1]:.1e} of the work, momentum beside the books {max(map(abs, left)):.1e} kg m/s")
+    assert abs(drift) < 1e-3 * column["box.work"][-1] and max(map(abs, left)) < 1e-15
+
+
 if __name__ == "__main__":
     assert math.isclose(math.hypot(3.3552, 9.2184), 9.81, rel_tol=1e-4)
     with lab.workplace() as name:
-        for test in (incline, elastic_bar, mixture, two_grains, drum, hopper, silo, hourglass, heap):
+        for test in (incline, elastic_bar, mixture, two_grains, drum, hopper, silo, hourglass, heap, plane_shear):
             test(pathlib.Path(name))

@@ -4,8 +4,8 @@ under a pressure and in shear that a stage turns back, in two dimensions, and on
 of grains is a state that another scene starts from, and observers that count images of the domain say that they do not know it."""
 import pathlib
 
+import cache
 import h5py
-
 import lab
 
 SHEAR = ["--set=time.end=0.16 s", "--set=output.every=20 ms", "--set=output.fields=[grain.velocity, contact.force, total.box_length]",
@@ -85,10 +85,26 @@ def others_do_not_know_it(place):
     assert "a part of a box that is strained (grains.box) does not stay where it is" in said, said
 
 
+def boxes_that_do_not_go(place):
+    """A box that is too flat for its offset ends the run, and one that a file holds and that is none is not gone on with."""
+    flat = ["--set=domain.upper=[160 mm, 12 mm]", "--set=grains.fill.0.region.box.upper=[160 mm, 12 mm]", "--set=output.every=10 ms"]
+    said = lab.run("plane_shear", place / "flat", *flat, "--set=grains.box.shear=20 1/s", status=3)
+    assert "the box that is strained (grains.box) is only 0.01" in said and "along axis 1: at its offset it must be" in said, said
+    for field, number in (("box_length", 0.0), ("box_offset", 1e9), ("box_speed", 1e9)):
+        out = place / f"of_{field}"
+        lab.run("plane_shear", out, "--until=0.01", "--set=time.end=0.02 s", "--set=output.every=10 ms")
+        with h5py.File(out / "checkpoint.h5", "r+") as file:
+            file[f"total/{field}.0"][...] = number
+        cache.seal(out / "checkpoint.h5")
+        said = lab.run("plane_shear", out, "--set=time.end=0.02 s", "--set=output.every=10 ms", resume=True, status=2)
+        assert "total.box_length and its like hold the numbers of no box" in said, said
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
         place = pathlib.Path(name)
         others_do_not_know_it(place)
+        boxes_that_do_not_go(place)
         (place / "shear").mkdir()
         strain(place / "shear", "plane_shear", SHEAR, (0.03, 0.075, 0.0751, 0.14), "discs that shear under a pressure")
         (place / "pack").mkdir()
