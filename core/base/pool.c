@@ -55,20 +55,20 @@ static uint32_t begin_of(const quern_pool *p, uint32_t n, uint32_t worker) {
 
 /* Takes indices of one share until there is none left. */
 static void take_from(quern_pool *p, uint32_t round, uint32_t owner, uint32_t worker) {
-	_Atomic uint64_t *share = &p->shares[owner].ticket;
-	uint64_t ticket = atomic_load(share);
+	_Atomic uint64_t *tickets = &p->shares[owner].ticket;
+	uint64_t ticket = atomic_load(tickets);
 	while (ticket >> 32 == round && (uint32_t)ticket) {
 		const uint32_t left = (uint32_t)ticket, n = atomic_load(&p->n);
 		void (*body)(void *, uint32_t, uint32_t) = atomic_load(&p->body);
 		void *arg = atomic_load(&p->arg);
-		if (!atomic_compare_exchange_weak(share, &ticket, ticket - 1)) continue;
+		if (!atomic_compare_exchange_weak(tickets, &ticket, ticket - 1)) continue;
 		body(arg, begin_of(p, n, owner + 1) - left, worker);
 		if (atomic_fetch_add(&p->done, 1) + 1 == n && atomic_load(&p->caller_waits)) {
 			pthread_mutex_lock(&p->lock);
 			pthread_cond_signal(&p->end);
 			pthread_mutex_unlock(&p->lock);
 		}
-		ticket = atomic_load(share);
+		ticket = atomic_load(tickets);
 	}
 }
 
