@@ -36,6 +36,12 @@ static quern_real loosest_flow(const update *d) {
 	return least < d->h->packed ? least : INFINITY;
 }
 
+static bool presses(const update *d, int32_t i) {
+	quern_real trace = 0;
+	for (uint32_t k = 0; k < d->s->dim; k++) trace += d->u[U_POINT_STRESS].real[k][i];
+	return trace < 0;
+}
+
 /* Only the shares' sum is the material's stress; points that will carry all of it take it on. What flows at a density of its own keeps its room. */
 static void take_over_stress(const update *d, uint32_t c) {
 	quern_real contact[6];
@@ -54,7 +60,7 @@ static void take_over_stress(const update *d, uint32_t c) {
 		const int32_t i = d->point[q];
 		const quern_real room = volume[i];
 		quern_hybrid_assign(d, (uint32_t)i, 1);
-		if (quern_hybrid_presses(d, i) && mass[i] >= loosest * room) volume[i] = room;
+		if (presses(d, i) && mass[i] >= loosest * room) volume[i] = room;
 	}
 }
 

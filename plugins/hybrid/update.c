@@ -69,7 +69,7 @@ static quern_status once(const hybrid *h, const quern_step *s, news *n) {
 	}
 	if (status == QUERN_OK && !s->use[U_UPDATES].index[0]) quern_hybrid_packing(&d);
 	if (status == QUERN_OK) status = apply(&d);
-	free(d.points);
+	free(d.points.made);
 	free(d.grains);
 	n->changed += d.changed;
 	if (status == QUERN_OK) n->passed = cells_passed(&d);

@@ -1,14 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* update - what the parts of a zone update share: who is in which cell, what cells hold, and what shall come and go */
 #pragma once
+#include "../common/resample.h"
 #include "hybrid.h"
-
-typedef struct new_point {
-	quern_real position[3], velocity[3], stress[6], mass, weight;
-	quern_real volume; /* of a part of others; else the one that goes with the stress is taken */
-	int32_t cell;
-	int32_t parent; /* old entry that it is a part of, -1: none */
-} new_point;
 
 typedef struct new_grain {
 	quern_real position[3], velocity[3], spin[3], radius, mass, weight;
@@ -41,8 +35,7 @@ typedef struct update {
 	quern_real *share;        /* by cell: the continuum's, in the new zone */
 	quern_real *asked;        /* by cell: what oracles ask for in its place, -1: nothing; NULL: nobody asks */
 	bool *drop_grain, *drop_point;
-	new_point *points;
-	uint32_t n_new_points, cap_points;
+	resample points;
 	new_grain *grains;
 	uint32_t n_new_grains;
 	uint32_t changed; /* cells that changed zone */
@@ -151,8 +144,6 @@ quern_status quern_hybrid_points(update *);
 /* As many points as the mass is worth, in a cell that has none. */
 void quern_hybrid_create(update *, uint32_t cell, quern_real mass, const quern_real v[3]);
 void quern_hybrid_assign(const update *, uint32_t begin, uint32_t n);
-/* Whether the mean of the normal stresses of point i is a pressure. */
-bool quern_hybrid_presses(const update *, int32_t i);
 quern_status quern_hybrid_apply_points(update *);
 
 /* ---- absorb.c ---- */
