@@ -14,10 +14,10 @@
 
 typedef struct mpm {
 	quern_real cell, cut; /* from the scene */
-	int32_t points, rasterise;
+	int32_t points, rasterise, resample;
 	quern_list fill, source;
 	const char *from;
-	bool outlets, sources;
+	bool outlets, sources, resamples;
 	uint64_t stream;                            /* of random numbers */
 	bool affine;                                /* points send their gradient, hybrid or not */
 	bool matrix, moments;                       /* or what the transfer gives; whose moment can be kept */
@@ -63,6 +63,7 @@ quern_status quern_mpm_fill(const void *self, const quern_step *);
 /* The n points of another run's state, which are there before the fill: checks and adopts them. */
 quern_status quern_mpm_begin(const mpm *, const quern_step *, uint32_t n);
 quern_status quern_mpm_pour(const void *self, const quern_step *);
+quern_status quern_mpm_resample(const void *self, const quern_step *);
 quern_status quern_mpm_outlets(const void *self, const quern_step *);
 quern_status quern_mpm_sort(const void *self, const quern_step *);
 quern_status quern_mpm_scatter(const void *self, const quern_step *);

@@ -37,6 +37,13 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.choices = rasters),
 	QUERN_PARAM(mpm, affine, NULL, "Keep the gradient that points send; set by itself where one is needed.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, resample, "1",
+		"Steps from one look at how many points cells hold to the next: holes within the material are filled from the points around, "
+		"crowded points join; 0: never. A hybrid has its own.",
+		.max = 1000000),
+	QUERN_PARAM(mpm, resamples, NULL,
+		"Look at how many points cells hold; set by itself where they are resampled.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, outlets, NULL,
 		"Take out what passes an open face; set by itself where the domain has one.",
 		.flags = QUERN_ADVANCED),
@@ -131,6 +138,7 @@ static const quern_slot slots[] = { { .name = "source.region",
 
 static const quern_use fill_uses[] = QUERN_USE_ROWS(FILL_USES);
 static const quern_use pour_uses[] = QUERN_USE_ROWS(POUR_USES);
+static const quern_use resample_uses[] = QUERN_USE_ROWS(RESAMPLE_USES);
 static const quern_use outlet_uses[] = QUERN_USE_ROWS(OUTLET_USES);
 static const quern_use hold_uses[] = QUERN_USE_ROWS(HOLD_USES);
 static const quern_use sort_uses[] = QUERN_USE_ROWS(SORT_USES);
@@ -151,6 +159,13 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 		.uses = pour_uses,
 		.run = quern_mpm_pour,
 		.when = "sources" },
+	{ .name = "mpm.resample",
+		.doc = "Fills holes between points, and joins points that crowd.",
+		.phase = QUERN_BEGIN,
+		.flags = QUERN_SOMETIMES,
+		.uses = resample_uses,
+		.run = quern_mpm_resample,
+		.when = "resamples" },
 	{ .name = "mpm.sort",
 		.doc = "Orders points by block and cell, allocates blocks.",
 		.phase = QUERN_DEPOSIT,
@@ -253,6 +268,10 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if (p->from && setup->host->keeps(setup, "hybrid"))
 		return setup->host->fail(err, QUERN_E_PARAM, "from",
 			"a hybrid starts from its grains alone: give grains.from a run of grains");
+	if (p->resample && setup->host->keeps(setup, "hybrid"))
+		return setup->host->fail(err, QUERN_E_PARAM, "resample",
+			"is for a continuum alone: a hybrid fills holes and joins points at its updates, as hybrid.update says");
+	p->resamples = p->resamples || p->resample > 0;
 	p->outlets = p->outlets || outlets_any(setup->open);
 	/* in a hybrid there is none */
 	const bool hybrid =

@@ -68,6 +68,7 @@ SCENES = {
         hybrid__oracle="[{layered: {depth: 8.1 mm, half_width: 4 mm}}, "
                        "{strain_rate: {rate_change: 40, shear_rate: 20, depth: 5 mm, half_width: 4 mm}}]")]),
     "continuum alone, with a source": ("column", flow.CONTINUUM),
+    "continuum alone, holes filled": ("column", [*flow.CONTINUUM, "--set=continuum.resample=5"]),
     "a hopper that is filled and runs out": ("hopper", flow.HOPPER),
     "a drum that turns": ("drum", ["--set=model=grains", "--set=time.end=0.05", "--set=output.every=10 ms"]),
     "two materials": ("mixture", ["--set=time.end=0.05"]),
