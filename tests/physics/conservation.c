@@ -83,7 +83,7 @@ static result fly(const setting *c) {
 	set_going(run, c);
 	const sums before = sum(run, c->dim);
 	result r = { true, 0, 0, 1 };
-	while (quern_run_time(run) < (c->dim == 3 ? 0.1 : 0.3)) {
+	while (quern_run_time(run) < (c->dim == 3 ? 0.05 : 0.3)) {
 		harness_steps(run, 1);
 		const sums now = sum(run, c->dim);
 		r.same &= now.mass == before.mass;
