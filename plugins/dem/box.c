@@ -5,8 +5,6 @@
 #include "forces.h"
 #include <math.h>
 
-enum { BOX_ALL, BOX_Y };
-
 /* ---- the scene ---- */
 
 static const char *key_of(const dem *d) {

@@ -8,6 +8,33 @@
 #include <quern/math.h>
 #include <quern/solver.h>
 
+enum { BOX_ALL, BOX_Y };
+static const char *const dem_box_axes[] = { "all", "y", NULL };
+/* Rows for what the scene says of a box; with dem.h. */
+#define DEM_BOX_PARAMS                                                                                                    \
+	QUERN_PARAM_AS(dem, box_shear, "box.shear", "1/s",                                                                    \
+		"Shear rate du_x/dy of a domain that is periodic along every axis and strained with all its grains.",             \
+		.flags = QUERN_MAYBE),                                                                                            \
+		QUERN_PARAM_AS(dem, box_pressure, "box.pressure", "Pa",                                                           \
+			"Normal stress that the domain is kept at by what changes of it (box.along); in 2-D force per length.",       \
+			.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e12, .unless = "box.packing"),                                 \
+		QUERN_PARAM_AS(dem, box_packing, "box.packing", "1",                                                              \
+			"Packing fraction that the domain is brought to at box.rate and kept at: volume of all grains over its own.", \
+			.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1, .unless = "box.pressure"),                                   \
+		QUERN_PARAM_AS(dem, box_rate, "box.rate", "1/s",                                                                  \
+			"Rate of change of the lengths, over themselves, on the way there.",                                          \
+			.flags = QUERN_MAYBE | QUERN_MIN_OPEN, .max = 1e9),                                                           \
+		QUERN_PARAM_AS(dem, box_along, "box.along", "1",                                                                  \
+			"Which lengths change for box.pressure and box.packing.", .choices = dem_box_axes),                           \
+		QUERN_PARAM_AS(dem, box_inertia, "box.inertia", "1",                                                              \
+			"Mass of what pushes for box.pressure, over that of the grains.", .def = 0.1, .min = 0.001,                   \
+			.max = 1e3, .flags = QUERN_ADVANCED),                                                                         \
+		QUERN_PARAM_AS(dem, box_damping, "box.damping", "1",                                                              \
+			"Its damping rate, over the frequency that it would have on a gas of that pressure.", .def = 10,              \
+			.min = 0.1, .max = 1e3, .flags = QUERN_ADVANCED),                                                             \
+		QUERN_PARAM(dem, boxed, NULL, "Strain the domain; set by itself where a key of box says how.",                    \
+			.flags = QUERN_ADVANCED)
+
 typedef struct dem_box {
 	uint32_t dim;
 	quern_real lower[3];            /* m, a corner that stays */
