@@ -35,11 +35,12 @@ static void range_of(quern_real *restrict column, uint32_t n, quern_real *least,
 			high[k] = column[i + k] > high[k] ? column[i + k] : high[k];
 		}
 	}
+	for (uint32_t half = LANES / 2; half; half /= 2)
+		for (uint32_t k = 0; k < half; k++) {
+			low[k] = low[k + half] < low[k] ? low[k + half] : low[k];
+			high[k] = high[k + half] > high[k] ? high[k + half] : high[k];
+		}
 	*least = low[0], *most = high[0];
-	for (uint32_t k = 1; k < LANES; k++) {
-		*least = low[k] < *least ? low[k] : *least;
-		*most = high[k] > *most ? high[k] : *most;
-	}
 }
 
 /* The way since the last list and its square; how much of the velocity on the way of this step is kept on that of the next; and 1

@@ -98,8 +98,19 @@ QUERN_INLINE void put_distances(const forces_shared *sh, const forces_work *w, u
 /* Those that are near among n slots, where `slot` says who is; the numbers of the slots take its place. */
 QUERN_INLINE uint32_t keep_near(forces_work *w, const int32_t *first, const int32_t *second, uint32_t n) {
 	int32_t *slot = w->slot;
-	const uint32_t kept = quern_compress_numbers(n, slot, slot, w->near);
+	uint32_t kept = 0;
+#ifdef __AVX512VL__
+	kept = quern_compress_numbers(n, slot, slot, w->near);
 	for (uint32_t q = 0; q < kept; q++) w->first[q] = first[slot[q]], w->second[q] = second[slot[q]];
+#else
+	for (uint32_t k = 0; k < n; k++) {
+		const int32_t is = slot[k];
+		w->first[kept] = first[k];
+		w->second[kept] = second[k];
+		slot[kept] = (int32_t)k;
+		kept += (uint32_t)is;
+	}
+#endif
 	return kept;
 }
 
