@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""law - laws of run-out through the columns of studies/columns.yaml.
+
+    studies/columns/law.py [--sweep out/columns]
+
+The aspect is a = H/L with the width L of the column before the gate goes and H twice the height below
+which half of its mass lies; the run-out is r = (front - L)/L at the end. Broad columns: r = c a through a <= 2, with R^2 of that line. Slender ones:
+r = k a^n through a >= 4, by least squares of the logarithms. Errors are those over seeds, by leaving out one at a time (jackknife). `meet` is the aspect at
+which both laws say the same, `time` when the front has come 95 % of its way, in sqrt(H/g)."""
+import argparse
+import csv
+import math
+import pathlib
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+GRAVITY, MOST_BROAD, LEAST_SLENDER = 9.81, 2.5, 3.5
+WIDTH = {"0.5": 0.282, "1": 0.198, "2": 0.14, "4": 0.099, "6": 0.081, "8": 0.07}  # m, of the cases of studies/columns.yaml
+
+
+def columns_of(run):
+    """The columns of a run's series by their names."""
+    with open(run / "series.csv") as file:
+        header, *rows = csv.reader(file)
+    return {name.split(" [")[0]: [float(row[k]) if row[k] else math.nan for row in rows] for k, name in enumerate(header)}
+
+
+def look(run, width):
+    """Aspect, run-out and time of arrival of one run."""
+    series = columns_of(run)
+    front, height = series["runout.front"], 2 * series["middle.height"][0]
+    near = width + 0.95 * (front[-1] - width)
+    k = next(k for k, x in enumerate(front) if x >= near)
+    time = series["time"]
+    arrived = time[k - 1] + (time[k] - time[k - 1]) * (near - front[k - 1]) / (front[k] - front[k - 1])
+    return height / width, (front[-1] - width) / width, arrived / math.sqrt(height / GRAVITY)
+
+
+def found(folder):
+    """For each method and seed: aspect, run-out and time of every column."""
+    by = {}
+    with open(folder / "table.csv") as file:
+        for line in csv.DictReader(file):
+            row = {key.split(" [")[0]: value for key, value in line.items()}
+            if row["status"] == "done":
+                seeds = by.setdefault(row["model"] or row["method"], {})
+                seeds.setdefault(row["seed"], []).append(look(folder / "runs" / row["run"], WIDTH[row["aspect"]]))
+    return by
+
+
+def laws(columns):
+    """c, R^2, k, n, the aspect at which both laws meet."""
+    broad = [(a, r) for a, r, _ in columns if a < MOST_BROAD]
+    c = sum(a * r for a, r in broad) / sum(a * a for a, _ in broad)
+    mean = sum(r for _, r in broad) / len(broad)
+    square = 1 - sum((r - c * a) ** 2 for a, r in broad) / sum((r - mean) ** 2 for _, r in broad)
+    slender = [(math.log(a), math.log(r)) for a, r, _ in columns if a > LEAST_SLENDER]
+    am, rm = (sum(one[k] for one in slender) / len(slender) for k in (0, 1))
+    n = sum((a - am) * (r - rm) for a, r in slender) / sum((a - am) ** 2 for a, _ in slender)
+    k = math.exp(rm - n * am)
+    return c, square, k, n, (k / c) ** (1 / (1 - n))
+
+
+def jackknife(values):
+    n = len(values)
+    mean = sum(values) / n
+    return math.sqrt((n - 1) / n * sum((x - mean) ** 2 for x in values))
+
+
+def table(by):
+    rows = ["| method | c | R² | k | n | meet | time |", "|---|---|---|---|---|---|---|"]
+    for method, seeds in sorted(by.items(), key=lambda item: item[0] != "grains"):
+        whole = laws([one for columns in seeds.values() for one in columns])
+        parts = [laws([one for seed, columns in seeds.items() if seed != out for one in columns]) for out in seeds]
+        cells = [f"{value:.3g} ± {jackknife([part[k] for part in parts]):.2g}" if k != 1 else f"{value:.4f}" for k, value in enumerate(whole)]
+        times = [one[2] for columns in seeds.values() for one in columns if one[0] > 0.8]
+        rows.append(f"| {method} | {' | '.join(cells)} | {min(times):.2f} to {max(times):.2f} |")
+    return "\n".join(rows) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/columns")
+    print(table(found(parser.parse_args().sweep)), end="")
+
+
+if __name__ == "__main__":
+    main()
