@@ -303,7 +303,7 @@ static quern_status lost(const gather_work *w, int32_t i) {
 			"point.velocity is not a number after %s: is the step of %.3g s too long?", material, s->dt);
 	if (isnan(volume))
 		return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,
-			"point.volume at (%.4g, %.4g) m grows more than %g times in one step of %.3g s (%s): unstable, or "
+			"point.volume at (%.4g, %.4g) m is not a number, or grows more than %g times in one step of %.3g s (%s): unstable, or "
 			"the step is too long",
 			x, y, most_growth, s->dt, material);
 	if (!(volume > 0 && volume < INFINITY))
