@@ -153,7 +153,7 @@ QUERN_INLINE void kernel(const int dim, const bool rated, const bool relaxed, co
 			const bool slides = flows & (p > 0);
 			const quern_real now = (tau - (slides ? flow : 0)) * per_strain;
 			const dilatancy d = dilate(&law, slides ? p : law.bulk_modulus, rho, now * dt,
-				slides | known ? now * thick / __builtin_sqrt(around) : 0);
+				(slides | known) ? now * thick / __builtin_sqrt(around) : 0);
 			grown = slides ? d.grown : 1;
 			least = known ? d.least : critical;
 			bore = (symmetric_mean(dim, old) < 0) & (rho >= loosest);
