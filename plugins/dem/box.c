@@ -244,10 +244,14 @@ void quern_dem_box_bring_back(const quern_step *s) {
 		for (uint32_t turn = 0; turn < s->dim; turn++) {
 			const uint32_t k = turn == 0 ? 1 : turn == 1 ? 0 : 2; /* across y it is moved along x too */
 			quern_real *x = &u[NEAR_POSITION].real[k][i];
-			const quern_real upper = b.lower[k] + b.length[k],
-							 gone = quern_floor((*x - b.lower[k]) / b.length[k]);
+			const quern_real upper = b.lower[k] + b.length[k];
+			quern_real gone = quern_floor((*x - b.lower[k]) / b.length[k]);
 			*x -= gone * b.length[k];
-			if (*x >= upper || *x < b.lower[k]) *x = b.lower[k];
+			if (*x >= upper) { /* by rounding: then it is the image at the lower face */
+				gone += 1;
+				*x = b.lower[k];
+			}
+			if (*x < b.lower[k]) *x = b.lower[k];
 			if (gone == 0) continue;
 			u[NEAR_BOX_WORK].real[0][0] += take(s, k, i, gone * b.speed[k]);
 			if (k != 1) continue;
