@@ -257,8 +257,11 @@ static quern_real sweep(const forces_shared *sh) {
  * how far from where the list was made, or where ways are those beside a box's own flow, only such ways count. */
 static quern_real used_of_skin(const forces_shared *sh, uint32_t n_blocks, quern_real farthest) {
 	const bool alone = !sh->use[FORCE_WEIGHT].real[0] && !sh->use[FORCE_LENT].real[0] && !sh->boxed;
-	const quern_real swept = sweep(sh),
-					 pair = alone ? fmin(farthest, nearer_by_half(sh, n_blocks)) : farthest;
+	bool wraps =
+		false; /* grains are brought back as a list is made, and nobody shall see them far outside of a periodic domain */
+	for (uint32_t k = 0; k < sh->s->dim; k++) wraps = wraps || sh->s->periodic[k];
+	const quern_real swept = sweep(sh), least = wraps ? 0.25 * farthest : 0,
+					 pair = alone ? fmin(farthest, fmax(least, nearer_by_half(sh, n_blocks))) : farthest;
 	return sh->n_bodies ? fmax(pair, 0.5 * (farthest + swept)) : pair;
 }
 
