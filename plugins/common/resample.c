@@ -142,7 +142,9 @@ static quern_real free_share(const resample *r, uint32_t c, const int32_t cell[3
 		const quern_real low = r->g->lower[k] + cell[k] * r->g->cell, step = way[k] / n;
 		for (uint32_t q = r->begin[c]; q < r->begin[c + 1]; q++) {
 			const quern_real x = r->position->real[k][r->point[q]],
-							 room = step > 0 ? x - low : low + r->g->cell - x;
+							 room =
+								 fmax(0, step > 0 ? x - low
+												  : low + r->g->cell - x); /* by rounding it may be outside */
 			if (fabs(step) * most > room) most = room / fabs(step);
 		}
 	}
