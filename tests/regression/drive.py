@@ -135,7 +135,7 @@ def check_scene(here):
     column = drive(here, "--scene", SOURCE / "configs/column.yaml", "--path", "simple_shear")
     number = column["point.shear_rate"][-1] * 2e-3 * np.sqrt(2500 / column["pressure"][-1])
     assert "point.shear_rate" in column and "stress_zz" not in column
-    assert abs(column["friction"][-1] - (0.219 + (0.897 - 0.219) / (1 + 0.403 / number))) < 1e-6, (column["friction"][-1], number)
+    assert abs(column["friction"][-1] - (0.2183 + (0.813 - 0.2183) / (1 + 0.333 / number))) < 1e-6, (column["friction"][-1], number)
     assert "has no continuum.material" in call(here, "--scene", SOURCE / "configs/two_grains.yaml", "--path", "tension", status=2)
 
 

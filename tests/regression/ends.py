@@ -137,7 +137,7 @@ def left(place):
     except OSError:
         print("no terminal can be had here: what is left of a run was not looked at")
         return
-    words = [word for word in lab.command("column", place / "left", *lab.SMALL["column"], "--set=time.end=400 ms", "--threads=1",
+    words = [word for word in lab.command("column", place / "left", *lab.SMALL["column"], "--set=time.end=300 ms", "--threads=1",
                                           "--set=grains.settle.step=0.002") if word != "--quiet"]
     process, said = subprocess.Popen(words, stderr=slave), b""
     os.close(slave)
