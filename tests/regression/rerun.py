@@ -24,6 +24,7 @@ SHORT = {"bed": LAYER, "chute": TURNED, "strip": TURNED, "shear": LAYER, "silo":
                   "--set=stages.0.for=15 ms", "--set=stages.1.for=20 ms"],
          "heap": lab.sets(time__end="60 ms", output__every="20 ms"), "pile": lab.sets(time__end="60 ms", output__every="20 ms"),
          "packing": lab.sets(), "shear": lab.sets(time__end="20 ms", output__every="10 ms"),
+         "plane_shear": lab.sets(time__end="20 ms", output__every="10 ms"),
          "hopper": lab.sets(
              time__end="60 ms", output__every="20 ms", grains__contact__linear__stiffness="1e5 N/m", grains__settle__energy=1e-2,
              grains__fill__region__box="{lower: [0.02, 0.051], upper: [0.1, 0.08]}", grains__overlap__most=0)}
