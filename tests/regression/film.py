@@ -102,7 +102,7 @@ def interrupted(folder):
     """By a signal, at any moment: status 130, no film, no folder beside it."""
     for number, after in ((signal.SIGINT, 0.7), (signal.SIGTERM, 1.2), (signal.SIGHUP, 0.9)):
         before = sorted(folder.iterdir())
-        at_work = subprocess.Popen([str(QUERN), "film", str(folder), "-o", str(folder / "half.gif"), "--width", "4000"],
+        at_work = subprocess.Popen([str(QUERN), "film", str(folder), "-o", str(folder / "half.gif"), "--width", "8000"],
                                    stderr=subprocess.PIPE, text=True, start_new_session=True)
         time.sleep(after)
         assert at_work.poll() is None, "it was over before"
