@@ -114,6 +114,7 @@ quern_status quern_hybrid_sort(update *d) {
 	d->in_points = take(d, d->n_cells, sizeof(quern_real));
 	d->wall = take(d, d->n_cells, sizeof(quern_real));
 	d->open = take(d, d->n_cells, sizeof(quern_real));
+	d->displaced = take(d, d->n_cells, sizeof(bool));
 	d->zone = take(d, d->n_cells, sizeof(int32_t));
 	d->share = take(d, d->n_cells, sizeof(quern_real));
 	for (uint32_t k = 0; k < s->dim; k++) d->velocity[k] = take(d, d->n_cells, sizeof(quern_real));
@@ -205,7 +206,7 @@ static void spread_grain(const update *d, uint32_t i, quern_real times, quern_re
 }
 
 /* Fixed grains are walls: as densely as they may lie, they leave no room. Where nothing moves between them nothing
- * will. */
+ * will. Those of a rough floor are a part of what grains lack before it, which its displacement counts. */
 void quern_hybrid_fixed(update *d) {
 	const int32_t *fixed = d->u[U_GRAIN_FIXED].index;
 	quern_real *taken = fixed ? take(d, d->n_cells, sizeof(quern_real)) : NULL;
@@ -215,7 +216,7 @@ void quern_hybrid_fixed(update *d) {
 		if (fixed[i]) spread_grain(d, i, d->h->density / d->h->packed, taken);
 	}
 	for (uint32_t c = 0; c < d->n_cells; c++) {
-		if (!(taken[c] > 0)) continue;
+		if (!(taken[c] > 0) || d->displaced[c]) continue;
 		const quern_real left = d->open[c] - taken[c];
 		d->open[c] = left >= 0.25 ? left : d->mass[c] > 0 ? 0.125 : 0;
 	}

@@ -27,6 +27,7 @@ typedef struct update {
 	quern_real *in_grains, *in_points; /* kg by cell, that grains and points carry with their new weights */
 	int32_t *beside;                   /* by cell, down and up each axis: the next one */
 	quern_real *wall, *open;  /* by cell: m from its centre to the nearest body; share that is open */
+	bool *displaced;          /* by cell: whether a body with its surface before it takes some of it */
 	const body_pose *pose;    /* by body */
 	quern_real full, nominal; /* kg: of a full cell, of one point in it */
 	int32_t *zone;            /* by cell: the new one; the old one stands in the field until the end */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* walls - bodies as cells see them: how far the nearest surface is, how much of a cell is open, and what stands
- * between two cells. docs/theory/hybrid.md, section 3 */
+/* walls - bodies as cells see them, with the continuum's surface: how far the nearest one is, how much of a cell is open, and what
+ * stands between two cells. docs/theory/hybrid.md, section 3 */
 #include "update.h"
 #include <math.h>
 #include <string.h>
@@ -10,6 +10,7 @@ enum { N = QUERN_BLOCK_CELLS }; /* cells of a block, and places in a cell */
 typedef struct {
 	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N],
 		least[N];
+	bool displaced[N]; /* whether the nearest body has its surface before it */
 } places;
 
 /* Gap of every place to the nearest body that is meant and there now; infinite where there is none. */
@@ -19,7 +20,7 @@ static void nearest_bodies(const update *d, const bool *meant, places *p) {
 		batch.normal[k] = p->normal[k];
 		batch.velocity[k] = p->velocity[k];
 	}
-	for (uint32_t i = 0; i < N; i++) p->least[i] = INFINITY, p->radius[i] = 0;
+	for (uint32_t i = 0; i < N; i++) p->least[i] = INFINITY, p->displaced[i] = false;
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
 		if (!quern_body_is_there(body, d->s->settling) || (meant && !meant[b])) continue;
@@ -28,23 +29,36 @@ static void nearest_bodies(const update *d, const bool *meant, places *p) {
 			(const quern_real *const[3]) { p->position[0], p->position[1], p->position[2] },
 			(quern_real *const[3]) { p->own[0], p->own[1], p->own[2] });
 		for (uint32_t k = 0; k < d->s->dim; k++) batch.position[k] = p->own[k];
+		const quern_real out = ((const body_item *)body->item)->displacement;
+		for (uint32_t i = 0; i < N; i++) p->radius[i] = out;
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);
-		for (uint32_t i = 0; i < N; i++) p->least[i] = p->gap[i] < p->least[i] ? p->gap[i] : p->least[i];
+		for (uint32_t i = 0; i < N; i++) {
+			if (!(p->gap[i] < p->least[i])) continue;
+			p->least[i] = p->gap[i];
+			p->displaced[i] = out > 0;
+		}
 	}
 }
 
-/* The share of a cell that lies in no body, by 8 x 8 or 4 x 4 x 4 places. */
-static quern_real open_share(const update *d, const int32_t cell[3], places *p) {
+/* The share of a cell that lies in no body, by 8 x 8 or 4 x 4 x 4 places, of which each stands for a cube around it: exact before
+ * a plane across an axis. */
+static quern_real open_share(const update *d, const int32_t cell[3], places *p, bool *displaced) {
 	const uint32_t dim = d->s->dim, side = dim == 2 ? 8 : 4;
-	uint32_t open = 0;
+	const quern_real apart = d->g->cell / side, rounding = 1e-9 * N;
+	quern_real open = 0;
 	for (uint32_t i = 0; i < N; i++) {
 		const uint32_t at[3] = { i % side, i / side % side, i / (side * side) };
 		for (uint32_t k = 0; k < dim; k++)
 			p->position[k][i] = d->g->lower[k] + (cell[k] + (at[k] + 0.5) / side) * d->g->cell;
 	}
 	nearest_bodies(d, NULL, p);
-	for (uint32_t i = 0; i < N; i++) open += p->least[i] >= 0;
-	return (quern_real)open / N;
+	*displaced = false;
+	for (uint32_t i = 0; i < N; i++) {
+		const quern_real part = 0.5 + p->least[i] / apart;
+		open += part >= 1 ? 1 : part > 0 ? part : 0;
+		*displaced = *displaced || (part < 1 && p->displaced[i]);
+	}
+	return open < rounding ? 0 : open > N - rounding ? 1 : open / N;
 }
 
 /* Of the centres of block b's cells. */
@@ -80,12 +94,13 @@ static void open_block(void *arg, uint32_t b, uint32_t worker) {
 	const quern_real reach = 0.5 * sqrt(d->s->dim) * d->g->cell, *gap = w->gap + (size_t)b * N;
 	places *p = d->s->host->scratch(d->s->run, worker, sizeof *p);
 	quern_real *open = d->open + (size_t)b * N;
+	bool *displaced = d->displaced + (size_t)b * N;
 	int32_t cell[3];
 	w->failed[b] = !p;
 	for (uint32_t i = 0; i < N && p; i++) {
 		open[i] = gap[i] > 0 ? 1 : 0;
 		if (fabs(gap[i]) < reach && quern_grid_cell_of(d->g, b * N + i, cell))
-			open[i] = open_share(d, cell, p);
+			open[i] = open_share(d, cell, p, &displaced[i]);
 	}
 }
 
@@ -117,7 +132,8 @@ static quern_real gap_at(const update *d, const bool *meant, const quern_real x[
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
 		quern_real n[3] = { 0 };
 		if (!quern_body_is_there(body, d->s->settling) || (meant && !meant[b])) continue;
-		const quern_real gap = quern_body_gap(body, &d->pose[b], d->s->dim, x, 0, normal ? n : NULL);
+		const quern_real out = ((const body_item *)body->item)->displacement,
+						 gap = quern_body_gap(body, &d->pose[b], d->s->dim, x, out, normal ? n : NULL);
 		if (!(gap < least)) continue;
 		least = gap;
 		if (normal) memcpy(normal, n, sizeof n);

@@ -118,8 +118,9 @@ typedef struct {
 /* Marks the points that lie in a body; returns how many were not marked before. */
 static uint32_t mark_inside(
 	const quern_step *s, const quern_bound *body, const body_pose *pose, uint32_t n, bool *inside) {
-	near_points w = { .radius = { 0 } };
+	near_points w;
 	uint32_t found = 0;
+	for (uint32_t q = 0; q < CHUNK; q++) w.radius[q] = ((const body_item *)body->item)->displacement;
 	for (uint32_t i = 0; i < n; i += CHUNK) {
 		const uint32_t m = n - i < CHUNK ? n - i : CHUNK;
 		quern_body_batch batch = {

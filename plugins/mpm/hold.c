@@ -28,7 +28,9 @@ static bool holds(const quern_bound *body, const quern_step *s) {
 	if (item->boundary == BOUNDARY_NONE && isnan(item->friction)) return false;
 	((const quern_body_ops *)body->ops)->bounds(body->self, s->dim, lower, upper);
 	for (uint32_t k = 0; k < s->dim; k++)
-		if (!s->periodic[k] && (upper[k] <= s->lower[k] || lower[k] >= s->upper[k])) return false;
+		if (!s->periodic[k] &&
+			(upper[k] + item->displacement <= s->lower[k] || lower[k] - item->displacement >= s->upper[k]))
+			return false;
 	return true;
 }
 
@@ -37,7 +39,9 @@ static bool is_far(const hold_work *w, uint32_t j, uint32_t b) {
 	quern_real x[3] = { 0 };
 	quern_grid_corner(w->g, b * QUERN_BLOCK_CELLS, x);
 	for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * w->g->edge * w->g->cell;
-	const quern_real reach = 0.9 * (w->g->edge + 3) * w->g->cell; /* sqrt(3)/2 and a little */
+	const body_item *item = w->s->slot[SLOT_BODIES][j].item;
+	const quern_real reach =
+		0.9 * (w->g->edge + 3) * w->g->cell + item->displacement; /* sqrt(3)/2 and a little */
 	return quern_body_gap(&w->s->slot[SLOT_BODIES][j], &w->pose[j], w->s->dim, x, reach, NULL) > 0;
 }
 
@@ -47,7 +51,7 @@ static void find_gaps(const hold_work *w, uint32_t j, uint32_t begin, uint32_t n
 	quern_body_batch batch = {
 		.n = n, .cap = STENCIL, .dim = w->s->dim, .pose = &w->pose[j].pose, .radius = m->radius, .gap = m->gap
 	};
-	for (uint32_t i = 0; i < STENCIL; i++) m->radius[i] = 0;
+	for (uint32_t i = 0; i < STENCIL; i++) m->radius[i] = ((const body_item *)body->item)->displacement;
 	for (uint32_t k = 0; k < w->s->dim; k++) {
 		for (uint32_t i = 0; i < STENCIL; i++) m->position[k][i] = x[k][begin + (i < n ? i : 0)];
 		batch.normal[k] = m->normal[k];

@@ -6,7 +6,7 @@
 #include <quern/vec.h>
 #include <string.h>
 
-enum { N = QUERN_BLOCK_CELLS, SURFACES = 2 };
+enum { N = QUERN_BLOCK_CELLS, SURFACES = 3 };
 
 typedef struct {
 	const mpm *p;
@@ -23,7 +23,8 @@ typedef struct {
 typedef struct {
 	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
 	quern_real room[SURFACES][N],
-		facing[SURFACES][3][N]; /* what bodies leave of a node, and which way they face */
+		more[SURFACES][N],      /* than a hat's part: what shape functions of this size have before a face */
+		facing[SURFACES][3][N]; /* what faces and bodies leave of a node, and which way they face */
 	uint32_t surfaces[N];
 } near_nodes;
 
@@ -137,7 +138,8 @@ static bool body_is_far(const quern_bound *body, const near_nodes *n, quern_body
 		batch.velocity[k] = one.velocity[k];
 	}
 	/* sqrt(3)/2 and a little, and the cell in which a body takes room */
-	for (uint32_t i = 0; i < QUERN_LANES; i++) one.radius[i] = 0.9 * extent + cell;
+	const quern_real reach = 0.9 * extent + cell + ((const body_item *)body->item)->displacement;
+	for (uint32_t i = 0; i < QUERN_LANES; i++) one.radius[i] = reach;
 	batch.n = 1;
 	batch.cap = QUERN_LANES;
 	batch.radius = one.radius;
@@ -167,16 +169,33 @@ static bool is_face(const grid_work *w, const near_nodes *n, uint32_t b, uint32_
 		   fabs(n->gap[i] - cells_to_face(w->g, at, k) * w->g->cell) < 1e-6 * w->g->cell;
 }
 
+/* The faces of the domain come first among a node's surfaces, so that a body just before one does not take its half again. */
+static void begin_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
+	int32_t at[3];
+	quern_grid_cell_of(w->g, b * N + i, at);
+	for (uint32_t k = 0; k < w->g->dim; k++) {
+		const quern_real share = share_along(w, at, k);
+		if (!(share < 1)) continue;
+		const uint32_t q = n->surfaces[i]++;
+		n->room[q][i] = share;
+		n->more[q][i] = share - (cells_to_face(w->g, at, k) ? 1 : 0.5);
+		for (uint32_t m = 0; m < w->g->dim; m++) n->facing[q][m][i] = 0;
+		n->facing[q][k][i] = at[k] < w->g->cells[k] - at[k] ? 1 : -1;
+	}
+}
+
 /* Surfaces that face the same way are one, of which the nearest counts; two that face each other both take; what stands across multiplies. */
 static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
 	const quern_real alike = 0.7, share = share_before(n->gap[i], w->g->cell);
 	uint32_t q = 0;
 	if (w->again || !(n->gap[i] < w->g->cell) || is_face(w, n, b, i)) return;
+	if (!n->surfaces[i]) begin_room(w, b, i, n);
 	for (; q < n->surfaces[i]; q++) {
 		quern_real along = 0;
 		for (uint32_t k = 0; k < w->g->dim; k++) along += n->facing[q][k][i] * n->normal[k][i];
 		if (fabs(along) < alike) continue;
-		n->room[q][i] = along > 0 ? fmin(n->room[q][i], share) : fmax(0, n->room[q][i] + share - 1);
+		n->room[q][i] =
+			along > 0 ? fmin(n->room[q][i], share + n->more[q][i]) : fmax(0, n->room[q][i] + share - 1);
 		return;
 	}
 	if (q == SURFACES) {
@@ -185,6 +204,7 @@ static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n)
 	}
 	n->surfaces[i] = q + 1;
 	n->room[q][i] = share;
+	n->more[q][i] = 0;
 	for (uint32_t k = 0; k < w->g->dim; k++) n->facing[q][k][i] = n->normal[k][i];
 }
 
@@ -198,6 +218,7 @@ static void measure_densities(const grid_work *w, uint32_t b, const near_nodes *
 		quern_grid_cell_of(w->g, b * N + i, at);
 		for (uint32_t k = 0; k < w->g->dim; k++) faces *= share_along(w, at, k);
 		for (uint32_t q = 0; q < n->surfaces[i]; q++) bodies *= n->room[q][i];
+		if (n->surfaces[i]) bodies /= faces; /* which are among them */
 		const quern_real density = w->node[(size_t)b * N + i][0] / (volume * faces * fmax(bodies, least));
 		w->motion[(size_t)b * N + i][motion_density(w->g->dim)] = bodies > least ? density : -density;
 	}
@@ -214,7 +235,6 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 		quern_real x[3];
 		quern_grid_corner(w->g, b * N + i, x);
 		for (uint32_t k = 0; k < s->dim; k++) n->position[k][i] = x[k];
-		n->radius[i] = 0;
 		n->surfaces[i] = 0;
 	}
 	for (uint32_t j = 0; j < w->n_bodies; j++) {
@@ -226,6 +246,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 		batch.pose = &w->pose[j].pose;
 		if (w->pose[j].repeats) bring_nodes(&w->pose[j], s->dim, n);
 		else if (body_is_far(body, n, batch, w->g->cell, w->g->cell * w->g->edge)) continue;
+		for (uint32_t i = 0; i < N; i++) n->radius[i] = item->displacement;
 		for (uint32_t k = 0; k < s->dim; k++)
 			batch.position[k] = w->pose[j].repeats ? n->own[k] : n->position[k];
 		((const quern_body_ops *)body->ops)->closest(body->self, &batch);

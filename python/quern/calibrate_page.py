@@ -83,6 +83,13 @@ def slip_length(found: Found) -> tuple[float, float]:
     return mean([np.mean([slip_of(rows[k]).length for rows in found.chutes.values()]) / found.grains.diameter for k in range(len(found.beds))])
 
 
+def displacements(found: Found) -> tuple[tuple[float, float], tuple[float, float]]:
+    """In m, of the chutes, mean over the angles, and of the settled beds; with standard errors over seeds."""
+    seeds = range(len(found.beds))
+    return (mean([np.mean([rows[k].displacement for rows in found.chutes.values()]) for k in seeds]),
+            mean([one.displacement for one in found.beds]))
+
+
 def about_walls(found: Found) -> str:
     if found.slides is None:
         return "friction of a smooth wall: not measured"
@@ -119,9 +126,11 @@ def block(found: Found, command: str) -> str:
     rows |= {key: (plain(value, 9), "of these grains") for key, value in given(found).items()}
     low, high = inertia_range(found)
     length, off = slip_length(found)
+    flowing, settled = displacements(found)
     lines = [f"# {command}",
              f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
              f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate",
+             f"# displacement of the rough floor: {with_spread(*flowing)} m in flow, {with_spread(*settled)} m in a settled bed",
              f"# {about_walls(found)}", "continuum:", "  material:", "    mu_i:"]
     return "\n".join(lines + [f"      {key}: {value}".ljust(40) + f"# {note}" for key, (value, note) in rows.items()]) + "\n"
 
@@ -179,13 +188,13 @@ def constants_table(found: Found) -> list[str]:
 
 
 def chutes_table(found: Found) -> list[str]:
-    lines = ["| angle [°] | tau/p | I | density [kg/m³] | slip at the floor [m/s] | shear rate there [1/s] | slip length over d |",
-             "|---|---|---|---|---|---|---|"]
+    lines = ["| angle [°] | tau/p | I | density [kg/m³] | slip at the floor [m/s] | shear rate there [1/s] | slip length over d | displacement over d |",
+             "|---|---|---|---|---|---|---|---|"]
     for angle, rows in sorted(found.chutes.items()):
         slips = [slip_of(one) for one in rows]
         parts = [[float(np.mean(one.friction[one.bulk])) for one in rows], [float(np.mean(one.inertia[one.bulk])) for one in rows],
                  [float(np.mean(one.density[one.bulk])) for one in rows], [one.velocity for one in slips], [one.rate for one in slips],
-                 [one.length / found.grains.diameter for one in slips]]
+                 [one.length / found.grains.diameter for one in slips], [one.displacement / found.grains.diameter for one in rows]]
         lines.append(f"| {angle:g} | " + " | ".join(with_spread(*mean(part)) for part in parts) + " |")
     return lines
 
