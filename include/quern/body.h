@@ -15,7 +15,7 @@ typedef struct quern_pose {
 typedef struct quern_body_batch {
 	uint32_t n, cap, dim, pad;
 	const quern_pose *pose;
-	const quern_real *position[3], *radius; /* of grains; grid nodes come with radius 0 */
+	const quern_real *position[3], *radius; /* of grains; grid nodes come with what they keep from it */
 	const int32_t *feature;  /* which face, edge or vertex, from `features`; NULL: the nearest */
 	quern_real *gap;         /* m, distance to the surface minus radius; negative: overlap or inside */
 	quern_real *normal[3];   /* unit, out of the body */

@@ -33,10 +33,10 @@ static const quern_param rows[] = {
 		"Slip length in grain diameters, in place of slip or sticky: friction that grows with the speed as the "
 		"material's own does with its rate, so that the speed along the body is that over so many diameters inside.",
 		.flags = QUERN_MAYBE, .unless = "boundary.frictional", .min = 0, .max = 1e6),
-	QUERN_PARAM_AS(body_item, displacement, "boundary.displacement", "m",
-		"How far before the body the continuum ends, for grains that lie looser there: what they lack of its "
-		"density, added up from the body on, over that density.",
-		.min = 0),
+	QUERN_PARAM(body_item, displacement, "m",
+		"How far before the body the continuum ends, since grains lie looser there: what they lack of its "
+		"density, added up from the body on, over that density. Less than a cell.",
+		.max = INFINITY),
 	QUERN_PARAM(body_item, name, NULL, "A word that messages call it by, and observers may: its own.",
 		.flags = QUERN_MAYBE),
 	QUERN_PARAM(body_item, material, NULL,

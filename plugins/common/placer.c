@@ -37,6 +37,7 @@ bool quern_placer_bodies(placer *p, const quern_step *s, uint32_t slot, bool nod
 	body_pose *pose = quern_body_poses_now(s, slot);
 	if (!body || !pose) return false;
 	p->n_bodies = 0;
+	p->nodes = nodes;
 	for (uint32_t b = 0; b < s->n_slot[slot]; b++) {
 		const body_item *item = s->slot[slot][b].item;
 		if (!quern_body_is_there(&s->slot[slot][b], s->settling)) continue;
@@ -133,7 +134,9 @@ static bool meets_body(const placer *p, const quern_spot *s) {
 	static const body_pose still = { .pose = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } } };
 	for (uint32_t b = 0; b < p->n_bodies; b++) {
 		const body_pose *pose = p->pose ? &p->pose[b] : &still;
-		if (quern_body_gap(&p->body[b], pose, p->dim, s->x, s->radius, NULL) < -1e-9 * s->radius) return true;
+		const body_item *item = p->nodes ? p->body[b].item : NULL;
+		const quern_real reach = s->radius + (item ? item->displacement : 0);
+		if (quern_body_gap(&p->body[b], pose, p->dim, s->x, reach, NULL) < -1e-9 * s->radius) return true;
 	}
 	return false;
 }

@@ -21,6 +21,7 @@ typedef struct placer {
 	const quern_bound *body; /* bodies that grains must not touch */
 	const body_pose *pose;   /* where each of them is; NULL: where the scene put it */
 	uint32_t n_bodies;
+	bool nodes;  /* bodies are what the continuum's nodes see of them */
 	bool failed; /* memory ran out */
 } placer;
 

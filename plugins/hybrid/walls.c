@@ -40,11 +40,11 @@ static void nearest_bodies(const update *d, const bool *meant, places *p) {
 	}
 }
 
-/* The share of a cell that lies in no body, by 8 x 8 or 4 x 4 x 4 places, of which each stands for a cube around it: exact before
- * a plane across an axis. */
+/* The share of a cell that lies in no body, by 8 x 8 or 4 x 4 x 4 places. Before a displaced surface, a small part of a cell away from the body's own, each
+ * stands for a cube around it, which is exact for a plane across an axis; plates and seams between bodies have no such thing. */
 static quern_real open_share(const update *d, const int32_t cell[3], places *p, bool *displaced) {
 	const uint32_t dim = d->s->dim, side = dim == 2 ? 8 : 4;
-	const quern_real apart = d->g->cell / side, rounding = 1e-9 * N;
+	const quern_real apart = d->g->cell / side, rounding = 1e-9;
 	quern_real open = 0;
 	for (uint32_t i = 0; i < N; i++) {
 		const uint32_t at[3] = { i % side, i / side % side, i / (side * side) };
@@ -54,11 +54,11 @@ static quern_real open_share(const update *d, const int32_t cell[3], places *p, 
 	nearest_bodies(d, NULL, p);
 	*displaced = false;
 	for (uint32_t i = 0; i < N; i++) {
-		const quern_real part = 0.5 + p->least[i] / apart;
+		const quern_real part = p->displaced[i] ? 0.5 + p->least[i] / apart : p->least[i] >= 0;
 		open += part >= 1 ? 1 : part > 0 ? part : 0;
-		*displaced = *displaced || (part < 1 && p->displaced[i]);
+		*displaced = *displaced || (part < 1 - rounding && p->displaced[i]);
 	}
-	return open < rounding ? 0 : open > N - rounding ? 1 : open / N;
+	return open < N * rounding ? 0 : open > N - N * rounding ? 1 : open / N;
 }
 
 /* Of the centres of block b's cells. */

@@ -6,7 +6,7 @@
 #include <quern/vec.h>
 #include <string.h>
 
-enum { N = QUERN_BLOCK_CELLS, SURFACES = 3 };
+enum { N = QUERN_BLOCK_CELLS, SURFACES = 5 };
 
 typedef struct {
 	const mpm *p;
@@ -26,6 +26,7 @@ typedef struct {
 		more[SURFACES][N],      /* than a hat's part: what shape functions of this size have before a face */
 		facing[SURFACES][3][N]; /* what faces and bodies leave of a node, and which way they face */
 	uint32_t surfaces[N];
+	quern_real counted[N]; /* what bodies leave of the hat around the cell above the node */
 } near_nodes;
 
 static int32_t cells_to_face(const quern_grid_view *g, const int32_t at[3], uint32_t k) {
@@ -184,9 +185,12 @@ static void begin_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n
 	}
 }
 
+/* Cosine of the angle within which surfaces face the same way. */
+static const quern_real alike = 0.7;
+
 /* Surfaces that face the same way are one, of which the nearest counts; two that face each other both take; what stands across multiplies. */
 static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
-	const quern_real alike = 0.7, share = share_before(n->gap[i], w->g->cell);
+	const quern_real share = share_before(n->gap[i], w->g->cell);
 	uint32_t q = 0;
 	if (w->again || !(n->gap[i] < w->g->cell) || is_face(w, n, b, i)) return;
 	if (!n->surfaces[i]) begin_room(w, b, i, n);
@@ -208,8 +212,23 @@ static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n)
 	for (uint32_t k = 0; k < w->g->dim; k++) n->facing[q][k][i] = n->normal[k][i];
 }
 
+/* The same of the hat around the centre of the cell above the node, which a face of the domain folds. */
+static void take_count(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
+	const quern_real cell = w->g->cell;
+	const uint32_t k = axis_nearest(n, i, w->g->dim);
+	int32_t at[3];
+	quern_real gap = n->gap[i];
+	for (uint32_t m = 0; m < w->g->dim; m++) gap += 0.5 * cell * n->normal[m][i];
+	if (w->again || !(gap < cell)) return;
+	quern_grid_cell_of(w->g, b * N + i, at);
+	const bool folded = !w->g->periodic[k] && fabs(n->normal[k][i]) > alike &&
+						at[k] == (n->normal[k][i] > 0 ? 0 : w->g->cells[k] - 1);
+	const quern_real share = folded && gap > 0 ? fmin(1, 0.5 + gap / cell) : share_before(gap, cell);
+	n->counted[i] = fmin(n->counted[i], share);
+}
+
 /* A node to which bodies leave hardly any room does not say how full that is; its density is marked by a sign, and its size is that of a node
- * with the least room that says something. */
+ * with the least room that says something. What is counted around a cell's centre becomes that of a whole one. */
 static void measure_densities(const grid_work *w, uint32_t b, const near_nodes *n) {
 	const quern_real least = 0.2, volume = quern_grid_cell_volume(w->g);
 	for (uint32_t i = 0; i < N; i++) {
@@ -220,6 +239,7 @@ static void measure_densities(const grid_work *w, uint32_t b, const near_nodes *
 		for (uint32_t q = 0; q < n->surfaces[i]; q++) bodies *= n->room[q][i];
 		if (n->surfaces[i]) bodies /= faces; /* which are among them */
 		const quern_real density = w->node[(size_t)b * N + i][0] / (volume * faces * fmax(bodies, least));
+		if (w->p->alone) w->node[(size_t)b * N + i][node_held(w->g->dim)] /= fmax(n->counted[i], least);
 		w->motion[(size_t)b * N + i][motion_density(w->g->dim)] = bodies > least ? density : -density;
 	}
 }
@@ -236,6 +256,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 		quern_grid_corner(w->g, b * N + i, x);
 		for (uint32_t k = 0; k < s->dim; k++) n->position[k][i] = x[k];
 		n->surfaces[i] = 0;
+		n->counted[i] = 1;
 	}
 	for (uint32_t j = 0; j < w->n_bodies; j++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][j];
@@ -253,6 +274,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 		for (uint32_t i = 0; i < N; i++) {
 			const quern_real mass = w->node[(size_t)b * N + i][0];
 			if (mass > 0) take_room(w, b, i, n);
+			if (mass > 0 && w->p->alone) take_count(w, b, i, n);
 			if (mass > 0 && n->gap[i] <= 1e-9 * w->g->cell)
 				touch_node(w, j, n, b, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
 		}

@@ -98,9 +98,9 @@ static bool is_cut(const looking *w, const int32_t cell[3]) {
 	for (uint32_t k = 0; k < 3; k++) x[k] = k < s->dim ? g->lower[k] + (cell[k] + 0.5) * g->cell : 0;
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
-		if (quern_body_is_there(body, s->settling) &&
-			((const body_item *)body->item)->boundary != BOUNDARY_NONE &&
-			quern_body_gap(body, &w->pose[b], s->dim, x, 0, NULL) < 0.499 * g->cell)
+		const body_item *item = body->item;
+		if (quern_body_is_there(body, s->settling) && item->boundary != BOUNDARY_NONE &&
+			quern_body_gap(body, &w->pose[b], s->dim, x, item->displacement, NULL) < 0.499 * g->cell)
 			return true;
 	}
 	return false;

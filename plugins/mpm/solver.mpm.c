@@ -288,7 +288,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
-/* A rough body rubs as the material does, which must have a friction for that. */
+/* A rough body rubs as the material does, which must have a friction for that; and none may end the continuum farther before itself than nodes see. */
 static quern_status find_rough(mpm *p, const quern_setup *setup, const quern_bound *material,
 	const quern_bound *body, uint32_t n, quern_err *err) {
 	const quern_material_ops *ops = material->ops;
@@ -302,8 +302,15 @@ static quern_status find_rough(mpm *p, const quern_setup *setup, const quern_bou
 				material->id, quern_body_say(&body[i], i, word));
 		p->rough = true;
 	}
-	for (uint32_t i = 0; i < n; i++)
-		p->still = p->still || !quern_motion_is_any(&((const body_item *)body[i].item)->motion);
+	for (uint32_t i = 0; i < n; i++) {
+		const body_item *item = body[i].item;
+		p->still = p->still || !quern_motion_is_any(&item->motion);
+		if (!(item->displacement < p->cell))
+			return setup->host->fail(err, QUERN_E_PARAM, "bodies",
+				"the continuum would end %.3g m before %s, and cells of %.3g m do not know anything as far as "
+				"that from a body: give a displacement that is less than a cell",
+				item->displacement, quern_body_say(&body[i], i, word), p->cell);
+	}
 	rough_law *law = &p->rubbing;
 	if (p->rough)
 		ops->friction(material->self, setup->dim, &law->slow, &law->fast, &law->number, &law->density);

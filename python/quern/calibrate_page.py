@@ -14,7 +14,7 @@ import yaml
 
 from .chart_data import Curve, Picture
 from .program import call
-from .rheology import Bed, Grains, Law, Looseness, Rows, Slide, law_of, looseness_of, slip_of
+from .rheology import Bed, Grains, Law, Looseness, Rows, Slide, displacement_of, law_of, looseness_of, slip_of
 from .workers import save
 
 AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is told
@@ -86,7 +86,7 @@ def slip_length(found: Found) -> tuple[float, float]:
 def displacements(found: Found) -> tuple[tuple[float, float], tuple[float, float]]:
     """In m, of the chutes, mean over the angles, and of the settled beds; with standard errors over seeds."""
     seeds = range(len(found.beds))
-    return (mean([np.mean([rows[k].displacement for rows in found.chutes.values()]) for k in seeds]),
+    return (mean([np.mean([displacement_of(rows[k], found.bulk_modulus()) for rows in found.chutes.values()]) for k in seeds]),
             mean([one.displacement for one in found.beds]))
 
 
@@ -194,7 +194,7 @@ def chutes_table(found: Found) -> list[str]:
         slips = [slip_of(one) for one in rows]
         parts = [[float(np.mean(one.friction[one.bulk])) for one in rows], [float(np.mean(one.inertia[one.bulk])) for one in rows],
                  [float(np.mean(one.density[one.bulk])) for one in rows], [one.velocity for one in slips], [one.rate for one in slips],
-                 [one.length / found.grains.diameter for one in slips], [one.displacement / found.grains.diameter for one in rows]]
+                 [one.length / found.grains.diameter for one in slips], [displacement_of(one, found.bulk_modulus()) / found.grains.diameter for one in rows]]
         lines.append(f"| {angle:g} | " + " | ".join(with_spread(*mean(part)) for part in parts) + " |")
     return lines
 

@@ -38,7 +38,6 @@ class Rows:
     friction: np.ndarray
     inertia: np.ndarray
     bulk: np.ndarray
-    displacement: float  # m
     haste: float  # mean acceleration over g cos(angle)
 
     @property
@@ -131,16 +130,14 @@ def rows_of(angle: float, y: np.ndarray, times: np.ndarray, density: np.ndarray,
         friction = shear / pressure
     haste = float((mean * gain)[there].sum() / (mean[there].sum() * across))
     bulk = there & bulk_rows(y, mean, grains.diameter)
-    return Rows(angle, y, mean, u, pressure, friction, inertia, bulk, displacement_of(y, mean, bulk), haste)
+    return Rows(angle, y, mean, u, pressure, friction, inertia, bulk, haste)
 
 
-def displacement_of(y: np.ndarray, density: np.ndarray, bulk: np.ndarray) -> float:
-    """What the rows below the bulk lack of its mean density, over that density: how far above the floor a layer would begin that were as dense
-    all the way down."""
-    if not bulk.any():
-        return math.nan
-    below = density[:np.flatnonzero(bulk)[0]]
-    return float((y[1] - y[0]) * (1 - below / density[bulk].mean()).sum())
+def displacement_of(one: Rows, bulk_modulus: float) -> float:
+    """What the rows below the bulk lack of its mean density, both without what pressure compresses, over that density: how far above the floor a
+    layer would begin that were as dense all the way down."""
+    free = one.density * np.exp(-one.pressure / bulk_modulus)
+    return float((one.y[1] - one.y[0]) * (1 - free[:np.flatnonzero(one.bulk)[0]] / free[one.bulk].mean()).sum())
 
 
 def profiles(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -248,4 +245,4 @@ def bed(run: Run, heavier: float, grains: Grains) -> Bed:
     loaded, unloaded = (modulus(rest[inside], way[inside], height, more) for way, more in ((pressed - rest, load), (relieved - pressed, -load)))
     bulk = loaded * bulk_over_constrained(dimension)
     free = settled.density[settled.bulk] * np.exp(-settled.pressure[settled.bulk] / bulk)
-    return Bed(float(settled.density[settled.bulk].mean()), float(free.mean()), loaded, unloaded, bulk, settled.displacement)
+    return Bed(float(settled.density[settled.bulk].mean()), float(free.mean()), loaded, unloaded, bulk, displacement_of(settled, bulk))

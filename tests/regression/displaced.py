@@ -22,13 +22,16 @@ continuum:
 output: {{every: 40 ms, fields: [point.velocity, point.pressure]}}
 """
 FLAT = {"dim": 2, "gravity": "[2, -9.81]", "lower": "[0, 0]", "upper": "[0.1, 0.12]", "from_": "[0, 0.006]", "to": "[0.06, 0.05]"}
-DEEP = {"dim": 3, "gravity": "[0, 0, -9.81]", "lower": "[0, 0, 0]", "upper": "[24 mm, 16 mm, 48 mm]",
-        "from_": "[0, 0, 0.6 mm]", "to": "[24 mm, 16 mm, 24 mm]"}
-CASES = [  # what, the domain, the body before itself, and where it stands with 0.6 mm of displacement
-    ("a floor on the domain's face", dict(FLAT, from_="[0, 0.6 mm]"),
-     "{{plane: {{point: [0, {0}], normal: [0, 1], boundary: {{rough: 5{1}}}}}}}", "0.6 mm", "0"),
-    ("a floor within a cell", FLAT, "{{plane: {{point: [0, {0}], normal: [0, 1], boundary: {{frictional: 0.3{1}}}}}}}", "5.6 mm", "5 mm"),
-    ("a floor in space", DEEP, "{{plane: {{point: [0, 0, {0}], normal: [0, 0, 1], boundary: {{rough: 5{1}}}}}}}", "0.6 mm", "0"),
+DEEP = {"dim": 3, "gravity": "[2, 1, -9.81]", "lower": "[0, 0, 0]", "upper": "[24 mm, 16 mm, 48 mm]", "from_": "[0, 0, 0]", "to": "[24 mm, 16 mm, 24 mm]"}
+OUT = 0.6  # mm
+CASES = [  # what, the domain, the body, its places with and without a displacement, and which points, in mm, must lie where
+    ("a floor on the domain's face", FLAT, "{{plane: {{point: [0, {0} mm], normal: [0, 1], boundary: {{rough: 5}}{1}}}}}", OUT, 0, lambda x: x[:, 1] >= OUT),
+    ("a floor within a cell", FLAT, "{{plane: {{point: [0, {0} mm], normal: [0, 1], boundary: {{frictional: 0.3}}{1}}}}}", 5 + OUT, 5, lambda x: x[:, 1] >= 5 + OUT),
+    ("a floor that rises and is sticky", FLAT, "{{plane: {{point: [0, {0} mm], normal: [0, 1], boundary: sticky, motion: {{velocity: [0, 0.05]}}{1}}}}}", 4 + OUT, 4, None),
+    ("a box", FLAT, "{{box: {{lower: [30 mm, 0], upper: [1, {0} mm], boundary: {{frictional: 0.3}}{1}}}}}", 20 + OUT, 20, None),
+    ("a drum from within", dict(FLAT, from_="[0.03, 0.01]"),
+     "{{cylinder: {{centre: [50 mm, 50 mm], radius: {0} mm, inside: true, boundary: {{frictional: 0.3}}{1}}}}}", 45 - OUT, 45, None),
+    ("a floor in space", DEEP, "{{plane: {{point: [0, 0, {0} mm], normal: [0, 0, 1], boundary: {{rough: 5}}{1}}}}}", 1 + OUT, 1, lambda x: x[:, 2] >= 1 + OUT),
 ]
 HYBRID = """
 quern: 1
@@ -44,7 +47,7 @@ grains:
   fill:
     - {region: {box: {lower: [0, -0.7 mm], upper: [80 mm, -0.7 mm]}}, fixed: true}
     - {region: {box: {lower: [0, 1 mm], upper: [80 mm, 40 mm]}}, settle: true}
-bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 5, displacement: 0.6 mm}}}]
+bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 5}, displacement: 0.6 mm}}]
 continuum: {cell: 4 mm, material: {mu_i: {bulk_modulus: 1e5 Pa, diameter: 2 mm, grain_density: 2500, critical_density: 2000}}}
 hybrid: {oracle: [{fixed: {otherwise: discrete}}], substeps: 30}
 output: {every: 1 ms, fields: [cell.packing_fraction]}
@@ -58,22 +61,24 @@ def last(folder):
 
 
 def check_continuum(place):
-    acts = False
-    for k, (what, keys, body, before, own) in enumerate(CASES):
+    """A box goes out sideways too, which none can that is larger upwards alone: its points beside it are left out."""
+    for k, (what, keys, body, before, own, there) in enumerate(CASES):
         found = []
-        for at, extra in ((before, ""), (own, ", displacement: 0.6 mm"), (own, "")):
+        for at, extra in ((before, ""), (own, f", displacement: {OUT} mm"), (own, "")):
             path = place / f"c{len(found)}_{k}.yaml"
             path.write_text(CONTINUUM.format(body=body.format(at, extra), **keys))
             lab.run(path, place / path.stem)
             found.append(last(place / path.stem))
-        there, displaced, _ = found
-        off = max(numpy.abs(there[name] - displaced[name]).max() / numpy.abs(there[name]).max() for name in there)
-        lowest = [one["position"][:, keys["dim"] - 1].min() for one in found]
-        print(f"{what}: {len(there['position'])} points, apart by {off:.1e}; lowest at {lowest[1] * 1e3:.3f} mm, without it {lowest[2] * 1e3:.3f}")
+        ahead, displaced, plain = found
+        if what == "a box":
+            assert len(ahead["position"]) - len(displaced["position"]) in range(20), what
+            continue
+        off = max(numpy.abs(ahead[name] - displaced[name]).max() / numpy.abs(ahead[name]).max() for name in ahead)
+        n, without = len(ahead["position"]), len(plain["position"])
+        print(f"{what}: {n} points, without displacement {without}; before itself and displaced they are apart by {off:.1e}")
         assert off < 1e-9, (what, off)
-        assert lowest[1] >= float(before.split()[0]) / 1e3 - 1e-12, (what, lowest)
-        acts = acts or lowest[2] < lowest[1] - 1e-4
-    assert acts
+        assert n < without or numpy.abs(plain["position"] - displaced["position"]).max() > 1e-5, what
+        assert there is None or there(1e3 * displaced["position"] + 1e-9).all(), what
 
 
 FLOW = """
@@ -82,7 +87,7 @@ dimension: 2
 gravity: [3.36, -9.22]
 domain: {lower: [0, 0], upper: [40 mm, 80 mm], periodic: [true, false]}
 time: {end: 0.4 s}
-bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 7, displacement: 0.6 mm}}}]
+bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 7}, displacement: 0.6 mm}}]
 continuum:
   cell: 4 mm
   material: {mu_i: {bulk_modulus: 1e5 Pa, diameter: 2 mm, grain_density: 2500, critical_density: 2000}}
@@ -101,8 +106,8 @@ def check_room(place):
     rows = [(y >= k * 4e-3) & (y < (k + 1) * 4e-3) for k in range(4)]
     bears = [pressure[row].mean() / (60.6e-3 - y[row].mean()) for row in rows]
     print(f"a layer that flows: {rows[0].sum()} points in the lowest cells, pressure over depth {bears[0] / numpy.mean(bears[1:]):.3f} of that above")
-    # what is cut off a cell bears its part through the others' nodes: up to 4/3.4 of the pressure above
-    assert rows[0].sum() == 40 and 0.97 < bears[0] / numpy.mean(bears[1:]) < 1.2
+    # what is cut off a cell bears its part through the others' nodes: about 4/3.4 of the pressure above, and points on either side
+    assert rows[0].sum() == 40 and 0.97 < bears[0] / numpy.mean(bears[1:]) < 1.25
 
 
 def check_hybrid(place):
@@ -110,7 +115,7 @@ def check_hybrid(place):
     (place / "hybrid.yaml").write_text(HYBRID)
     fractions = []
     for name, displacement in (("plain", "0"), ("hybrid", "0.6 mm")):
-        lab.run(place / "hybrid.yaml", place / name, f"--set=bodies.0.plane.boundary.displacement={displacement}")
+        lab.run(place / "hybrid.yaml", place / name, f"--set=bodies.0.plane.displacement={displacement}")
         with h5py.File(lab.frames(place / name)[-1]) as frame:
             low = frame["cells/position"][:, 1] < 4e-3
             fractions.append(frame["cells/packing_fraction"][()][low].mean())
