@@ -16,7 +16,7 @@ from . import calibrate_page, rheology, sweep
 from .points import Job, jobs_of
 from .program import QuernError, call, sentence_of, set_options, spelt
 from .reader import StudyError
-from .rheology import Grains, Rows, Slide
+from .rheology import Grains, Rows, Shear, Slide
 from .runs import Run, open as open_run, read_scene
 from .study import Axis, Study, Value
 from .workers import recorded, save
@@ -30,6 +30,8 @@ FIRST = {2: (15.0, 19.0, 23.0), 3: (20.0, 22.0, 24.0)}  # degrees
 LEANING, SLIDE = ((10.0, 13.0), (16.0, 20.0), (25.0, 30.0), (36.0, 42.0)), 80  # degrees of a smooth plane, two at a time; length over sqrt(d/g)
 GENTLEST, STEEPEST, NEAREST = 3.0, 45.0, 0.8  # degrees, of chutes that are tried, and between two of them
 WANTED = 3  # angles
+SIDE = {2: 30, 3: 12}  # of the box that shears, in diameters
+SHEARED, STRAIN, FIRST_STRAIN = (0.003, 0.01, 0.03, 0.1, 0.3), 3.0, 1.0  # inertial numbers; strain, and from where on it is measured
 KEPT = ("material", "contact", "skin", "overlap", "settle", "neighbours", "integrator", "settling")  # of the section grains
 
 
@@ -48,6 +50,8 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--set", metavar="PATH=VALUE", action="append", default=[], help="a key of the scene; may stand several times")
     parser.add_argument("-o", "--output", metavar="DIR", help="where runs and results go; default: out/calibrate_NAME, NAME being the scene's")
     parser.add_argument("--angles", metavar="A,B,C", help="of the chutes, in degrees; default: found by trying")
+    parser.add_argument("--law", choices=("shear", "chutes"), default="shear",
+                        help="where friction in the block comes from: plane shear of up to three times the height, or chutes that flow for long; default: shear")
     parser.add_argument("--seeds", type=int, metavar="N", default=3, help="runs of each kind, with seeds 1 to N; default: 3")
     parser.add_argument("--jobs", type=int, metavar="N", help="runs at a time; default: one for each core")
     parser.add_argument("--size", type=float, metavar="X", default=1.0, help="width, depth and time of the layers, over the usual ones; default: 1")
@@ -165,6 +169,18 @@ def leaning(given: Given, size: float, angle: float) -> Value:
                                                  f"stages={spelt([{'set': {'gravity': turned(given, angle)}}])}"))
 
 
+def box_of(given: Given, size: float, inertia: float) -> Value:
+    """The same grains in a box without walls that shears, under the pressure in the middle of the layer."""
+    n, d = given.dimension, given.of.diameter
+    side, pressure = SIDE[n] * size * d, 0.35 * given.of.density * given.of.gravity * DEPTH[n] * size * d
+    rate = inertia / d * math.sqrt(pressure / given.of.density)
+    domain = {"lower": [0.0] * n, "upper": [side] * n, "periodic": [True] * n}
+    fill = [{"region": {"box": {"lower": [0.0] * n, "upper": [side] * n}}}]
+    return Value(f"shear at {inertia:g}", (
+        f"gravity={spelt([0.0] * n)}", f"domain={spelt(domain)}", "bodies=[]", f"grains.fill={spelt(fill)}", f"time.end={STRAIN / rate!r}",
+        f"grains.box={spelt({'shear': rate, 'pressure': pressure, 'along': 'y'})}", f"output.every={STRAIN / rate / 300!r}", "observe=[stress, box]"))
+
+
 # ---- runs ----
 
 @dataclass
@@ -191,6 +207,19 @@ class Work:
     def chute(self, angle: float, seed: int) -> Rows | str:
         run = self.runs[case_of(self.given, angle).label, seed]
         return run if isinstance(run, str) else rheology.chute(run, math.radians(angle), LAST, self.given.of)
+
+
+def find_sheared(work: Work, seeds: list[int]) -> list[list[Shear]]:
+    """For each seed one of each inertial number; none at all where a run failed."""
+    cases = [box_of(work.given, work.options.size, inertia) for inertia in SHEARED]
+    work.make(cases, seeds)
+    for case in cases:
+        for seed in seeds:
+            if isinstance(said := work.runs[case.label, seed], str):
+                print(f"quern calibrate: warning: plane shear is left out, and the law is that of the chutes: {case.label}, seed {seed}: {said}", file=sys.stderr)
+                return []
+    return [[rheology.sheared(work.runs[case.label, seed], inertia, FIRST_STRAIN / STRAIN, work.given.of) for case, inertia in zip(cases, SHEARED)]
+            for seed in seeds]
 
 
 def find_slides(work: Work, seeds: list[int]) -> list[Slide] | None:
@@ -280,7 +309,8 @@ def measure(work: Work) -> calibrate_page.Found:
         print(f"quern calibrate: warning: the flow at {angle:g} degrees is left out: {words}", file=sys.stderr)
     if len(moving) < WANTED:
         raise QuernError(f"{len(moving)} of the chutes flow steadily with every seed, and mu(I) takes {WANTED}; give others by --angles", 3)
-    return calibrate_page.Found(given.name, given.dimension, given.of, beds, {angle: chutes[angle] for angle in moving}, find_slides(work, seeds))
+    return calibrate_page.Found(given.name, given.dimension, given.of, beds, {angle: chutes[angle] for angle in moving}, find_slides(work, seeds),
+                                find_sheared(work, seeds), work.options.law == "shear")
 
 
 def float_of(case: str) -> float | None:

@@ -14,7 +14,7 @@ import yaml
 
 from .chart_data import Curve, Picture
 from .program import call
-from .rheology import Bed, Grains, Law, Looseness, Rows, Slide, displacement_of, law_of, looseness_of, slip_of
+from .rheology import Bed, Grains, Law, Looseness, Rows, Shear, Slide, displacement_of, fit_law, law_of, looseness_of, slip_of
 from .workers import save
 
 AT = (0.01, 0.03, 0.1, 0.3)  # inertial numbers at which the law's spread is told
@@ -29,14 +29,31 @@ class Found:
     beds: list[Bed]
     chutes: dict[float, list[Rows]]  # by angle in degrees
     slides: list[Slide] | None
+    sheared: list[list[Shear]]  # by seed
+    by_shear: bool  # whether the law is that of plane shear
+
+    def sides(self) -> dict[str, tuple[Law, list[Law]]]:
+        """The law of each kind of flow, and what it is without one of the seeds each. That of the block comes first."""
+        kinds = {"chutes": self.law_without} | ({"plane shear": self.shear_without} if self.sheared else {})
+        order = sorted(kinds, key=lambda kind: (kind == "plane shear") != self.by_shear)
+        n = len(self.beds)
+        return {kind: (kinds[kind](None), [kinds[kind](out) for out in range(n)] if n > 1 else []) for kind in order}
+
+    def law_without(self, out: int | None) -> Law:
+        return law_of([one for rows in self.chutes.values() for k, one in enumerate(rows) if k != out])
+
+    def shear_without(self, out: int | None) -> Law:
+        points = [one for k, seed in enumerate(self.sheared) if k != out for one in seed]
+        return fit_law(np.array([one.inertia for one in points]), np.array([one.friction for one in points]))
+
+    def kind(self) -> str:
+        return next(iter(self.sides()))
 
     def law(self) -> Law:
-        return law_of([one for rows in self.chutes.values() for one in rows])
+        return self.sides()[self.kind()][0]
 
     def laws(self) -> list[Law]:
-        """Without one of the seeds each."""
-        n = len(self.beds)
-        return [law_of([rows[k] for rows in self.chutes.values() for k in range(n) if k != out]) for out in range(n)] if n > 1 else []
+        return self.sides()[self.kind()][1]
 
     def bulk_modulus(self) -> float:
         return float(np.mean([one.bulk_modulus for one in self.beds]))
@@ -127,9 +144,10 @@ def block(found: Found, command: str) -> str:
     low, high = inertia_range(found)
     length, off = slip_length(found)
     flowing, settled = displacements(found)
+    others = [f"# friction of {kind}: {told_law(*laws)}" for kind, laws in found.sides().items()]
     lines = [f"# {command}",
              f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
-             f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate",
+             *others, f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate",
              f"# displacement of the rough floor: {with_spread(*flowing)} m in flow, {with_spread(*settled)} m in a settled bed",
              f"# {about_walls(found)}", "continuum:", "  material:", "    mu_i:"]
     return "\n".join(lines + [f"      {key}: {value}".ljust(40) + f"# {note}" for key, (value, note) in rows.items()]) + "\n"
@@ -177,7 +195,11 @@ def pictures(found: Found) -> list[Picture]:
         there = np.all([one.density > 0.5 * np.median(one.density[one.bulk]) for one in rows], axis=0)
         speed.append(Curve(f"{angle:g}°", np.mean([one.velocity[there] for one in rows], axis=0), rows[0].y[there] / d))
     x = np.linspace(0, inertia_range(found)[1] * 1.1, 100)
-    flow.append(Curve("the law", x, found.law()(x), reference=True))
+    for kind, (law, _) in found.sides().items():
+        flow.append(Curve(f"the law of {kind}", x, law(x), reference=kind == found.kind()))
+    if found.sheared:
+        each = np.array([[(one.inertia, one.friction) for one in seed] for seed in found.sheared]).mean(axis=0)
+        flow.append(Curve("plane shear", each[:, 0], each[:, 1]))
     return [Picture("mu", "scalar", "Friction over the inertial number", ("I", ""), ("tau/p", ""), flow),
             Picture("velocity", "scalar", "Velocity in the chutes", ("velocity", "m/s"), ("height over d", ""), speed)]
 
@@ -199,13 +221,16 @@ def chutes_table(found: Found) -> list[str]:
     return lines
 
 
+def told_law(law: Law, laws: list[Law]) -> str:
+    return ", ".join(f"{with_spread(float(law(x)), left_out([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT)
+
+
 def about_law(found: Found) -> list[str]:
     low, high = inertia_range(found)
-    law, laws = found.law(), found.laws()
-    told = [f"{with_spread(float(law(x)), left_out([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT if low / 2 < x < 2 * high]
-    said = [f"The law is measured for I from {plain(low, 2)} to {plain(high, 2)}. There it says {', '.join(told)}. The three numbers of the law "
-            "scatter more than the law does, since one can stand in for another; take them together."]
-    if law.i_0 > high * 5:
+    said = [f"The law is that of {found.kind()}. " + "; ".join(f"{kind} say {told_law(*laws)}" for kind, laws in found.sides().items()) +
+            f". Chutes have I from {plain(low, 2)} to {plain(high, 2)}. The three numbers of a law scatter more than the law does, since one can stand in for "
+            "another; take them together."]
+    if found.kind() == "chutes" and found.law().i_0 > high * 5:
         said.append("The flows hardly show that friction comes to an end: mu_2 and I_0 stand for a straight line, "
                     "and say nothing of faster flows.")
     return said
@@ -239,6 +264,7 @@ def page(found: Found, command: str, drawn: list[str]) -> str:
 def command_of(options: argparse.Namespace) -> str:
     words = ["quern", "calibrate", options.scene, *(word for one in options.set for word in ("--set", one))]
     words += ["--angles", ",".join(f"{angle:g}" for angle in options.angles)] * bool(options.angles)
+    words += ["--law", options.law] * (options.law != "shear")
     words += ["--seeds", str(options.seeds)] * (options.seeds != 3) + ["--size", f"{options.size:g}"] * (options.size != 1)
     return shlex.join(words)
 

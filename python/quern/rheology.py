@@ -48,6 +48,14 @@ class Rows:
 
 
 @dataclass(frozen=True)
+class Shear:
+    """Of a periodic box that shears under a pressure, means over the strain that is measured."""
+    inertia: float
+    friction: float
+    density: float
+
+
+@dataclass(frozen=True)
 class Law:
     """mu_s + (mu_2 - mu_s)/(1 + I_0/I)."""
     mu_s: float
@@ -187,6 +195,13 @@ def fit_law(inertia: np.ndarray, friction: np.ndarray) -> Law:
         best = min(range(len(grid)), key=lambda k: line(grid[k])[0])
         low, high = grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)]
     return line((low + high) / 2)[1]
+
+
+def sheared(run: Run, inertia: float, first: float, grains: Grains) -> Shear:
+    """From this share of its time on, which its strain grows with."""
+    series = run.series
+    late = series["time"] > first * series["time"][-1]
+    return Shear(inertia, float(series["stress.friction"][late].mean()), float(grains.density * series["box.packing"][late].mean()))
 
 
 def law_of(chutes: list[Rows]) -> Law:

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""law - laws of run-out through the columns of studies/columns.yaml.
+"""law - laws of run-out through the columns of studies/columns.yaml, or of studies/collapse.yaml.
 
     studies/columns/law.py [--sweep out/columns]
+    studies/columns/law.py --sweep out/collapse     and how the run-out converges with the cell
 
 The aspect is a = H/L with the width L of the column before the gate goes and H twice the height below
 which half of its mass lies; the run-out is r = (front - L)/L at the end. Broad columns: r = c a through a <= 2, with R^2 of that line. Slender ones:
@@ -43,9 +44,14 @@ def found(folder):
         for line in csv.DictReader(file):
             row = {key.split(" [")[0]: value for key, value in line.items()}
             if row["status"] == "done":
-                seeds = by.setdefault(row["model"] or row["method"], {})
-                seeds.setdefault(row["seed"], []).append(look(folder / "runs" / row["run"], WIDTH[row["aspect"]]))
+                seeds = by.setdefault(name_of(row), {})
+                seeds.setdefault(row["seed"], []).append(look(folder / "runs" / row["run"], WIDTH[f"{float(row['aspect']):g}"]))
     return by
+
+
+def name_of(row):
+    """Of the method of a run: all axes but the aspect, or that of the reference."""
+    return row["model"] if row.get("model") else ", ".join(row[axis] for axis in ("method", "material", "cell") if row.get(axis))
 
 
 def laws(columns):
@@ -78,10 +84,25 @@ def table(by):
     return "\n".join(rows) + "\n"
 
 
+def convergence(by):
+    """Run-outs of each aspect in cells of 8, 4 and 2 mm, and the order in which the last two are nearer than the first two."""
+    rows = ["| material | aspect | 8 mm | 4 mm | 2 mm | order |", "|---|---|---|---|---|---|"]
+    for material in sorted({name.rpartition(", ")[0] for name in by}):
+        sizes = [[one for columns in by[f"{material}, {cell} mm"].values() for one in sorted(columns)] for cell in (8, 4, 2)]
+        for aspect, *three in zip(sorted(WIDTH, key=float), *sizes):
+            coarse, middle, fine = (one[1] for one in three)
+            order = f"{math.log2(abs((coarse - middle) / (middle - fine))):.1f}"
+            rows.append(f"| {material} | {aspect} | {coarse:.3f} | {middle:.3f} | {fine:.3f} | {order} |")
+    return "\n".join(rows) + "\n"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/columns")
-    print(table(found(parser.parse_args().sweep)), end="")
+    by = found(parser.parse_args().sweep)
+    print(table(by), end="")
+    if all(" mm" in name for name in by):
+        print(f"\n{convergence(by)}", end="")
 
 
 if __name__ == "__main__":

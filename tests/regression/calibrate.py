@@ -67,6 +67,8 @@ def check_fit():
     loose = [replace(one, density=np.where(one.density > 0, 2040 * (1 - 0.4 * one.inertia) * np.exp(one.pressure / 1e5), 0)) for one in chutes]
     slow = rheology.looseness_of(loose, 1e5)
     assert abs(slow.density / 2040 - 1) < 1e-9 and abs(slow.dilation / 0.4 - 1) < 1e-9, slow
+    looser = replace(loose[0], density=loose[0].density * np.where(np.arange(36) < 2, 0.9, 1))
+    assert abs(rheology.displacement_of(looser, 1e5) / (0.2 * SAND.diameter) - 1) < 0.02 and abs(rheology.displacement_of(loose[0], 1e5)) < 0.02 * SAND.diameter
     y = np.linspace(0, 0.04, 50)
     assert abs(rheology.modulus(y, -3000 / 1e5 * (0.05 * y - y ** 2 / 2), 0.05, 3000) / 1e5 - 1) < 1e-12
     print("ok  flows that are not steady are told, a straight law is a straight law, a modulus is found again")
@@ -123,7 +125,7 @@ def check_command(here):
     """A layer that is smaller by a fifth, one seed: its numbers are rough, but they are those of sand. (Of half the depth, chutes of some seeds are not steady.)"""
     words = [lab.scene("column"), *SOFT, "-o", here / "sand", "--size", "0.8", "--seeds", "1", "--angles", "15,18,21"]
     said = command(*words)
-    assert 5 <= said.count("] done: ") <= 12, said  # a bed, three chutes, and planes
+    assert 10 <= said.count("] done: ") <= 17, said  # a bed, three chutes, planes, and five boxes
     options = dict(line.split("=")[1:] for line in (here / "sand/options.txt").read_text().splitlines())
     value = {key.rsplit(".", 1)[1]: float(text) for key, text in options.items()}
     print("    " + ", ".join(f"{key} {text:g}" for key, text in value.items()))
@@ -139,8 +141,15 @@ def check_command(here):
         assert abs(float(row["friction"]) - math.tan(math.radians(float(row["angle [degree]"])))) < 0.03, row
     page = (here / "sand/calibration.md").read_text()
     assert "critical_density" in page and "smooth walls" in page and "nan" not in page, page
-    again = command(*words)
+    block = (here / "sand/calibration.yaml").read_text()
+    laws = {kind: [float(x) for x in re.findall(r"([0-9.]+) at I", line)] for kind, line in re.findall(r"# friction of ([a-z ]+): (.*)", block)}
+    print("    friction at I = 0.01, 0.03, 0.1, 0.3: " + "; ".join(f"{kind} {one}" for kind, one in laws.items()))
+    assert list(laws) == ["plane shear", "chutes"] and abs(law(0.1) / laws["plane shear"][2] - 1) < 0.01, laws
+    assert all(0.2 < one[0] < one[1] < one[2] < one[3] < 0.7 for one in laws.values()), laws
+    again = command(*words, "--law", "chutes")
     assert "] done: " not in again, again
+    assert re.findall(r"# friction of ([a-z ]+): ", again) == ["chutes", "plane shear"], again
+    command(*words)
     print("ok  a small layer is measured, and not made again")
     block = (here / "sand/calibration.yaml").read_text()
     scene = "quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [0.08, 0.08]}\ntime: {end: 1 ms}\n" \
