@@ -51,7 +51,9 @@ def found(folder):
 
 def name_of(row):
     """Of the method of a run: all axes but the aspect, or that of the reference."""
-    return row["model"] if row.get("model") else ", ".join(row[axis] for axis in ("method", "material", "cell") if row.get(axis))
+    if row.get("model"):
+        return row["model"]
+    return ", ".join(f"{float(row[axis]):g} mm" if axis == "cell" else row[axis] for axis in ("method", "material", "cell") if row.get(axis))
 
 
 def laws(columns):
@@ -77,8 +79,8 @@ def table(by):
     rows = ["| method | c | R² | k | n | meet | time |", "|---|---|---|---|---|---|---|"]
     for method, seeds in sorted(by.items(), key=lambda item: item[0] != "grains"):
         whole = laws([one for columns in seeds.values() for one in columns])
-        parts = [laws([one for seed, columns in seeds.items() if seed != out for one in columns]) for out in seeds]
-        cells = [f"{value:.3g} ± {jackknife([part[k] for part in parts]):.2g}" if k != 1 else f"{value:.4f}" for k, value in enumerate(whole)]
+        parts = [laws([one for seed, columns in seeds.items() if seed != out for one in columns]) for out in seeds if len(seeds) > 1]
+        cells = [f"{value:.3g}" + (f" ± {jackknife([part[k] for part in parts]):.2g}" if parts else "") if k != 1 else f"{value:.4f}" for k, value in enumerate(whole)]
         times = [one[2] for columns in seeds.values() for one in columns if one[0] > 0.8]
         rows.append(f"| {method} | {' | '.join(cells)} | {min(times):.2f} to {max(times):.2f} |")
     return "\n".join(rows) + "\n"
