@@ -212,7 +212,8 @@ static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n)
 	for (uint32_t k = 0; k < w->g->dim; k++) n->facing[q][k][i] = n->normal[k][i];
 }
 
-/* The same of the hat around the centre of the cell above the node, which a face of the domain folds. */
+/* The same of the hat around the centre of the cell above the node, at a face of the domain, which folds it. Before bodies elsewhere nodes are silent, and
+ * nobody asks. */
 static void take_count(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
 	const quern_real cell = w->g->cell;
 	const uint32_t k = axis_nearest(n, i, w->g->dim);
@@ -223,8 +224,7 @@ static void take_count(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n
 	quern_grid_cell_of(w->g, b * N + i, at);
 	const bool folded = !w->g->periodic[k] && fabs(n->normal[k][i]) > alike &&
 						at[k] == (n->normal[k][i] > 0 ? 0 : w->g->cells[k] - 1);
-	const quern_real share = folded && gap > 0 ? fmin(1, 0.5 + gap / cell) : share_before(gap, cell);
-	n->counted[i] = fmin(n->counted[i], share);
+	if (folded) n->counted[i] *= gap > 0 ? fmin(1, 0.5 + gap / cell) : share_before(gap, cell);
 }
 
 /* A node to which bodies leave hardly any room does not say how full that is; its density is marked by a sign, and its size is that of a node

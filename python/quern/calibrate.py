@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """quern calibrate - constants of the continuum from the grains that a scene has: docs/calibration.md.
 
-The grains of the scene, nothing else of it, are settled on a floor, pressed, sent down chutes and let slide on a plane. The runs are those of a study: what was
+The grains of the scene, nothing else of it, are settled on a floor, pressed, sent down chutes, let slide on a plane and sheared in a box. The runs are those of a study: what was
 made before is not made again, and a command that was killed goes on."""
 import argparse
 import json
@@ -169,11 +169,17 @@ def leaning(given: Given, size: float, angle: float) -> Value:
                                                  f"stages={spelt([{'set': {'gravity': turned(given, angle)}}])}"))
 
 
+def shear_of(given: Given, size: float, inertia: float) -> tuple[float, float]:
+    """Pressure, about that in the middle of the layer, and rate of shear."""
+    n, d = given.dimension, given.of.diameter
+    pressure = (0.4 if n == 2 else 0.3) * given.of.density * given.of.gravity * DEPTH[n] * size * d
+    return pressure, inertia / d * math.sqrt(pressure / given.of.density)
+
+
 def box_of(given: Given, size: float, inertia: float) -> Value:
     """The same grains in a box without walls that shears, under the pressure in the middle of the layer."""
-    n, d = given.dimension, given.of.diameter
-    side, pressure = SIDE[n] * size * d, 0.35 * given.of.density * given.of.gravity * DEPTH[n] * size * d
-    rate = inertia / d * math.sqrt(pressure / given.of.density)
+    n, side = given.dimension, SIDE[given.dimension] * size * given.of.diameter
+    pressure, rate = shear_of(given, size, inertia)
     domain = {"lower": [0.0] * n, "upper": [side] * n, "periodic": [True] * n}
     fill = [{"region": {"box": {"lower": [0.0] * n, "upper": [side] * n}}}]
     return Value(f"shear at {inertia:g}", (
@@ -210,15 +216,19 @@ class Work:
 
 
 def find_sheared(work: Work, seeds: list[int]) -> list[list[Shear]]:
-    """For each seed one of each inertial number; none at all where a run failed."""
-    cases = [box_of(work.given, work.options.size, inertia) for inertia in SHEARED]
-    work.make(cases, seeds)
-    for case in cases:
-        for seed in seeds:
-            if isinstance(said := work.runs[case.label, seed], str):
-                print(f"quern calibrate: warning: plane shear is left out, and the law is that of the chutes: {case.label}, seed {seed}: {said}", file=sys.stderr)
-                return []
-    return [[rheology.sheared(work.runs[case.label, seed], inertia, FIRST_STRAIN / STRAIN, work.given.of) for case, inertia in zip(cases, SHEARED)]
+    """For each seed one of each inertial number with which every seed has come to its end; none at all where these are too few."""
+    given, size = work.given, work.options.size
+    cases = {inertia: box_of(given, size, inertia).label for inertia in SHEARED}
+    work.make([box_of(given, size, inertia) for inertia in SHEARED], seeds)
+    for inertia, case in list(cases.items()):
+        said = [run for seed in seeds if isinstance(run := work.runs[case, seed], str)]
+        if said:
+            print(f"quern calibrate: warning: {case} is left out: {said[0]}", file=sys.stderr)
+            del cases[inertia]
+    if len(cases) < WANTED:
+        print("quern calibrate: warning: too few boxes that shear are left, and the law is that of the chutes", file=sys.stderr)
+        return []
+    return [[rheology.sheared(work.runs[case, seed], shear_of(given, size, inertia)[1], FIRST_STRAIN / STRAIN, given.of) for inertia, case in cases.items()]
             for seed in seeds]
 
 

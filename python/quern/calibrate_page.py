@@ -144,7 +144,7 @@ def block(found: Found, command: str) -> str:
     low, high = inertia_range(found)
     length, off = slip_length(found)
     flowing, settled = displacements(found)
-    others = [f"# friction of {kind}: {told_law(*laws)}" for kind, laws in found.sides().items()]
+    others = [f"# friction of {kind}: {told_law(found, kind)}" for kind in found.sides()]
     lines = [f"# {command}",
              f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
              *others, f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate",
@@ -194,7 +194,7 @@ def pictures(found: Found) -> list[Picture]:
         flow.append(Curve(f"{angle:g}°", x[order], y[order]))
         there = np.all([one.density > 0.5 * np.median(one.density[one.bulk]) for one in rows], axis=0)
         speed.append(Curve(f"{angle:g}°", np.mean([one.velocity[there] for one in rows], axis=0), rows[0].y[there] / d))
-    x = np.linspace(0, inertia_range(found)[1] * 1.1, 100)
+    x = np.linspace(0, max(measured(found, kind)[1] for kind in found.sides()) * 1.1, 100)
     for kind, (law, _) in found.sides().items():
         flow.append(Curve(f"the law of {kind}", x, law(x), reference=kind == found.kind()))
     if found.sheared:
@@ -221,16 +221,25 @@ def chutes_table(found: Found) -> list[str]:
     return lines
 
 
-def told_law(law: Law, laws: list[Law]) -> str:
-    return ", ".join(f"{with_spread(float(law(x)), left_out([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT)
+def measured(found: Found, kind: str) -> tuple[float, float]:
+    """Smallest and largest inertial number of that kind of flow."""
+    if kind == "chutes":
+        return inertia_range(found)
+    every = [one.inertia for seed in found.sheared for one in seed]
+    return min(every), max(every)
+
+
+def told_law(found: Found, kind: str) -> str:
+    law, laws = found.sides()[kind]
+    low, high = measured(found, kind)
+    return ", ".join(f"{with_spread(float(law(x)), left_out([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT if low / 2 < x < 2 * high)
 
 
 def about_law(found: Found) -> list[str]:
-    low, high = inertia_range(found)
-    said = [f"The law is that of {found.kind()}. " + "; ".join(f"{kind} say {told_law(*laws)}" for kind, laws in found.sides().items()) +
-            f". Chutes have I from {plain(low, 2)} to {plain(high, 2)}. The three numbers of a law scatter more than the law does, since one can stand in for "
+    high = measured(found, found.kind())[1]
+    said = [f"The law is that of {found.kind()}. " + "; ".join(f"{kind} say {told_law(found, kind)}" for kind in found.sides()) + ". The three numbers of a law scatter more than the law does, since one can stand in for "
             "another; take them together."]
-    if found.kind() == "chutes" and found.law().i_0 > high * 5:
+    if found.law().i_0 > high * 5:
         said.append("The flows hardly show that friction comes to an end: mu_2 and I_0 stand for a straight line, "
                     "and say nothing of faster flows.")
     return said

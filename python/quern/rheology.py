@@ -197,11 +197,16 @@ def fit_law(inertia: np.ndarray, friction: np.ndarray) -> Law:
     return line((low + high) / 2)[1]
 
 
-def sheared(run: Run, inertia: float, first: float, grains: Grains) -> Shear:
-    """From this share of its time on, which its strain grows with."""
+def sheared(run: Run, rate: float, first: float, grains: Grains) -> Shear:
+    """From this share of its time on, which its strain grows with. Friction is the ratio of mean stresses, and I that of the normal stress that there was:
+    both are noise from contact to contact."""
     series = run.series
     late = series["time"] > first * series["time"][-1]
-    return Shear(inertia, float(series["stress.friction"][late].mean()), float(grains.density * series["box.packing"][late].mean()))
+
+    def borne(axes: str) -> float:
+        return abs(float((series[f"stress.{axes}"] + series[f"stress.kinetic_{axes}"])[late].mean()))
+    pressure = borne("yy")
+    return Shear(rate * grains.diameter * math.sqrt(grains.density / pressure), borne("xy") / pressure, float(grains.density * series["box.packing"][late].mean()))
 
 
 def law_of(chutes: list[Rows]) -> Law:
