@@ -99,11 +99,14 @@ def without_ffmpeg(folder):
 
 
 def interrupted(folder):
-    """By a signal, at any moment: status 130, no film, no folder beside it."""
-    for number, after in ((signal.SIGINT, 0.7), (signal.SIGTERM, 1.2), (signal.SIGHUP, 0.9)):
+    """By a signal, at any moment from when its folder is there: status 130, no film, no folder beside it."""
+    for number, after in ((signal.SIGINT, 0.0), (signal.SIGTERM, 0.5), (signal.SIGHUP, 0.2)):
         before = sorted(folder.iterdir())
         at_work = subprocess.Popen([str(QUERN), "film", str(folder), "-o", str(folder / "half.gif"), "--width", "8000"],
                                    stderr=subprocess.PIPE, text=True, start_new_session=True)
+        end = time.monotonic() + 60
+        while sorted(folder.iterdir()) == before and at_work.poll() is None and time.monotonic() < end:
+            time.sleep(0.01)
         time.sleep(after)
         assert at_work.poll() is None, "it was over before"
         at_work.send_signal(number)
