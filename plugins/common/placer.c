@@ -134,8 +134,8 @@ static bool meets_body(const placer *p, const quern_spot *s) {
 	static const body_pose still = { .pose = { .turn = { 1, 0, 0, 0, 1, 0, 0, 0, 1 } } };
 	for (uint32_t b = 0; b < p->n_bodies; b++) {
 		const body_pose *pose = p->pose ? &p->pose[b] : &still;
-		const body_item *item = p->nodes ? p->body[b].item : NULL;
-		const quern_real reach = s->radius + (item ? item->displacement : 0);
+		const quern_real reach =
+			s->radius + (p->nodes ? ((const body_item *)p->body[b].item)->displacement : 0);
 		if (quern_body_gap(&p->body[b], pose, p->dim, s->x, reach, NULL) < -1e-9 * s->radius) return true;
 	}
 	return false;

@@ -8,6 +8,7 @@ import math
 import pathlib
 import shlex
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import yaml
@@ -32,6 +33,7 @@ class Found:
     sheared: list[list[Shear]]  # by seed
     by_shear: bool  # whether the law is that of plane shear
 
+    @cached_property
     def sides(self) -> dict[str, tuple[Law, list[Law]]]:
         """The law of each kind of flow, and what it is without one of the seeds each. That of the block comes first."""
         kinds = {"chutes": self.law_without} | ({"plane shear": self.shear_without} if self.sheared else {})
@@ -47,13 +49,13 @@ class Found:
         return fit_law(np.array([one.inertia for one in points]), np.array([one.friction for one in points]))
 
     def kind(self) -> str:
-        return next(iter(self.sides()))
+        return next(iter(self.sides))
 
     def law(self) -> Law:
-        return self.sides()[self.kind()][0]
+        return self.sides[self.kind()][0]
 
     def laws(self) -> list[Law]:
-        return self.sides()[self.kind()][1]
+        return self.sides[self.kind()][1]
 
     def bulk_modulus(self) -> float:
         return float(np.mean([one.bulk_modulus for one in self.beds]))
@@ -144,7 +146,7 @@ def block(found: Found, command: str) -> str:
     low, high = inertia_range(found)
     length, off = slip_length(found)
     flowing, settled = displacements(found)
-    others = [f"# friction of {kind}: {told_law(found, kind)}" for kind in found.sides()]
+    others = [f"# friction of {kind}: {told_law(found, kind)}" for kind in found.sides]
     lines = [f"# {command}",
              f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
              *others, f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate",
@@ -194,8 +196,8 @@ def pictures(found: Found) -> list[Picture]:
         flow.append(Curve(f"{angle:g}°", x[order], y[order]))
         there = np.all([one.density > 0.5 * np.median(one.density[one.bulk]) for one in rows], axis=0)
         speed.append(Curve(f"{angle:g}°", np.mean([one.velocity[there] for one in rows], axis=0), rows[0].y[there] / d))
-    x = np.linspace(0, max(measured(found, kind)[1] for kind in found.sides()) * 1.1, 100)
-    for kind, (law, _) in found.sides().items():
+    x = np.linspace(0, max(measured(found, kind)[1] for kind in found.sides) * 1.1, 100)
+    for kind, (law, _) in found.sides.items():
         flow.append(Curve(f"the law of {kind}", x, law(x), reference=kind == found.kind()))
     if found.sheared:
         each = np.array([[(one.inertia, one.friction) for one in seed] for seed in found.sheared]).mean(axis=0)
@@ -230,15 +232,16 @@ def measured(found: Found, kind: str) -> tuple[float, float]:
 
 
 def told_law(found: Found, kind: str) -> str:
-    law, laws = found.sides()[kind]
+    law, laws = found.sides[kind]
     low, high = measured(found, kind)
     return ", ".join(f"{with_spread(float(law(x)), left_out([float(one(x)) for one in laws]))} at I = {x:g}" for x in AT if low / 2 < x < 2 * high)
 
 
 def about_law(found: Found) -> list[str]:
     high = measured(found, found.kind())[1]
-    said = [f"The law is that of {found.kind()}. " + "; ".join(f"{kind} say {told_law(found, kind)}" for kind in found.sides()) + ". The three numbers of a law scatter more than the law does, since one can stand in for "
-            "another; take them together."]
+    told = "; ".join(f"in {kind} it says {told_law(found, kind)}" for kind in found.sides)
+    said = [f"The law is that of {found.kind()}: {told}. The three numbers of a law scatter more than the law does, since one can stand in for another; take "
+            "them together."]
     if found.law().i_0 > high * 5:
         said.append("The flows hardly show that friction comes to an end: mu_2 and I_0 stand for a straight line, "
                     "and say nothing of faster flows.")

@@ -137,8 +137,7 @@ def rows_of(angle: float, y: np.ndarray, times: np.ndarray, density: np.ndarray,
         inertia = rate * grains.diameter * np.sqrt(grains.density / pressure)
         friction = shear / pressure
     haste = float((mean * gain)[there].sum() / (mean[there].sum() * across))
-    bulk = there & bulk_rows(y, mean, grains.diameter)
-    return Rows(angle, y, mean, u, pressure, friction, inertia, bulk, haste)
+    return Rows(angle, y, mean, u, pressure, friction, inertia, there & bulk_rows(y, mean, grains.diameter), haste)
 
 
 def displacement_of(one: Rows, bulk_modulus: float) -> float:

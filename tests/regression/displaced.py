@@ -28,7 +28,8 @@ CASES = [  # what, the domain, the body, its places with and without a displacem
     ("a floor on the domain's face", FLAT, "{{plane: {{point: [0, {0} mm], normal: [0, 1], boundary: {{rough: 5}}{1}}}}}", OUT, 0, lambda x: x[:, 1] >= OUT),
     ("a floor within a cell", FLAT, "{{plane: {{point: [0, {0} mm], normal: [0, 1], boundary: {{frictional: 0.3}}{1}}}}}", 5 + OUT, 5, lambda x: x[:, 1] >= 5 + OUT),
     ("a floor that rises and is sticky", FLAT, "{{plane: {{point: [0, {0} mm], normal: [0, 1], boundary: sticky, motion: {{velocity: [0, 0.05]}}{1}}}}}", 4 + OUT, 4, None),
-    ("a box", FLAT, "{{box: {{lower: [30 mm, 0], upper: [1, {0} mm], boundary: {{frictional: 0.3}}{1}}}}}", 20 + OUT, 20, None),
+    ("a box", FLAT, "{{box: {{lower: [30 mm, 0], upper: [1, {0} mm], boundary: {{frictional: 0.3}}{1}}}}}", None, 20,
+     lambda x: (x[:, 0] <= 30 - OUT) | (x[:, 1] >= 20 + OUT)),
     ("a drum from within", dict(FLAT, from_="[0.03, 0.01]"),
      "{{cylinder: {{centre: [50 mm, 50 mm], radius: {0} mm, inside: true, boundary: {{frictional: 0.3}}{1}}}}}", 45 - OUT, 45, None),
     ("a floor in space", DEEP, "{{plane: {{point: [0, 0, {0} mm], normal: [0, 0, 1], boundary: {{rough: 5}}{1}}}}}", 1 + OUT, 1, lambda x: x[:, 2] >= 1 + OUT),
@@ -60,25 +61,28 @@ def last(folder):
         return {name: frame[f"points/{name}"][()] for name in ("position", "velocity", "pressure")}
 
 
+def look(place, keys, body, at, extra=""):
+    path = place / "scene.yaml"
+    path.write_text(CONTINUUM.format(body=body.format(at, extra), **keys))
+    lab.run(path, place / "out", "--force")
+    return last(place / "out")
+
+
 def check_continuum(place):
-    """A box goes out sideways too, which none can that is larger upwards alone: its points beside it are left out."""
-    for k, (what, keys, body, before, own, there) in enumerate(CASES):
-        found = []
-        for at, extra in ((before, ""), (own, f", displacement: {OUT} mm"), (own, "")):
-            path = place / f"c{len(found)}_{k}.yaml"
-            path.write_text(CONTINUUM.format(body=body.format(at, extra), **keys))
-            lab.run(path, place / path.stem)
-            found.append(last(place / path.stem))
-        ahead, displaced, plain = found
-        if what == "a box":
-            assert len(ahead["position"]) - len(displaced["position"]) in range(20), what
-            continue
-        off = max(numpy.abs(ahead[name] - displaced[name]).max() / numpy.abs(ahead[name]).max() for name in ahead)
-        n, without = len(ahead["position"]), len(plain["position"])
-        print(f"{what}: {n} points, without displacement {without}; before itself and displaced they are apart by {off:.1e}")
-        assert off < 1e-9, (what, off)
+    """A box has no place before itself: displaced, it is larger to all sides, and none may lie within 0.6 mm of it, where points of one that is not do."""
+    for what, keys, body, before, own, there in CASES:
+        displaced, plain = look(place, keys, body, own, f", displacement: {OUT} mm"), look(place, keys, body, own)
+        n, without = len(displaced["position"]), len(plain["position"])
         assert n < without or numpy.abs(plain["position"] - displaced["position"]).max() > 1e-5, what
         assert there is None or there(1e3 * displaced["position"] + 1e-9).all(), what
+        if before is None:
+            assert not there(1e3 * plain["position"]).all(), what
+            print(f"{what}: {n} points, without displacement {without}; none near it")
+            continue
+        ahead = look(place, keys, body, before)
+        off = max(numpy.abs(ahead[name] - displaced[name]).max() / numpy.abs(ahead[name]).max() for name in ahead)
+        print(f"{what}: {n} points, without displacement {without}; before itself and displaced they are apart by {off:.1e}")
+        assert off < 1e-9, (what, off)
 
 
 FLOW = """
@@ -106,8 +110,8 @@ def check_room(place):
     rows = [(y >= k * 4e-3) & (y < (k + 1) * 4e-3) for k in range(4)]
     bears = [pressure[row].mean() / (60.6e-3 - y[row].mean()) for row in rows]
     print(f"a layer that flows: {rows[0].sum()} points in the lowest cells, pressure over depth {bears[0] / numpy.mean(bears[1:]):.3f} of that above")
-    # what is cut off a cell bears its part through the others' nodes: about 4/3.4 of the pressure above, and points on either side
-    assert rows[0].sum() == 40 and 0.97 < bears[0] / numpy.mean(bears[1:]) < 1.25
+    # points of the cut cells bear 4/3.4 of the pressure above; 1.09 if what is counted there were that of whole cells, 1.64 if nodes lost their room twice
+    assert rows[0].sum() == 40 and abs(bears[0] / numpy.mean(bears[1:]) * 3.4 / 4 - 1) < 0.05
 
 
 def check_hybrid(place):
