@@ -103,7 +103,8 @@ def interrupted(folder):
     for number, after in ((signal.SIGINT, 0.0), (signal.SIGTERM, 0.5), (signal.SIGHUP, 0.2)):
         before = sorted(folder.iterdir())
         at_work = subprocess.Popen([str(QUERN), "film", str(folder), "-o", str(folder / "half.gif"), "--width", "8000"],
-                                   stderr=subprocess.PIPE, text=True, start_new_session=True)
+                                   stderr=subprocess.PIPE, text=True, start_new_session=True,
+                                   preexec_fn=lambda sent=number: signal.signal(sent, signal.SIG_DFL))  # who runs the tests may ignore it, as nohup does
         end = time.monotonic() + 60
         while sorted(folder.iterdir()) == before and at_work.poll() is None and time.monotonic() < end:
             time.sleep(0.01)
