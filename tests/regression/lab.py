@@ -205,8 +205,10 @@ def same(one, two, what, checkpoint=True):
 
 def same_ways(name, base, folder, *options, what="", batches=(8,), levels=()):
     """A scene leaves what it has left in `base`, to the bit: with two threads, and so in other batches, with other instruction sets, and
-    where QUERN_OTHER names a program of another compiler, by that one."""
+    where QUERN_OTHER names a program of another compiler, by that one. Sanitizers, which look for other things, see two threads alone."""
     ways = {"2 threads": ([], {"threads": 2})}
+    if os.environ.get("QUERN_WAYS") == "threads":
+        batches, levels = (), ()
     ways |= {f"run.batch: {batch}": ([f"--set=run.batch={batch}"], {"threads": 2}) for batch in batches}
     ways |= {f"run.instructions: {level}": ([f"--set=run.instructions={level}"], {}) for level in levels}
     if os.environ.get("QUERN_OTHER"):
