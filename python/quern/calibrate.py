@@ -32,7 +32,7 @@ GENTLEST, STEEPEST, NEAREST = 3.0, 45.0, 0.8  # degrees, of chutes that are trie
 WANTED = 3  # angles
 SIDE = {2: 30, 3: 12}  # of the box that shears, in diameters
 SHEARED, STRAIN, FIRST_STRAIN = (0.003, 0.01, 0.03, 0.1, 0.3), 3.0, 1.0  # inertial numbers; strain, and from where on it is measured
-KEPT = ("material", "contact", "skin", "overlap", "settle", "neighbours", "integrator", "settling")  # of the section grains
+KEPT = ("material", "contact", "skin", "overlap", "settle", "neighbours", "integrator", "step", "settling")  # of the section grains
 
 
 class Parser(argparse.ArgumentParser):
