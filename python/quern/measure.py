@@ -21,7 +21,7 @@ RESERVED = ("run", "point", "model", "seed", "status", "exit", "message", "scene
 COSTS = {"wall": "s", "processor": "s", "running": "s", "memory": "B"}  # columns cost.NAME of every table
 TIMES = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
 UNITS = {"time_end": "s", "time_step": "s", "energy": "J", "mass_initial": "kg", "mass_final": "kg", "mass_ledger": "kg",
-         "momentum": "kg m/s", "peak_rss_bytes": "B"}
+         "momentum": "kg m/s", "peak_rss_bytes": "B", "state_rss_bytes": "B"}
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Reading:
 def is_clocked(path: str) -> bool:
     """True for numbers of a summary that differ from one run of a scene to the next."""
     word = path.split(".")[0]
-    return word in ("wall_seconds", "settle_seconds", "seconds_by_stage", "peak_rss_bytes") or word.startswith(("processor", "settle_processor"))
+    return word in ("wall_seconds", "settle_seconds", "seconds_by_stage", "peak_rss_bytes", "state_rss_bytes") or word.startswith(("processor", "settle_processor"))
 
 
 # ---- from the study's file ----
