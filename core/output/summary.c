@@ -173,7 +173,8 @@ bool quern_summary_write(
 	json_object_set_new(root, "sums", sums(&a));
 	json_object_set_new(root, "discrete_share", number(discrete_share(run, series, &a)));
 	json_object_set_new(root, "peak_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024));
-	json_object_set_new(root, "state_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024 - run->rss_before));
+	json_object_set_new(
+		root, "state_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024 - run->rss_before));
 	json_object_set_new(root, "observers", observers(run, series));
 	json_object_set_new(root, "provenance", provenance(run));
 	char *text = json_dumps(root, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(17));

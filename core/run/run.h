@@ -48,7 +48,7 @@ struct quern_run {
 	double wall_before, settle_wall;    /* s on the clock spent before a resume; in settling */
 	double processor, settle_processor; /* s of all threads up to the last checkpoint; up to the release */
 	double mass_initial;
-	int64_t rss_before; /* bytes that were resident at most before the first set was allocated */
+	int64_t rss_before;     /* bytes that were resident at most before the first set was allocated */
 	char limit_reason[200]; /* what sets the step */
 	char *identity;         /* see identity.h */
 	uint64_t scene_hash, *plugins;
