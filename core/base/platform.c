@@ -65,3 +65,15 @@ void *quern_platform_memory(size_t bytes) {
 #endif
 	return memory;
 }
+
+int64_t quern_platform_peak_memory(void) {
+	/* getrusage would tell that of the process that has forked this one, if it was more */
+	FILE *file = fopen("/proc/self/status", "r");
+	if (!file) return 0;
+	char line[256];
+	long long kib = 0;
+	while (fgets(line, sizeof line, file))
+		if (sscanf(line, "VmHWM: %lld", &kib) == 1) break;
+	fclose(file);
+	return kib * 1024;
+}

@@ -22,3 +22,5 @@ char *quern_platform_program(void);
 /* Memory of that many bytes, more than none, that begins with a line of the cache; free(). Where the system has large pages, a large
  * block lies in them: it would otherwise need more entries than a processor keeps of a page's place. NULL: there is none. */
 void *quern_platform_memory(size_t bytes);
+/* Bytes that were resident at most since the program began: what had started it does not count. 0: it cannot be known. */
+int64_t quern_platform_peak_memory(void);

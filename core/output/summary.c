@@ -3,11 +3,11 @@
 #include "commit.h"
 #include "config.h"
 #include "identity.h"
+#include "platform.h"
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 
 /* JSON has no NaN: what is not a number is null. */
 static json_t *number(double x) { return isfinite(x) ? json_real(x) : json_null(); }
@@ -142,8 +142,7 @@ bool quern_summary_write(
 	const double mass = quern_account_of(&a, "mass"), owed = quern_account_of(&a, "owed");
 	const double momentum[3] = { quern_account_of(&a, "momentum_x"), quern_account_of(&a, "momentum_y"),
 		quern_account_of(&a, "momentum_z") };
-	struct rusage usage;
-	getrusage(RUSAGE_SELF, &usage);
+	const int64_t peak = quern_platform_peak_memory();
 	json_t *root = json_object();
 	json_object_set_new(root, "status", json_string(status));
 	if (run->message) json_object_set_new(root, "message", json_string(run->message));
@@ -172,9 +171,8 @@ bool quern_summary_write(
 			   quern_account_of(&a, "elastic")));
 	json_object_set_new(root, "sums", sums(&a));
 	json_object_set_new(root, "discrete_share", number(discrete_share(run, series, &a)));
-	json_object_set_new(root, "peak_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024));
-	json_object_set_new(
-		root, "state_rss_bytes", json_integer((json_int_t)usage.ru_maxrss * 1024 - run->rss_before));
+	json_object_set_new(root, "peak_rss_bytes", json_integer(peak));
+	json_object_set_new(root, "state_rss_bytes", json_integer(peak - run->rss_before));
 	json_object_set_new(root, "observers", observers(run, series));
 	json_object_set_new(root, "provenance", provenance(run));
 	char *text = json_dumps(root, JSON_INDENT(2) | JSON_PRESERVE_ORDER | JSON_REAL_PRECISION(17));

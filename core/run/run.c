@@ -10,7 +10,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 
 quern_status quern_run_stop(quern_run *run, quern_status status, const char *fmt, ...) {
 	if (run->status != QUERN_OK) return status;
@@ -106,9 +105,7 @@ quern_run *quern_run_create(quern_scene *scene, uint32_t workers) {
 	if (!quern_report_errors(scene->report)) quern_wishes_check(scene, run->has_grid);
 	quern_run_plan_episodes(run);
 	if (run->has_grid && !quern_report_errors(scene->report)) init_grid(run);
-	struct rusage usage;
-	getrusage(RUSAGE_SELF, &usage);
-	run->rss_before = (int64_t)usage.ru_maxrss * 1024;
+	run->rss_before = quern_platform_peak_memory();
 	const int total = quern_store_set(&run->plan->store, "total");
 	bool reserved = quern_store_fill(&run->plan->store, total, 1) == QUERN_OK;
 	for (int i = 0; i < (int)run->plan->store.n_sets;
