@@ -28,6 +28,7 @@ class Curve:
     dy: np.ndarray | None = None
     reference: bool = False
     straight: bool = False  # of distributions: a law, straight from place to place, where data rise in steps
+    ended: np.ndarray | None = None  # where the program ended the run: a cross
 
 
 @dataclass
@@ -55,6 +56,9 @@ class Picture:
     words: list[str] = field(default_factory=list)  # at 0, 1, 2 of x, where it is no number
     front: Front | None = None
     notes: list[tuple[str, str]] = field(default_factory=list)  # who could not be shown, and why
+    log: str = ""  # axes that are logarithmic: x, y, xy
+    marks: list[tuple[float, str]] = field(default_factory=list)  # limits along x, and what they are
+    reaches: tuple[float, float] | None = None  # the ends of y, where they are not those of the data
 
 
 @dataclass

@@ -62,6 +62,15 @@ def write_ticks(axis, span: float = 0) -> None:
     axis.set_minor_locator(ticker.NullLocator())
 
 
+def write_powers(axis, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis: as people write numbers where there are few powers of ten, else as powers."""
+    from matplotlib import ticker
+    write_ticks(axis, min(max(high / low, 10), 199 if high / low < 1e3 else math.inf))
+    if high / low > 1e4:
+        axis.set_major_locator(ticker.LogLocator(numticks=9))
+        axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: powers(f"10^{round(math.log10(value))}")))
+
+
 def style_of(number: int, one: Curve, references: int) -> dict:
     if one.reference:
         return {"color": REFERENCE, "linestyle": DASHES[(references + 1) % 4], "marker": ""}
@@ -108,6 +117,47 @@ def draw_words(axes, picture: Picture, by: float) -> None:
     axes.set_yticks(range(len(picture.words)), picture.words)
     axes.set_ylim(len(picture.words) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
+
+
+# ---- beyond limits ----
+
+def draw_ended(axes, picture: Picture) -> None:
+    """Crosses where runs were ended; at the top and in the line's colour where nothing was measured before."""
+    style = {"linestyle": "", "marker": "x", "markersize": 8, "markeredgewidth": 1.2, "color": "black", "zorder": 4}
+    known = [one for one in picture.curves if one.ended is not None]
+    for number, one in enumerate(known):
+        seen = np.isfinite(one.y)
+        axes.plot(one.x[one.ended & seen], one.y[one.ended & seen], **style)
+        unseen = one.x[one.ended & ~seen]
+        axes.plot(unseen, np.full(len(unseen), 0.97 - 0.035 * number), transform=axes.get_xaxis_transform(),
+                  **{**style, "color": style_of(number, one, 0)["color"]})
+    if any(one.ended.any() for one in known):
+        axes.plot([], [], label="ended by Quern", **style)
+
+
+def draw_marks(axes, picture: Picture) -> None:
+    """Limits as upright lines with their names along them."""
+    for at, word in picture.marks:
+        axes.axvline(at, color="#444444", linestyle=DASHES[1], linewidth=1, zorder=1.5)
+        left = axes.get_xlim()[0] > at - 0.05 * np.ptp(axes.get_xlim())  # no room before it
+        axes.annotate(word, (at, 1), (4 if left else -2.5, -3), ("data", "axes fraction"), "offset points", rotation=90,
+                      ha="left" if left else "right", va="top", fontsize=8,
+                      color="#444444", zorder=5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.85})
+
+
+def draw_limits(axes, picture: Picture) -> None:
+    set_logarithmic(axes, picture)
+    if picture.reaches:
+        axes.set_ylim(picture.reaches)
+    draw_ended(axes, picture)
+    draw_marks(axes, picture)
+
+
+def set_logarithmic(axes, picture: Picture) -> None:
+    for axis, scale, bounds in ((axes.xaxis, axes.set_xscale, axes.get_xlim), (axes.yaxis, axes.set_yscale, axes.get_ylim)):
+        if axis.axis_name in picture.log:
+            scale("log")
+            write_powers(axis, *bounds())
 
 
 # ---- cost against error ----
@@ -273,6 +323,7 @@ def figure_of(picture: Picture):
     elif picture.words:
         draw_words(axes, picture, y_by)
         write_ticks(axes.xaxis)
+        set_logarithmic(axes, picture)
     else:
         draw_lines(axes, picture, x_by, y_by)
         axes.margins(x=0.02)
@@ -280,6 +331,7 @@ def figure_of(picture: Picture):
             axes.set_xlim(0, picture.curves[0].x[[0, -1]].sum() / x_by)
         for axis in (axes.xaxis, axes.yaxis):
             write_ticks(axis)
+        draw_limits(axes, picture)
     below, across = named(picture.x[0], x_unit), named(picture.y[0], y_unit)
     axes.set_xlabel(across if picture.words else below)
     axes.set_ylabel("" if picture.words else across)
@@ -294,7 +346,8 @@ def figure_of(picture: Picture):
 def write_legend(figure, axes, picture: Picture) -> float:
     """Beside the axes, if there is more than one line; returns where it ends, from the top of the axes."""
     known = dict(zip(*reversed(axes.get_legend_handles_labels())))
-    handles = list(known.values()) if picture.front else [known[one.label] for one in picture.curves if one.label in known]
+    whole = picture.front or any(one.ended is not None for one in picture.curves)
+    handles = list(known.values()) if whole else [known[one.label] for one in picture.curves if one.label in known]
     if len(handles) < 2 and not picture.front:
         return 0.0
     legend = axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0, bbox_transform=axes.transAxes,

@@ -181,6 +181,26 @@ static void limits(void **unused) {
 			}
 }
 
+/* What lies between: energy over the step. */
+static void limits_over_step(void **unused) {
+	static const double factors[] = { 0.5, 0.9, 1, 1.1, 1.2, 1.3, 1.5, 1.75, 2, 2.5, 3 };
+	static const char *const shapes[] = { "gimp", "bspline", "linear" };
+	static const char *const transfers[] = { flip, "picflip: {rate: 30}", "apic", "xpic: {order: 2}" };
+	(void)unused;
+	beyond_table("Energy over the step by shape and transfer, the shaken block in 2-D; hats on a lattice",
+		"shape | transfer | step over hard limit | largest kinetic energy over first | steps | what Quern says");
+	for (size_t k = 0; k < 3; k++)
+		for (size_t t = 0; t < sizeof transfers / sizeof *transfers; t++)
+			for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) {
+				const block b = { "", shapes[k], transfers[t], 2, k != 2, 1e-3, 1, k == 2 ? INFINITY : 2 };
+				int64_t taken;
+				char said[300];
+				const double most = shake_for(&b, factors[i], beyond_is_long() ? 2000 : 200, &taken, said);
+				beyond_row("%s | %s | %g | %.3g | %lld | %s", shapes[k], transfers[t], factors[i], most,
+					(long long)taken, said);
+			}
+}
+
 /* Hats have no limit that holds for all places of points: a point just over a cell's face feeds a node of no mass. */
 static void light_nodes(void **unused) {
 	static const block shapes[] = { { "gimp, cut 1e-6", "gimp", flip, 2, true, 1e-6, 0.5, INFINITY },
@@ -249,7 +269,8 @@ static void column_at_rest(void **unused) {
 
 int main(int argc, char **argv) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(shaken_block), cmocka_unit_test(limits),
-		cmocka_unit_test(light_nodes), cmocka_unit_test(faster_than_waves), cmocka_unit_test(column_at_rest),
+		cmocka_unit_test(limits_over_step), cmocka_unit_test(light_nodes),
+		cmocka_unit_test(faster_than_waves), cmocka_unit_test(column_at_rest),
 		cmocka_unit_test(cell_crossing), cmocka_unit_test(unseen_motion), cmocka_unit_test(random_motion),
 		cmocka_unit_test(lone_point), cmocka_unit_test(share_as_viscosity), cmocka_unit_test(flow_over_step),
 		cmocka_unit_test(stiff_flow), cmocka_unit_test(stiff_slump), cmocka_unit_test(thin_layers),

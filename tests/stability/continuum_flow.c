@@ -100,7 +100,7 @@ static noise flow_for(quern_run *run, double time) {
 
 void flow_over_step(void **unused) {
 	(void)unused;
-	static const double factors[] = { 0.25, 0.5, 0.9, 1, 1.25, 1.5, 2, 3 };
+	static const double factors[] = { 0.25, 0.5, 0.9, 1, 1.25, 1.5, 1.75, 2, 2.5, 3 };
 	static const chute rows[] = { { "mu_i", "gimp", "apic", 1e5, 2 },
 		{ "mu_i", "gimp", "picflip: {rate: 0}", 1e5, 2 }, { "drucker_prager", "gimp", "apic", 1e5, 2 },
 		{ "drucker_prager", "gimp", "picflip: {rate: 0}", 1e5, 2 } };
