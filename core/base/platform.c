@@ -2,6 +2,7 @@
 #include "platform.h"
 #include "text.h"
 #include <limits.h>
+#include <malloc.h>
 #include <math.h>
 #include <sched.h>
 #include <stdio.h>
@@ -60,10 +61,23 @@ void *quern_platform_memory(size_t bytes) {
 	const size_t size = (bytes + unit - 1) / unit * unit;
 	void *memory = aligned_alloc(unit, size);
 #ifdef MADV_HUGEPAGE
-	if (memory && unit == page)
-		madvise(memory, size, MADV_HUGEPAGE); /* without them it is memory all the same */
+	/* without them it is memory all the same; the last one may be large only if little of it stays unused */
+	const size_t large = size - bytes <= bytes / 32 ? size : size - page;
+	if (memory && unit == page && large) madvise(memory, large, MADV_HUGEPAGE);
 #endif
 	return memory;
+}
+
+void quern_platform_forget(void *memory, size_t bytes) {
+	const size_t page = (size_t)sysconf(_SC_PAGESIZE), before = (page - (uintptr_t)memory % page) % page;
+	if (bytes > before + page)
+		madvise((char *)memory + before, (bytes - before) / page * page, MADV_DONTNEED);
+}
+
+void quern_platform_begin(void) {
+#ifdef M_MMAP_THRESHOLD
+	mallopt(M_MMAP_THRESHOLD, 1 << 20);
+#endif
 }
 
 int64_t quern_platform_peak_memory(void) {

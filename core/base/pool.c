@@ -231,6 +231,11 @@ void *quern_pool_scratch(quern_pool *p, uint32_t worker, size_t bytes) {
 	return own->memory;
 }
 
+void quern_pool_rest(quern_pool *p) {
+	for (uint32_t w = 0; w < p->workers; w++)
+		if (p->scratch[w].memory) quern_platform_forget(p->scratch[w].memory, p->scratch[w].bytes);
+}
+
 double quern_tree_sum(size_t n, const double *values) {
 	if (n <= 256) {
 		double sum = 0;

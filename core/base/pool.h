@@ -21,5 +21,8 @@ void quern_pool_each(
 /* Memory of one worker, at least `bytes`, 64-byte aligned, kept between calls; NULL if there is none. */
 void *quern_pool_scratch(quern_pool *, uint32_t worker, size_t bytes);
 
+/* Between calls: what lies in the memory of all workers goes back to the system until it is written again. */
+void quern_pool_rest(quern_pool *);
+
 /* The sum over a fixed binary tree of leaves of 256, whatever the number of workers. */
 double quern_tree_sum(size_t n, const double *values);

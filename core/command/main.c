@@ -4,6 +4,7 @@
 #include "commit.h"
 #include "config.h"
 #include "h5.h"
+#include "platform.h"
 #include "text.h"
 #include <errno.h>
 #include <stdlib.h>
@@ -77,6 +78,7 @@ static int run(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
+	quern_platform_begin();
 	quern_h5_quiet();
 	return quern_ended(run(argc, argv));
 }

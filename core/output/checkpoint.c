@@ -100,6 +100,7 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 	quern_text_finish(&wrong);
 	if (!accepted) return QUERN_E_NUMERIC;
 	char *path = quern_format("%s/checkpoint.h5", run->folder);
+	quern_run_rest(run);
 	bool good = quern_h5_create(&h, run->scene->general.compress, 512);
 	if (good) {
 		write_run(&h, run, rows);

@@ -140,6 +140,7 @@ quern_status quern_frame_write(quern_run *run, int64_t frame) {
 	char why[256];
 	if (!run->folder) return QUERN_OK;
 	char *path = quern_format("%s/frames/%06lld.h5", run->folder, (long long)frame);
+	quern_run_rest(run);
 	bool good = quern_h5_create(&h, run->scene->general.compress, 0);
 	if (good) {
 		provenance(&h, run);

@@ -34,6 +34,7 @@ static void look_at(telling *t, quern_run *run, const quern_section *section) {
 	quern_watch_enter(section->solver->file->plugin.id, "look");
 	section->ops->look(section->solver->self, &step, value);
 	quern_watch_leave();
+	quern_run_reset(run);
 	for (size_t k = 0; section->ops->looks[k].name; k++) {
 		const quern_output *row = &section->ops->looks[k];
 		if (!isfinite(value[k])) continue;

@@ -360,6 +360,7 @@ static bool worth_it(const quern_run *run) {
 /* Under a name of its own until it is whole: another run may be keeping the same state. */
 static bool write_to(quern_run *run, const char *path, const char *key, char why[256]) {
 	quern_h5 h;
+	quern_run_rest(run);
 	if (!quern_h5_create(&h, true, 512)) return snprintf(why, 256, "out of memory"), false;
 	quern_h5_text(&h, h.file, "format", format);
 	quern_h5_put(&h, h.file, "depends", H5T_NATIVE_UINT8, strlen(key), 1, key);

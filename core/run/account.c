@@ -35,6 +35,7 @@ static void add_section(quern_account *a, const quern_section *s, const quern_st
 	quern_watch_enter(s->solver->file->plugin.id, "account");
 	s->ops->account(s->solver->self, step, value);
 	quern_watch_leave();
+	if (!step->run->stage) quern_run_reset(step->run);
 	for (size_t k = 0; s->ops->sums[k].name; k++) {
 		const quern_output *row = &s->ops->sums[k];
 		double *sum = sum_named(a, row);
@@ -95,6 +96,7 @@ bool quern_run_accept(quern_run *run, quern_text *why) {
 		quern_watch_enter(s->solver->file->plugin.id, "accept");
 		good = s->ops->accept(s->solver->self, &step) == QUERN_OK && run->status == QUERN_OK;
 		quern_watch_leave();
+		if (!run->stage) quern_run_reset(run);
 		if (good) continue;
 		if (run->message) quern_text_add(why, "%s", run->message);
 		else quern_text_add(why, "%s cannot go on from this state", s->name);

@@ -42,6 +42,8 @@ static void *host_memory(quern_run *run, size_t bytes) {
 		memory = a->data + a->used;
 		a->used += size;
 	} else {
+		if (a->used < a->capacity) quern_platform_forget(a->data + a->used, a->capacity - a->used);
+		a->capacity = a->used; /* what is left of the block has no use before it is made anew */
 		memory = quern_platform_memory(size);
 		if (!memory) return NULL;
 		a->extra = quern_grow(a->extra, a->n_extra, &a->extra_capacity, sizeof(void *));

@@ -57,7 +57,8 @@ void quern_run_complain(const quern_run *run, FILE *out) {
 	quern_report_destroy(report);
 }
 
-static void arena_reset(quern_arena *a) {
+void quern_run_reset(quern_run *run) {
+	quern_arena *a = &run->arena;
 	for (size_t i = 0; i < a->n_extra; i++) free(a->extra[i]);
 	if (a->n_extra) {
 		const size_t wanted = (a->used + a->extra_bytes) * 5 / 4;
@@ -66,6 +67,12 @@ static void arena_reset(quern_arena *a) {
 		a->capacity = a->data ? (wanted + 63) & ~(size_t)63 : 0;
 	}
 	a->used = a->n_extra = a->extra_bytes = 0;
+}
+
+void quern_run_rest(quern_run *run) {
+	quern_run_reset(run);
+	if (run->arena.data) quern_platform_forget(run->arena.data, run->arena.capacity);
+	quern_pool_rest(run->pool);
 }
 
 static bool needs_grid(const quern_store *store) {
@@ -125,7 +132,7 @@ void quern_run_destroy(quern_run *run) {
 	quern_start_let_go(run);
 	quern_scene_destroy(run->scene);
 	quern_log_destroy(run->log);
-	arena_reset(&run->arena);
+	quern_run_reset(run);
 	free(run->arena.data);
 	free(run->arena.extra);
 	free(run->folder);
@@ -245,6 +252,7 @@ static double limit_of(const quern_section *s, const quern_step *step, double *h
 	quern_watch_enter(s->solver->file->plugin.id, "limit");
 	const double limit = s->ops->limit(s->solver->self, step, hard, why);
 	quern_watch_leave();
+	if (!step->run->stage) quern_run_reset(step->run);
 	return limit;
 }
 
@@ -382,7 +390,7 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 	quern_watch_enter(stage->section->solver->file->plugin.id, stage->name);
 	quern_status status = stage->stage->run(stage->section->solver->self, &step);
 	quern_watch_leave();
-	arena_reset(&run->arena);
+	quern_run_reset(run);
 	if (status == QUERN_OK) status = run->status;
 	else quern_run_stop(run, status, status == QUERN_E_MEMORY ? "out of memory" : "failed");
 	quern_plan_swap(run->plan, stage->swaps);
@@ -453,6 +461,7 @@ static void settle(quern_run *run) {
 		quern_watch_enter(s->solver->file->plugin.id, "settled");
 		rest = s->ops->settled(s->solver->self, &step) && rest;
 		quern_watch_leave();
+		quern_run_reset(run);
 	}
 	if (rest || run->status != QUERN_OK) {
 		c->settled = 1;

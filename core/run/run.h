@@ -17,6 +17,7 @@ typedef struct quern_clock {
 	int64_t settled; /* 1: settling is over */
 } quern_clock;
 
+/* What plugins have for a stage. */
 typedef struct quern_arena {
 	char *data;
 	size_t used, capacity;
@@ -93,6 +94,12 @@ void quern_run_frame(quern_run *);
 bool quern_run_rejoin(quern_run *);
 /* Breaks the interval off, so that the next one begins at the present time. */
 void quern_run_cut(quern_run *);
+
+/* Before a file is built in memory: what stages work in goes back to the system until the next one writes there, so that a file takes its
+ * place and not room beside it. */
+void quern_run_rest(quern_run *);
+/* Ends what plugins had for a stage, or for a call between stages. */
+void quern_run_reset(quern_run *);
 
 double quern_run_time(const quern_run *); /* s since the release */
 /* True once the frame of time.end is written; a time that is later only by round-off counts as that. */

@@ -83,11 +83,10 @@ typedef struct {
 	bool carried;
 } place;
 
-/* Every column of a set, the spare ones first; returns how many there are. */
+/* Every column of a set, the spare one first; returns how many there are. */
 static size_t places_of(quern_store *store, int set, place *out) {
 	size_t n = 0;
-	for (int k = 0; k < 2; k++)
-		out[n++] = (place) { .column = &store->sets[set].spare[k], .bytes = k ? 4 : 8 };
+	out[n++] = (place) { .column = &store->sets[set].spare, .bytes = 8 };
 	for (size_t i = 0; i < store->n_fields; i++) {
 		quern_field *field = &store->fields[i];
 		if (!owns(field, set)) continue;
@@ -98,25 +97,30 @@ static size_t places_of(quern_store *store, int set, place *out) {
 	return n;
 }
 
-/* Columns of a set always have its capacity, so that they can trade places with the spare ones; they lie in one block of memory, since
- * many small ones would have no large pages. All new columns are there before an old one goes. */
+/* Columns of a set always have its capacity, so that they can trade places with the spare one; they lie in one block of memory, since
+ * many small ones would have no large pages. All new ones have a place before an old one goes; but what a place takes up, it does as it is
+ * written, and by then the column before it has gone: a set that grows is never there twice. What is ahead of its size is touched too, so that
+ * it is little. */
 static quern_status reserve(quern_store *store, int set, uint32_t n) {
 	quern_set_store *s = &store->sets[set];
-	if (n <= s->cap && s->spare[0]) return QUERN_OK;
+	if (n <= s->cap && s->spare) return QUERN_OK;
 	if (n > UINT32_MAX / 2) return QUERN_E_MEMORY;
-	const uint32_t cap = n + n / 4 + 64;
-	place *places = calloc(store->n_fields * 18 + 2, sizeof *places);
+	const uint32_t cap = n + n / 16 + 64;
+	place *places = calloc(store->n_fields * 18 + 1, sizeof *places);
 	const size_t n_places = places ? places_of(store, set, places) : 0;
 	size_t bytes = 0;
 	for (size_t i = 0; i < n_places; i++) bytes += column_bytes(cap, places[i].bytes);
 	char *columns = places ? quern_platform_memory(bytes) : NULL, *at = columns;
 	if (!columns) return free(places), QUERN_E_MEMORY;
-	memset(columns, 0, bytes);
 	for (size_t i = 0; i < n_places; i++) {
 		const place *p = &places[i];
-		if (p->carried && *p->column) memcpy(at, *p->column, s->n * p->bytes);
+		const size_t size = column_bytes(cap, p->bytes),
+					 kept = p->carried && *p->column ? s->n * p->bytes : 0;
+		if (kept) memcpy(at, *p->column, kept);
+		memset(at + kept, 0, size - kept);
+		if (*p->column) quern_platform_forget(*p->column, s->cap * p->bytes);
 		*p->column = at;
-		at += column_bytes(cap, p->bytes);
+		at += size;
 	}
 	free(places);
 	free(s->columns);
@@ -328,12 +332,15 @@ static void permute_columns(quern_store *store, int set, uint32_t n, const int32
 	for (size_t i = 0; i < store->n_fields; i++) {
 		quern_field *field = &store->fields[i];
 		if (!owns(field, set)) continue;
-		const int spare = field->shape == QUERN_INDEX;
 		for (uint8_t k = 0; k < field->n_components; k++) {
 			void **column = &field->data[field->now][k];
-			permutation p = { field, from, *column, s->spare[spare], initial_of(field, k), s->next_id, n };
+			permutation p = { field, from, *column, s->spare, initial_of(field, k), s->next_id, n };
 			quern_pool_each(store->pool, (n + CHUNK - 1) / CHUNK, permute, &p);
-			s->spare[spare] = *column;
+			if (field->shape == QUERN_INDEX) { /* its own place is too narrow for others */
+				memcpy(*column, p.new, n * sizeof(int32_t));
+				continue;
+			}
+			s->spare = *column;
 			*column = p.new;
 			if (field->shape == QUERN_ID) number_new(s, *column, n);
 		}
@@ -412,6 +419,6 @@ size_t quern_store_bytes(const quern_store *store) {
 			bytes += (size_t)s->cap * field->n_components * quern_field_bytes(field) * (field->twice ? 2 : 1);
 	}
 	for (size_t i = 0; i < store->n_sets; i++)
-		bytes += store->sets[i].rows ? (size_t)store->sets[i].cap * 64 : (size_t)store->sets[i].cap * 12;
+		bytes += store->sets[i].rows ? (size_t)store->sets[i].cap * 64 : (size_t)store->sets[i].cap * 8;
 	return bytes;
 }

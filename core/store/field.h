@@ -32,8 +32,8 @@ typedef struct quern_set_store {
 	quern_parts parts;          /* as it was asked for last */
 	double *row;                /* of a row set: n rows of 8 */
 	int64_t next_id;
-	void *columns;          /* where those of all fields and the spare ones lie */
-	void *spare[2];         /* [0] 8-byte, [1] 4-byte: the other half of a reordering */
+	void *columns;          /* where those of all fields and the spare one lie */
+	void *spare;            /* of 8 bytes: the other half of a reordering */
 	bool grid;              /* entries belong to grid blocks: cells and nodes */
 	const quern_set *table; /* the solver's row; NULL: the host's own */
 	int64_t stepped;        /* steps of entries so far, where the row says that they are counted */

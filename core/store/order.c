@@ -64,6 +64,11 @@ static void order_stages(quern_plan *p) {
 
 /* ---- what the order implies for each field ---- */
 
+/* A row that only says what must be there has no column to read. */
+static bool reads_others(const quern_use *row) {
+	return row->flags & QUERN_OTHERS && !(row->flags & QUERN_EXISTS);
+}
+
 typedef struct {
 	const quern_plan_use *last;
 	bool read, first_seen, begins, fresh, written;
@@ -105,7 +110,7 @@ static void follow_field(quern_plan *p, int k) {
 				h.written = h.written || quern_use_changes(u->row);
 				h.whole = h.whole ||
 						  (i >= p->stages[s].first_use && i < p->stages[s].first_use + p->stages[s].n_uses);
-				others = others || u->row->flags & QUERN_OTHERS;
+				others = others || reads_others(u->row);
 				changed = changed || u->row->access == QUERN_UPDATE || u->row->access == QUERN_WRITE;
 				if (s != h.previous) h.stages++, h.previous = s;
 				if (setup) continue;
@@ -168,7 +173,6 @@ static bool stage_has(const quern_plan *p, int stage, int field, bool (*test)(co
 		if (p->uses[i].stage == stage && p->uses[i].target == field && test(p->uses[i].row)) return true;
 	return false;
 }
-static bool reads_others(const quern_use *row) { return row->flags & QUERN_OTHERS; }
 static bool adds(const quern_use *row) { return row->access == QUERN_ADD; }
 
 /* Before the first frame, whoever looks at it finds it as settling has left it. */

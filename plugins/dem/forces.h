@@ -24,7 +24,10 @@ enum {
 	G_NEW_VELOCITY = 21,
 	G_NEW_SPIN = 24,
 	G_ALONG = 27,
-	N_GRAIN_COLUMNS = 30
+	G_OLD_POSITION = 30,
+	G_OLD_VELOCITY = 33,
+	G_OLD_SPIN = 36,
+	N_GRAIN_COLUMNS = 39
 };
 /* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in
  * 3-D have a row of their own. */

@@ -57,9 +57,8 @@ QUERN_INLINE void compare(
 	const quern_real *restrict vx = u[FORCE_VELOCITY].real[0] + begin,
 							   *restrict vy = u[FORCE_VELOCITY].real[1] + begin,
 							   *restrict vz = dim == 3 ? u[FORCE_VELOCITY].real[2] + begin : NULL;
-	const quern_real *restrict ox = u[FORCE_OLD_VELOCITY].real[0] + begin,
-							   *restrict oy = u[FORCE_OLD_VELOCITY].real[1] + begin,
-							   *restrict oz = dim == 3 ? u[FORCE_OLD_VELOCITY].real[2] + begin : NULL;
+	const quern_real *restrict ox = w->grains[G_OLD_VELOCITY], *restrict oy = w->grains[G_OLD_VELOCITY + 1],
+							   *restrict oz = w->grains[G_OLD_VELOCITY + 2];
 	const quern_real *restrict mass = u[FORCE_MASS].real[0] + begin, *restrict radius =
 																		 u[FORCE_RADIUS].real[0] + begin;
 	const quern_real dt = sh->s->dt, waits = sh->waits;
@@ -154,11 +153,11 @@ static void hold_fixed(
 		if (!fixed[begin + i]) continue;
 		for (uint32_t k = 0; k < sh->s->dim; k++) {
 			support[k] -= w->grains[G_FORCE + k][i] * sh->s->dt;
-			u[FORCE_POSITION].real[k][begin + i] = u[FORCE_OLD_POSITION].real[k][begin + i];
-			u[FORCE_VELOCITY].real[k][begin + i] = u[FORCE_OLD_VELOCITY].real[k][begin + i];
+			u[FORCE_POSITION].real[k][begin + i] = w->grains[G_OLD_POSITION + k][i];
+			u[FORCE_VELOCITY].real[k][begin + i] = w->grains[G_OLD_VELOCITY + k][i];
 		}
 		for (uint32_t k = 0; k < (sh->s->dim == 3 ? 3u : 1u) && sh->spin; k++)
-			u[FORCE_SPIN].real[k][begin + i] = u[FORCE_OLD_SPIN].real[k][begin + i];
+			u[FORCE_SPIN].real[k][begin + i] = w->grains[G_OLD_SPIN + k][i];
 	}
 }
 
@@ -188,6 +187,11 @@ static void add_lent(const forces_shared *sh, const forces_work *w, uint32_t beg
 	}
 }
 
+/* n numbers as they are, where they can be read when the column has new ones: there is no second copy of it. */
+static const quern_real *keep_old(quern_real *to, const quern_real *column, uint32_t n) {
+	return memcpy(to, column, n * sizeof(quern_real));
+}
+
 static void integrate(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n) {
 	const quern_bound *bound = dem_integrator(sh->s);
 	const quern_column *u = sh->use;
@@ -204,15 +208,15 @@ static void integrate(const forces_shared *sh, const forces_work *w, uint32_t be
 	for (uint32_t k = 0; k < dim; k++) {
 		batch.gravity[k] = sh->s->gravity[k];
 		batch.force[k] = w->grains[G_FORCE + k];
-		batch.position[k] = u[FORCE_OLD_POSITION].real[k] + begin;
-		batch.velocity[k] = u[FORCE_OLD_VELOCITY].real[k] + begin;
+		batch.position[k] = keep_old(w->grains[G_OLD_POSITION + k], u[FORCE_OLD_POSITION].real[k] + begin, n);
+		batch.velocity[k] = keep_old(w->grains[G_OLD_VELOCITY + k], u[FORCE_OLD_VELOCITY].real[k] + begin, n);
 		batch.new_position[k] = sh->looks ? w->grains[G_NEW_POSITION + k] : u[FORCE_POSITION].real[k] + begin;
 		batch.new_velocity[k] = sh->looks ? w->grains[G_NEW_VELOCITY + k] : u[FORCE_VELOCITY].real[k] + begin;
 		if (means) batch.mean_velocity[k] = w->grains[G_MEAN + k];
 	}
 	for (uint32_t k = 0; k < n_spin; k++) {
 		batch.torque[k] = w->grains[G_TORQUE + k];
-		batch.spin[k] = u[FORCE_OLD_SPIN].real[k] + begin;
+		batch.spin[k] = keep_old(w->grains[G_OLD_SPIN + k], u[FORCE_OLD_SPIN].real[k] + begin, n);
 		batch.new_spin[k] = sh->looks ? w->grains[G_NEW_SPIN + k] : u[FORCE_SPIN].real[k] + begin;
 		if (means) batch.mean_spin[k] = w->grains[G_MEAN_SPIN + k];
 	}

@@ -15,12 +15,13 @@ typedef struct {
 	quern_neighbour_job job;
 	const int32_t *fixed, *material;
 	const int64_t *id;
-	quern_pair **pair; /* by block: its buffer */
+	quern_pair **pair; /* by block: its pairs, while it is searched a buffer */
 	uint32_t *room;    /* by block: of the buffer, in pairs */
 	uint32_t *found;   /* by block */
 	uint32_t *again;   /* blocks that found more than they had room for */
 	uint32_t *start;   /* by block: of the final list */
-	quern_pair *list;
+	uint32_t searched; /* the first block of those that are searched now */
+	quern_pair *list;  /* of touches */
 	int32_t *list_from, *list_feature;
 	const uint32_t *bucket; /* by grain: its old entries in `entry` */
 	const int32_t *entry;
@@ -91,11 +92,13 @@ static quern_status sort_grains(listing *l) {
 	const quern_step *s = l->s;
 	if (!set_job(l)) return QUERN_E_MEMORY;
 	const uint32_t n = l->job.n;
-	uint64_t *key = s->host->memory(s->run, ((size_t)n + 1) * sizeof(uint64_t));
-	int32_t *from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
-	uint64_t *work = s->host->memory(s->run, quern_sort_bytes(n));
-	uint32_t *block = s->host->memory(s->run, ((size_t)n + 2) * sizeof(uint32_t)), *by_place = NULL;
-	if (!key || !from || !work || !block) return QUERN_E_MEMORY;
+	/* forces have their rows there, in every step: what is gone before threads work takes no room beside them */
+	uint64_t *key = s->host->scratch(s->run, 0,
+		((size_t)n + 2) * (sizeof(uint64_t) + sizeof(int32_t) + sizeof(uint32_t)) + quern_sort_bytes(n));
+	if (!key) return QUERN_E_MEMORY;
+	int32_t *from = (int32_t *)(void *)(key + n + 2);
+	uint32_t *block = (uint32_t *)(void *)(from + n + 2), *by_place = NULL;
+	void *work = block + n + 2;
 	const size_t wanted = l->ops->keys(l->search->self, &l->job, key);
 #ifdef QUERN_PERMUTED_BLOCKS
 	permute_blocks(n, key);
@@ -172,18 +175,21 @@ static void find_pairs(void *arg, uint32_t b, uint32_t worker) {
 	l->found[b] = sort_pairs(l, out, kept, worker) ? kept : UINT32_MAX;
 }
 
+/* Bytes of an index of n entries, and of where those of the new list, as many as `made`, come from. */
+static size_t index_bytes(const listing *l, uint32_t n, uint32_t made) {
+	return ((size_t)l->job.n + 2 + n + made) * sizeof(int32_t) + sizeof(int32_t);
+}
+
 /* Entries of the old list by their first grain: an entry across blocks stands there twice, with equal contents. */
-static quern_status index_old(listing *l, const char *set, const int32_t *first, uint32_t n_grains) {
-	const quern_step *s = l->s;
-	const uint32_t n = s->host->set(s->run, set).n;
-	uint32_t *bucket = s->host->memory(s->run, ((size_t)n_grains + 2) * sizeof(uint32_t));
-	int32_t *entry = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
-	if (!bucket || !entry) return QUERN_E_MEMORY;
-	quern_bucket(n, first, NULL, n_grains, bucket, entry);
+static void index_old(listing *l, uint32_t n, const int32_t *first, void *memory) {
+	uint32_t *bucket = memory;
+	int32_t *entry = (int32_t *)(void *)(bucket + l->job.n + 2);
+	memset(bucket, 0, ((size_t)l->job.n + 2) * sizeof *bucket);
+	quern_bucket(n, first, NULL, l->job.n, bucket, entry);
 	l->bucket = bucket;
 	l->entry = entry;
 	l->old_first = first;
-	return QUERN_OK;
+	l->list_from = entry + n;
 }
 
 static int32_t old_entry(const listing *l, int32_t first, int32_t second, int32_t feature) {
@@ -194,15 +200,26 @@ static int32_t old_entry(const listing *l, int32_t first, int32_t second, int32_
 	return -1;
 }
 
-static void gather_pairs(void *arg, uint32_t b, uint32_t worker) {
-	listing *l = arg;
-	(void)worker;
+static void trace_pairs(void *arg, uint32_t b, uint32_t worker) {
+	const listing *l = arg;
 	const quern_pair *in = l->pair[b];
-	for (uint32_t i = 0; i < l->found[b]; i++) {
-		const uint32_t to = l->start[b] + i;
-		l->list[to] = in[i];
-		l->list_from[to] = old_entry(l, in[i].first, in[i].second, 0);
-	}
+	(void)worker;
+	for (uint32_t i = 0; i < l->found[b]; i++)
+		l->list_from[l->start[b] + i] = old_entry(l, in[i].first, in[i].second, 0);
+}
+
+static void put_pairs(void *arg, uint32_t b, uint32_t worker) {
+	const listing *l = arg;
+	const quern_pair *in = l->pair[b];
+	int32_t *first = l->s->use[NEAR_FIRST].index + l->start[b],
+			*second = l->s->use[NEAR_SECOND].index + l->start[b];
+	(void)worker;
+	for (uint32_t i = 0; i < l->found[b]; i++) first[i] = in[i].first, second[i] = in[i].second;
+}
+
+static void find_next(void *arg, uint32_t k, uint32_t worker) {
+	const listing *l = arg;
+	find_pairs(arg, l->searched + k, worker);
 }
 
 static void find_again(void *arg, uint32_t k, uint32_t worker) {
@@ -210,43 +227,98 @@ static void find_again(void *arg, uint32_t k, uint32_t worker) {
 	find_pairs(arg, l->again[k], worker);
 }
 
-/* Buffers of the blocks in `again`, or of all if that is NULL, one after the other; `cap` pairs per grain, or as many as were found. */
-static bool give_room(listing *l, const uint32_t *again, uint32_t n, uint32_t cap) {
-	size_t sum = 0;
-	for (uint32_t k = 0; k < n; k++) {
-		const uint32_t b = again ? again[k] : k;
-		l->room[b] = again ? l->found[b] : (l->job.block[b + 1] - l->job.block[b]) * cap;
-		sum += l->room[b];
-	}
-	quern_pair *pair = l->s->host->memory(l->s->run, (sum + 1) * sizeof *pair);
-	for (uint32_t k = 0; k < n && pair; k++) {
-		const uint32_t b = again ? again[k] : k;
-		l->pair[b] = pair;
-		pair += l->room[b];
-	}
-	return pair;
-}
-
 /* Every block has room for a usual number of pairs per grain; one with a large grain among small ones may need many times that, and
  * is searched again. */
+static uint32_t usual_room(const listing *l, uint32_t b) {
+	return (l->job.block[b + 1] - l->job.block[b]) * (l->s->dim == 2 ? 8 : 12);
+}
+
+/* The end of the blocks that are searched together, from `b` on: enough of them for all threads, and few of all, since one buffer serves
+ * them one after the other. */
+static uint32_t end_of_group(const listing *l, uint32_t b) {
+	const uint32_t least = 8192 * l->s->host->workers(l->s->run), share = l->job.n / 16;
+	const uint32_t wanted = share > least ? share : least, begin = l->job.block[b];
+	while (b < l->job.n_blocks && l->job.block[b] - begin < wanted) b++;
+	return b;
+}
+
+/* Pairs of the largest group, were it full. */
+static size_t room_of_groups(const listing *l) {
+	size_t most = 0;
+	for (uint32_t begin = 0, end; begin < l->job.n_blocks; begin = end) {
+		size_t sum = 0;
+		end = end_of_group(l, begin);
+		for (uint32_t b = begin; b < end; b++) sum += usual_room(l, b);
+		most = sum > most ? sum : most;
+	}
+	return most;
+}
+
+static quern_status search_again(listing *l, uint32_t begin, uint32_t end) {
+	const quern_step *s = l->s;
+	uint32_t n = 0;
+	size_t sum = 0;
+	for (uint32_t b = begin; b < end; b++) {
+		if (l->found[b] == UINT32_MAX || l->found[b] <= l->room[b]) continue;
+		l->again[n++] = b;
+		l->room[b] = l->found[b];
+		sum += l->found[b];
+	}
+	quern_pair *pair = n ? s->host->memory(s->run, sum * sizeof *pair) : NULL;
+	if (n && !pair) return QUERN_E_MEMORY;
+	for (uint32_t k = 0; k < n; pair += l->room[l->again[k++]]) l->pair[l->again[k]] = pair;
+	if (n) s->host->parallel(s->run, n, find_again, l);
+	return QUERN_OK;
+}
+
+/* What the blocks have found leaves the buffer, for as much memory as it needs. */
+static quern_status keep_found(
+	listing *l, uint32_t begin, uint32_t end, const quern_pair *buffer, size_t room) {
+	const quern_step *s = l->s;
+	size_t sum = 0;
+	for (uint32_t b = begin; b < end; b++) {
+		if (l->found[b] == UINT32_MAX) return QUERN_E_MEMORY;
+		sum += l->found[b];
+	}
+	quern_pair *to = s->host->memory(s->run, (sum + 1) * sizeof *to);
+	if (!to) return QUERN_E_MEMORY;
+	for (uint32_t b = begin; b < end; b++) {
+		if (l->pair[b] < buffer || l->pair[b] >= buffer + room) continue; /* of one that was searched again */
+		memcpy(to, l->pair[b], l->found[b] * sizeof *to);
+		l->pair[b] = to;
+		to += l->found[b];
+	}
+	return QUERN_OK;
+}
+
+static quern_status search_group(listing *l, uint32_t begin, uint32_t end, quern_pair *buffer, size_t room) {
+	quern_pair *at = buffer;
+	for (uint32_t b = begin; b < end; at += l->room[b++]) {
+		l->room[b] = usual_room(l, b);
+		l->pair[b] = at;
+	}
+	l->searched = begin;
+	l->s->host->parallel(l->s->run, end - begin, find_next, l);
+	const quern_status status = search_again(l, begin, end);
+	return status == QUERN_OK ? keep_found(l, begin, end, buffer, room) : status;
+}
+
 static quern_status search_pairs(listing *l) {
 	const quern_step *s = l->s;
 	const uint32_t n_blocks = l->job.n_blocks;
-	uint32_t n = 0;
+	const size_t room = room_of_groups(l) + 1;
 	l->found = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
 	l->start = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
 	l->room = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
 	l->again = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(uint32_t));
 	l->pair = s->host->memory(s->run, ((size_t)n_blocks + 1) * sizeof(quern_pair *));
-	if (!l->found || !l->start || !l->room || !l->again || !l->pair) return QUERN_E_MEMORY;
-	if (!give_room(l, NULL, n_blocks, s->dim == 2 ? 8 : 12)) return QUERN_E_MEMORY;
-	s->host->parallel(s->run, n_blocks, find_pairs, l);
-	for (uint32_t b = 0; b < n_blocks; b++)
-		if (l->found[b] != UINT32_MAX && l->found[b] > l->room[b]) l->again[n++] = b;
-	if (n && !give_room(l, l->again, n, 0)) return QUERN_E_MEMORY;
-	if (n) s->host->parallel(s->run, n, find_again, l);
-	for (uint32_t b = 0; b < n_blocks; b++)
-		if (l->found[b] == UINT32_MAX) return QUERN_E_MEMORY;
+	quern_pair *buffer = s->host->memory(s->run, room * sizeof *buffer);
+	if (!l->found || !l->start || !l->room || !l->again || !l->pair || !buffer) return QUERN_E_MEMORY;
+	for (uint32_t begin = 0, end; begin < n_blocks; begin = end) {
+		end = end_of_group(l, begin);
+		const quern_status status = search_group(l, begin, end, buffer, room);
+		if (status != QUERN_OK) return status;
+	}
 	for (uint32_t b = 0; b < n_blocks; b++) l->start[b + 1] = l->start[b] + l->found[b];
 	return QUERN_OK;
 }
@@ -255,21 +327,17 @@ static quern_status list_contacts(listing *l) {
 	const quern_step *s = l->s;
 	quern_status status = search_pairs(l);
 	if (status != QUERN_OK) return status;
-	const uint32_t n = l->start[l->job.n_blocks];
-	l->list = s->host->memory(s->run, ((size_t)n + 1) * sizeof(quern_pair));
-	l->list_from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
-	if (!l->list || !l->list_from) return QUERN_E_MEMORY;
-	status = index_old(l, "contact", s->use[NEAR_FIRST].index, l->job.n);
-	if (status != QUERN_OK) return status;
+	const uint32_t n = l->start[l->job.n_blocks], n_old = s->host->set(s->run, "contact").n;
+	void *memory = s->host->scratch(s->run, 0, index_bytes(l, n_old, n));
+	if (!memory) return QUERN_E_MEMORY;
+	index_old(l, n_old, s->use[NEAR_FIRST].index, memory);
 	l->old_second = s->use[NEAR_SECOND].index;
 	l->old_feature = NULL;
-	s->host->parallel(s->run, l->job.n_blocks, gather_pairs, l);
+	s->host->parallel(s->run, l->job.n_blocks, trace_pairs, l);
 	status = s->host->remap(s->run, "contact", n, l->list_from, l->job.n_blocks, l->start);
 	if (status == QUERN_OK) status = s->host->arrange(s->run, "contact", l->by_place);
-	if (status != QUERN_OK) return status;
-	int32_t *first = s->use[NEAR_FIRST].index, *second = s->use[NEAR_SECOND].index;
-	for (uint32_t k = 0; k < n; k++) first[k] = l->list[k].first, second[k] = l->list[k].second;
-	return QUERN_OK;
+	if (status == QUERN_OK) s->host->parallel(s->run, l->job.n_blocks, put_pairs, l);
+	return status;
 }
 
 /* ---- grains near bodies ---- */
@@ -385,16 +453,16 @@ static quern_status list_touches(listing *l) {
 		l->start[b + 1] = l->start[b] + l->found[b];
 	}
 	const uint32_t n = l->start[l->job.n_blocks];
+	const uint32_t n_old = s->host->set(s->run, "touch").n;
+	void *memory = s->host->memory(s->run, index_bytes(l, n_old, n));
 	l->list = s->host->memory(s->run, ((size_t)n + 1) * sizeof(quern_pair));
-	l->list_from = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
 	if (l->d->features) l->list_feature = s->host->memory(s->run, ((size_t)n + 1) * sizeof(int32_t));
-	if (!l->list || !l->list_from || (l->d->features && !l->list_feature)) return QUERN_E_MEMORY;
-	quern_status status = index_old(l, "touch", s->use[NEAR_GRAIN].index, l->job.n);
-	if (status != QUERN_OK) return status;
+	if (!memory || !l->list || (l->d->features && !l->list_feature)) return QUERN_E_MEMORY;
+	index_old(l, n_old, s->use[NEAR_GRAIN].index, memory);
 	l->old_second = s->use[NEAR_BODY].index;
 	l->old_feature = s->use[NEAR_FEATURE].index;
 	s->host->parallel(s->run, l->job.n_blocks, gather_touches, l);
-	status = s->host->remap(s->run, "touch", n, l->list_from, l->job.n_blocks, l->start);
+	quern_status status = s->host->remap(s->run, "touch", n, l->list_from, l->job.n_blocks, l->start);
 	if (status == QUERN_OK) status = s->host->arrange(s->run, "touch", l->by_place);
 	if (status != QUERN_OK) return status;
 	int32_t *grain = s->use[NEAR_GRAIN].index, *body = s->use[NEAR_BODY].index,

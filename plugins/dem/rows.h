@@ -162,11 +162,12 @@ QUERN_USE_ENUM(POUR_USES);
 	X(NEAR_BOX_WIDEST, "total.box_widest", "m", QUERN_UPDATE, QUERN_SCALAR, .when = "boxed")
 QUERN_USE_ENUM(NEAR_USES);
 
-/* Forces of the state as it is: what a look at them takes and what a step does. */
+/* Forces of the state as it is: what a look at them takes and what a step does. Of other grains a block reads packed rows (packed.h), made
+ * before any grain moves, so that these columns need no second copy; where a law asks for one, the old one is read here. */
 #define STATE_USES(X, moves, gives) \
-	X(FORCE_OLD_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS) \
-	X(FORCE_OLD_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OTHERS) \
-	X(FORCE_OLD_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OTHERS | QUERN_OPTIONAL) \
+	X(FORCE_OLD_POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(FORCE_OLD_VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(FORCE_OLD_SPIN, "grain.spin", "rad/s", QUERN_READ, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
 	X(FORCE_POSITION, "grain.position", "m", moves, QUERN_VECTOR) \
 	X(FORCE_VELOCITY, "grain.velocity", "m/s", moves, QUERN_VECTOR) \
 	X(FORCE_SPIN, "grain.spin", "rad/s", moves, QUERN_AXIAL, .flags = QUERN_OPTIONAL) \
