@@ -183,7 +183,7 @@ static const quern_slot slots[] = {
 	{ .name = "integrator",
 		.kind = &quern_integrator_kind,
 		.doc = "the step in time",
-		.def = "symplectic_euler",
+		.def = "position_verlet",
 		.stage = { "dem.forces", "dem.open" } },
 	{ .name = "bodies", .kind = &quern_body_kind, .list = 1, .stage = { "dem.forces" }, .same_as = "bodies" },
 	{ .name = "fill.packer",

@@ -33,7 +33,7 @@ static quern_run *open_scene(uint32_t dim, bool floor, double stiffness, double 
 	return harness_open(1,
 		"{quern: 1, dimension: %u, gravity: [0, %g%s], domain: {lower: [0, -1%s], upper: [%g, 99%s]},\n"
 		"time: {end: 10}, output: {every: 0.1}, bodies: [%s],\n"
-		"grains: {material: {density: %g, radius: {mean: %g}}, contact: {linear: {stiffness: %.17g}}, %s\n"
+		"grains: {material: {density: %g, radius: {mean: %g}}, contact: {linear: {stiffness: %.17g}}, step: 0.02, %s\n"
 		"  place: [%s{position: [0.1, %.17g%s], velocity: [0, %g%s]}]}}\n",
 		dim, -gravity, dim == 3 ? ", 0" : "", dim == 3 ? ", 0" : "", width, dim == 3 ? ", 0.2" : "", body,
 		density, radius, stiffness, more, fixed, y, dim == 3 ? ", 0.1" : "", -speed, dim == 3 ? ", 0" : "");

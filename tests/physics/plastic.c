@@ -43,7 +43,7 @@ static quern_run *open_scene(const collision *c, int n, const char *step, double
 		c->restitution, c->rolls);
 	if (c->rolls) text_add(&t, ", {rolling: {stiffness: %.17g}}", 0.1 * stiffness);
 	text_add(&t, "],\n");
-	text_add(&t, "  integrator: %s,\n  place: [\n", c->integrator);
+	text_add(&t, "  integrator: %s,\n  step: 0.02,\n  place: [\n", c->integrator);
 	for (int k = 0; k < n; k++) {
 		const double gap = (2 + (double)k / n) * dt * c->speed, y = 0.08 * k,
 					 share = c->with == WALL ? 1 : 0.5;

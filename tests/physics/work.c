@@ -50,6 +50,8 @@ static quern_run *open_scene(const heap *h) {
 	const double tension = h->dim == 2 ? 120 : 0.1;
 	snprintf(words, sizeof words, laws[h->by], h->by == HERTZ ? young(h->dim) : stiffness(h->dim), tension);
 	const double top = h->height + 0.1;
+	/* a bridge that tears is a jump of the force */
+	const char *const finer = h->by == COHESIVE ? ", step: 0.02" : "";
 	if (h->dim == 2)
 		return harness_open(1,
 			"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [2, %.17g]},\n"
@@ -59,10 +61,10 @@ static quern_run *open_scene(const heap *h) {
 			"bodies: [{plane: {point: [0, 0], normal: [0, 1]}}, {plane: {point: [0, 0], normal: [1, 0]}}],\n"
 			"grains: {material: {density: 2500, radius: {mean: 0.005, spread: 0.2, law: uniform}}, overlap: "
 			"{most: 0},\n"
-			"  contact: %s, integrator: %s,\n"
+			"  contact: %s, integrator: %s%s,\n"
 			"  fill: [{region: {box: {lower: [0, 0], upper: [1, 0]}}, fixed: true},\n"
 			"    {region: {box: {lower: [0, 0.01], upper: [%.17g, %.17g]}}}]}}\n",
-			top, h->step, words, integrator_names[h->with], h->width, h->height);
+			top, h->step, words, integrator_names[h->with], finer, h->width, h->height);
 	return harness_open(1,
 		"{quern: 1, dimension: 3, gravity: [0, -9.81, 0], domain: {lower: [0, 0, 0], upper: [2, %.17g, "
 		"0.05]},\n"
@@ -75,10 +77,10 @@ static quern_run *open_scene(const heap *h) {
 		"  {plane: {point: [0, 0, 0.05], normal: [0, 0, -1], contact: {friction: 0}}}],\n"
 		"grains: {material: {density: 2500, radius: {mean: 0.005, spread: 0.2, law: uniform}}, overlap: "
 		"{most: 0},\n"
-		"  contact: %s, integrator: %s,\n"
+		"  contact: %s, integrator: %s%s,\n"
 		"  fill: [{region: {box: {lower: [0, 0, 0.005], upper: [0.6, 0, 0.045]}}, fixed: true},\n"
 		"    {region: {box: {lower: [0, 0.01, 0.005], upper: [%.17g, %.17g, 0.045]}}}]}}\n",
-		top, h->step, words, integrator_names[h->with], h->width, h->height);
+		top, h->step, words, integrator_names[h->with], finer, h->width, h->height);
 }
 
 /* ==== one step ==== */
@@ -344,7 +346,8 @@ static void whole_collapse(void **unused) {
 			const double sum = collapse(&h, by_kind, &grains);
 			snprintf(what, sizeof what, "%s, %s, %uD, %u grains: sum", law_names[h.by],
 				integrator_names[h.with], dim, grains);
-			good &= table_row(what, sum, 0, 0.0005);
+			/* the Verlets take steps twice as long */
+			good &= table_row(what, sum, 0, h.with == EULER || h.by == COHESIVE ? 0.0005 : 0.001);
 			for (int k = 0; k < KINDS; k++) {
 				snprintf(what, sizeof what, "  %s", kinds[k]);
 				table_note(what, by_kind[k]);
