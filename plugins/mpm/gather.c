@@ -2,6 +2,7 @@
 /* gather - nodes to points, chunk by chunk: velocity, position, volume, stress */
 #include "answer.h"
 #include "damp.h"
+#include "strained.h"
 #include <math.h>
 
 /* For a node that says nothing those around it speak, if there are any that hold something. */
@@ -248,6 +249,7 @@ QUERN_INLINE void gather_block(
 	if (last) speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
 	if (last && (w->answers || w->counts)) level_block(w, m, b, dim);
+	if (last && w->strain->means) strain_block(w, m, b, dim);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
@@ -260,6 +262,7 @@ QUERN_INLINE void gather_block(
 		for (uint32_t k = 0; k < n && w->calm.part; k++)
 			calm_note(
 				&w->calm, k, i + k, m->gradient, m->trip.pic, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
+		if (w->strain->apply[dim - 2]) strain_chunk(w, m, b, i, n, dim);
 		move_chunk(w, m, b, i, n, dim);
 		if (w->answers) answer_chunk(w, m, b, i, n, dim);
 		if (w->counts) measure_chunk(w, m, b, i, n, dim);
@@ -267,6 +270,8 @@ QUERN_INLINE void gather_block(
 		press_chunk(w, m, i, n, dim);
 		for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
 			memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
+		for (int k = 0; k < dim * dim && w->strain->apply[dim - 2]; k++)
+			memcpy(m->gradient[k], m->raw[k], n * sizeof(quern_real));
 		finish_chunk(w, m, b, i, n, dim);
 	}
 	if (last && w->calm.part)
@@ -331,6 +336,7 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 		.g = s->host->grid(s->run),
 		.point = points.block,
 		.points = { .mass = s->use[GATHER_MASS].real[0], .weight = s->use[GATHER_WEIGHT].real[0] },
+		.strain = s->slot[SLOT_STRAIN][0].ops,
 		.motion = (const quern_row *)(const void *)s->use[GATHER_MOTION].real[0] };
 	w.trips = (trips) { .s = s,
 		.g = w.g,

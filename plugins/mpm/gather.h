@@ -15,8 +15,9 @@ typedef struct gather_work {
 	const quern_row *motion;
 	trips trips;
 	calm calm;
-	bool answers;         /* volume does, to how full cells are */
-	bool counts;          /* the same of a continuum alone, in this step */
+	bool answers; /* volume does, to how full cells are */
+	bool counts;  /* the same of a continuum alone, in this step */
+	const quern_strain_ops *strain;
 	quern_real full;      /* from there on a cell is crowded */
 	quern_real still;     /* 1/s: sheared much faster, material flows */
 	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
@@ -31,6 +32,9 @@ typedef struct gather_memory {
 	 * are not open */
 	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
 		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
+	/* of what a strain measures: at points, and by cell the mean over what bears, and the volume of that; the gradient as nodes say it */
+	_Alignas(64) quern_real measured[QUERN_STRAIN_MOST][STENCIL], raw[9][STENCIL];
+	quern_real strained[QUERN_STRAIN_MOST][QUERN_BLOCK_CELLS], bearing[QUERN_BLOCK_CELLS];
 	fit_memory fit;                   /* where the transfer asks for it */
 	int32_t cell[STENCIL];            /* of the block, by point of a chunk */
 	quern_real said[QUERN_TILE_MOST]; /* kg/m^3 at the tile's nodes */

@@ -10,6 +10,7 @@
 #include <quern/grid.h>
 #include <quern/material.h>
 #include <quern/shape.h>
+#include <quern/strain.h>
 #include <quern/transfer.h>
 
 typedef struct mpm {
@@ -46,7 +47,7 @@ typedef struct mpm_fill {
 	quern_list above;
 } mpm_fill;
 
-enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_BODIES };
+enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_STRAIN, SLOT_BODIES };
 
 /* Lanes of a node's row (mass, momentum, held, force: in 2-D too the force has the second half) and of its motion
  * (velocity, change, density, grip). */

@@ -133,6 +133,12 @@ static const quern_slot slots[] = { { .name = "source.region",
 		.def = "picflip",
 		.stage = { "mpm.gather" },
 		.particle = "point" },
+	{ .name = "strain",
+		.kind = &quern_strain_kind,
+		.doc = "what of the velocity gradient goes into volume and stress",
+		.def = "plain",
+		.stage = { "mpm.gather" },
+		.particle = "point" },
 	{ .name = "bodies", .kind = &quern_body_kind, .list = 1, .stage = { "mpm.nodes" }, .same_as = "bodies" },
 	{ .name = NULL } };
 

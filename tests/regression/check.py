@@ -47,6 +47,7 @@ def check_templates():
     return stated
 
 
+AVERAGED = "mpm/strain.averaged.c"
 LINEAR, ROLLS, VERLET = "dem/contact.linear.c", "dem/contact.rolling.c", "dem/integrator.velocity_verlet.c"
 FORCE = "b->force[0][i] += f.x;"
 ADD = "static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }"
@@ -132,6 +133,9 @@ BROKEN = [
     ("bends lines", "transfers/transfer.apic.c", [("fit[i] * shift[i] : fit[i]", "0.99 * fit[i] * shift[i] : fit[i]")],
      "linear motion"),
     ("adds a little", "transfers/transfer.xpic.c", [("pic[i] - echo[i]", "pic[i] - echo[i] + 1e-9 * v[i]")], "momentum"),
+    ("swells", AVERAGED, [("part * (mean[i] - own)", "part * (1.001 * mean[i] - own)")], "one gradient for all stays"),
+    ("forgets a part", AVERAGED, [("part * (mean[i] - own)", "part * (0.5 * mean[i] - own)")], "volume of cells"),
+    ("overshoots", AVERAGED, [("part * (mean[i] - own)", "3 * part * (mean[i] - own)")], "gradients do not grow"),
     ("drives nodes", "hybrid/coupling.lumped.c", [("exchange(job);", "exchange(job); job->velocity[0][0] += 1e-3;")],
      "momentum node by node"),
     ("kicks", VERLET, [("nv[i] = v[i] + (a[i] == a[i] ? 0.5 * dt * now : dt * now);\n\t\t\tnx",

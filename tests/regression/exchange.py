@@ -34,6 +34,7 @@ CHANGES = [
     ("coupling", ["hybrid.coupling=lumped"], "coupling.lumped", "coupling.affine"),
     ("shape", ["continuum.shape=linear"], "shape.linear", "shape.gimp"),
     ("shape, of B-splines", ["continuum.shape=bspline"], "shape.bspline", "shape.gimp"),
+    ("strain", ["continuum.strain=averaged"], "strain.averaged", "strain.plain"),
     # a force that acts in two steps has no place in the hybrid's books
     ("integrator, of grains alone", ["model=grains", "grains.integrator=velocity_verlet"], "integrator.velocity_verlet",
      "integrator.symplectic_euler"),

@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 
 QUERN = pathlib.Path(os.environ["QUERN"])
-KINDS = ["contact", "neighbours", "integrator", "body", "material", "shape", "transfer", "coupling", "oracle", "packer",
+KINDS = ["contact", "neighbours", "integrator", "body", "material", "shape", "transfer", "strain", "coupling", "oracle", "packer",
          "observer", "solver", "check"]
 
 HEAD = """
@@ -47,6 +47,7 @@ continuum:
   material: {{mine: {{bulk_modulus: 1e5, density: 1000}}}}
   shape: mine
   transfer: {{mine: {{rate: 10}}}}
+  strain: {{mine: {{part: 0.7}}}}
   fill: {{region: {{box: {region}}}}}
 """,
     "hybrid": """

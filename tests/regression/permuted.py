@@ -69,6 +69,7 @@ SCENES = {
                        "{strain_rate: {rate_change: 40, shear_rate: 20, depth: 5 mm, half_width: 4 mm}}]")]),
     "continuum alone, with a source": ("column", flow.CONTINUUM),
     "continuum alone, holes filled": ("column", [*flow.CONTINUUM, "--set=continuum.resample=5"]),
+    "continuum alone, volume averaged over cells": ("column", [*flow.CONTINUUM, "--set=continuum.strain=averaged"]),
     "a hopper that is filled and runs out": ("hopper", flow.HOPPER),
     "a drum that turns": ("drum", ["--set=model=grains", "--set=time.end=0.05", "--set=output.every=10 ms"]),
     "two materials": ("mixture", ["--set=time.end=0.05"]),

@@ -12,6 +12,7 @@ SCENES = {
     "a column that spreads, drucker_prager": ("column", [*lab.SMALL["column"], *lab.sets(
         model="continuum", time__end="150 ms", output__every="10 ms", continuum__fill="{region: {box: {lower: [0, 0], upper: [0.04, 0.12]}}}",
         continuum__material="{drucker_prager: {bulk_modulus: 1e5, density: 2000, friction: 0.3}}"), FIELDS]),
+    "points whose volume is averaged over cells": ("column", [*flow.CONTINUUM, *lab.sets(continuum__strain="averaged"), FIELDS]),
     "in three dimensions": ("column_3d", [*lab.SMALL["column_3d"], *lab.sets(model="continuum", time__end="120 ms", output__every="10 ms"), FIELDS])}
 
 

@@ -9,7 +9,7 @@ import lab
 INDEX = {"contact.first", "contact.second", "touch.grain", "touch.body", "grain.fixed", 
          "cell.zone", "waiting.draw"}  # four bytes; all the rest has eight
 OF_GRAINS = {"contact", "neighbours", "integrator", "packer"}
-OF_CONTINUUM = {"material", "shape", "transfer"}
+OF_CONTINUUM = {"material", "shape", "transfer", "strain"}
 OF_HYBRID = {"coupling", "oracle"}
 
 
