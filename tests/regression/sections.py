@@ -89,8 +89,8 @@ def friction():
     assert not [f for f in smooth.fields if re.search("spin|slip|torque|turn", f)], sorted(smooth.fields)
     assert smooth.components("grain.position") == smooth.components("grain.velocity") == 2
     assert max(field["components"] for field in smooth.fields.values()) == 2
-    # twice position and velocity, the last acceleration, the place at the last list, radius, mass, id; two indices
-    assert smooth.bytes("grain") == (2 * 4 + 2 + 2 + 3) * 8 and smooth.bytes("contact") == 8
+    # position and velocity, the last acceleration, the place at the last list, radius, mass, id; two indices
+    assert smooth.bytes("grain") == (4 + 2 + 2 + 3) * 8 and smooth.bytes("contact") == 8
     print(f"2-D grains: with friction {rough.bytes('grain')} and {rough.bytes('contact')} bytes each grain and contact, "
           f"without {smooth.bytes('grain')} and {smooth.bytes('contact')}")
     solid = Scene("column_3d", *lab.SMALL["column_3d"], "--set=model=grains", "--set=output.fields=[grain.velocity]")
