@@ -55,7 +55,7 @@ static const quern_param pair_rows[] = {
 		.rows = word_rows, .item_size = sizeof(dem_word), .flags = QUERN_REQUIRED),
 	QUERN_END_PARAMS
 };
-static const quern_param source_rows[] = { SOURCE_KEYS(100), BLEND_ROWS(dem_source), QUERN_END_PARAMS };
+static const quern_param source_rows[] = { SOURCE_KEYS(50), BLEND_ROWS(dem_source), QUERN_END_PARAMS };
 static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .unless = "materials"),
 	QUERN_PARAM(dem, materials, NULL,
 		"Several materials, by name: {sand: {density: ..., radius: ...}, ...}. The first stands for all "

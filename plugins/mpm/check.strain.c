@@ -23,6 +23,8 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 
 static bool has(const quern_check *c, uint32_t variant, uint32_t dim) {
 	const quern_strain_ops *ops = c->ops;
+	/* the solver refuses one with more means than there is room for, or with means and nothing that measures */
+	if (ops->means > QUERN_STRAIN_MOST || (ops->means > 0 && !ops->measure[dim - 2])) return false;
 	return variant == MEASURE ? ops->means > 0 : ops->apply[dim - 2] != NULL;
 }
 

@@ -364,6 +364,11 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 			"grains and continuum do not feel each other without a section hybrid; add it, or keep one of "
 			"them "
 			"with 'model: grains' or 'model: continuum'");
+	const quern_strain_ops *strain = slot[SLOT_STRAIN]->ops;
+	if (strain->means > QUERN_STRAIN_MOST || (strain->means > 0 && !strain->measure[setup->dim - 2]))
+		return setup->host->fail(err, QUERN_E_PARAM, "strain",
+			"%s asks for %u means, of at most %d, and must measure them", slot[SLOT_STRAIN]->id,
+			strain->means, QUERN_STRAIN_MOST);
 	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE],
 					  *transfer = slot[SLOT_TRANSFER];
 	p->matrix = ((const quern_transfer_ops *)transfer->ops)->affine != 0;

@@ -60,8 +60,8 @@ static quern_run *open_scene(const bounce *c, int n, const char *step, double dt
 		"time: {end: 1, step: %s}, output: {every: 1, fields: [total.kinetic]}, observe: [energy],\n", step);
 	if (c->with == WALL)
 		text_add(&t, "bodies: [{plane: {point: [0, 0%s], normal: [-1, 0%s]}}],\n", more, more);
-	text_add(&t, "grains: {material: {density: 2500, radius: {mean: %g}}, integrator: %s,\n", radius,
-		c->integrator);
+	text_add(&t, "grains: {material: {density: 2500, radius: {mean: %g}}, integrator: %s, step: 0.02,\n",
+		radius, c->integrator);
 	text_add(
 		&t, "  contact: [{linear: {stiffness: %g, restitution: 1, friction: 0}},\n", c->dim == 2 ? 1e5 : 1e3);
 	text_add(&t, "    {cohesive: {surface_tension: %.17g, liquid: %g, angle: %g}}],\n  place: [\n",

@@ -30,6 +30,7 @@ static quern_run *open_scene(uint32_t dim, bool floor, double stiffness, double 
 	else
 		snprintf(body, sizeof body, "{plane: {point: [0, 0%s], normal: [0, 1%s]}}", dim == 3 ? ", 0" : "",
 			dim == 3 ? ", 0" : "");
+	/* soft as these are, a longer step would end at a move of a radius before anybody looks how deep they lie */
 	return harness_open(1,
 		"{quern: 1, dimension: %u, gravity: [0, %g%s], domain: {lower: [0, -1%s], upper: [%g, 99%s]},\n"
 		"time: {end: 10}, output: {every: 0.1}, bodies: [%s],\n"

@@ -37,8 +37,8 @@ CHANGES = [
     ("strain", ["continuum.strain=averaged"], "strain.averaged", "strain.plain"),
     # a force that acts in two steps has no place in the hybrid's books
     ("integrator, of grains alone", ["model=grains", "grains.integrator=velocity_verlet"], "integrator.velocity_verlet",
-     "integrator.symplectic_euler"),
-    ("integrator", ["grains.integrator=position_verlet"], "integrator.position_verlet", "integrator.symplectic_euler"),
+     "integrator.position_verlet"),
+    ("integrator", ["grains.integrator=symplectic_euler"], "integrator.symplectic_euler", "integrator.position_verlet"),
     ("neighbours, of grains alone", ["model=grains", "grains.neighbours=all_pairs"], "neighbours.all_pairs",
      "neighbours.cells"),
     ("a hierarchical grid as neighbours, of grains alone", ["model=grains", "grains.neighbours=hgrid"], "neighbours.hgrid",

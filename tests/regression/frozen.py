@@ -59,7 +59,7 @@ class Host:
 
 def grains(host):
     """A law with history, a floor, an observer: two grains swap their velocities, and one rests on the floor."""
-    folder = host.run("two_grains", "--set=grains.contact=frozen", "--set=observe=frozen")
+    folder = host.run("two_grains", "--set=grains.contact=frozen", "--set=observe=frozen", "--set=grains.step=0.02")
     velocity = values(folder, 20, "grains/velocity")[:, 0]
     assert numpy.allclose(sorted(velocity), [-1, 1], atol=1e-3), velocity
     age = max(values(folder, k, "contacts/age").max(initial=0) for k in range(21))

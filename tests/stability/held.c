@@ -29,6 +29,7 @@ held held_open(double width, double height, int substeps, const char *packer, in
 		"quern: 1\ndimension: 2\nseed: %d\ngravity: [0, -9.81]\n"
 		"domain: {lower: [0, 0], upper: [%g, 0.2]}\ntime: {end: 1000}\noutput: {every: 1000}\n"
 		"grains:\n  material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}}\n"
+		"  integrator: symplectic_euler\n" /* of which the limits here were measured */
 		"  contact: {linear: {stiffness: 1e6, restitution: 0.5, friction: 0.4}}\n"
 		"  fill:\n    - {region: {box: {lower: [0, -0.7 mm], upper: [%g, -0.7 mm]}}, fixed: true}\n"
 		"    - {region: {box: {lower: [0.001, 0.001], upper: [%g, %g]}}, settle: true}\n"
@@ -39,7 +40,7 @@ held held_open(double width, double height, int substeps, const char *packer, in
 		"2500, "
 		"critical_density: 1975}}\n"
 		"hybrid:\n  oracle: [{packing_fraction: {depth: 14 mm, half_width: 4 mm}}]\n"
-		"  substeps: %d\n  packer: %s\n",
+		"  substeps: %d\n  packer: %s\n  update: 400\n  growth: 7000\n",
 		seed, width, width, width - 0.001, height, width, substeps, packer);
 	harness_settle(h.run);
 	h.weight = quern_run_carries(h.run, "mass") * gravity;

@@ -46,6 +46,7 @@ static void text_of(const column *c, char *out, size_t size) {
 		"quern: 1\ndimension: 2\nseed: %d\ngravity: [0, -9.81]\n"
 		"domain: {lower: [0, 0], upper: [%g, %.17g]}\ntime: {end: 1000}\noutput: {every: 1000}\n"
 		"grains:\n  material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}}\n"
+		"  integrator: symplectic_euler\n" /* its step is the unit of updates and growth here */
 		"  contact: {linear: {stiffness: 1e6, restitution: 0.5, friction: 0.4}}\n"
 		"  fill:\n    - {region: {box: {lower: [0, -0.7 mm], upper: [%g, -0.7 mm]}}, fixed: true}\n"
 		"    - {region: {box: {lower: [0.001, 0.001], upper: [%g, %g]}}, settle: true}\n%s"
@@ -53,7 +54,7 @@ static void text_of(const column *c, char *out, size_t size) {
 		"  - plane: {point: [0, 0], normal: [1, 0], contact: {friction: 0}}\n"
 		"  - plane: {point: [%g, 0], normal: [-1, 0], contact: {friction: 0}}\n"
 		"continuum:\n  cell: %.17g\n  material: {mu_i: {bulk_modulus: %g, critical_density: %g}}\n"
-		"hybrid:\n  oracle: [{packing_fraction: {depth: %g, half_width: %g}}]\n  substeps: 20\n%s",
+		"hybrid:\n  oracle: [{packing_fraction: {depth: %g, half_width: %g}}]\n  substeps: 20\n  update: 400\n%s",
 		c->seed ? c->seed : 7, width, floor(0.2 / cell) * cell, width, width - 0.001, height,
 		c->grains ? c->grains : "", width, cell, else_of(c->bulk, 3e5), else_of(c->packed, 1975),
 		else_of(c->depth, 0.014), else_of(c->half_width, 4e-3), c->hybrid ? c->hybrid : "");
@@ -308,11 +309,11 @@ static void hundred_steps(void) {
 }
 
 static void growth_in_a_jam(void **state) {
-	static const column of[] = { { "7000 steps", .jump = 0.02, .brief = true },
+	static const column of[] = { { "7000 steps", .jump = 0.02, .hybrid = "  growth: 7000\n", .brief = true },
 		{ "700", .jump = 0.02, .hybrid = "  growth: 700\n" },
 		{ "1", .jump = 0.02, .hybrid = "  growth: 1\n" },
 		{ "none grows", .jump = 0.02, .hybrid = "  growth: 0\n" },
-		{ "7000, packer expand", .jump = 0.02, .hybrid = "  packer: expand\n" },
+		{ "7000, packer expand", .jump = 0.02, .hybrid = "  packer: expand\n  growth: 7000\n" },
 		{ "1, packer expand", .jump = 0.02, .hybrid = "  packer: expand\n  growth: 1\n" } };
 	(void)state;
 	head(
@@ -347,13 +348,14 @@ static void fast_flow(void **state) {
 			"quern: 1\ndimension: 2\nseed: 7\ngravity: [0, 0]\n"
 			"domain: {lower: [0, 0], upper: [0.16, 0.08], periodic: [true, false]}\ntime: {end: 1000}\noutput: {every: 1000}\n"
 			"grains:\n  material: {density: 2500, radius: {mean: 1 mm, spread: 10 %%}}\n"
+			"  integrator: symplectic_euler\n"
 			"  contact: {linear: {stiffness: 1e6, restitution: 0.5, friction: 0.4}}\n"
 			"  fill: {region: {box: {lower: [0, 0.02], upper: [0.16, 0.06]}}, velocity: [%g, 0]}\n"
 			"continuum:\n  cell: 4 mm\n  material: {mu_i: {bulk_modulus: 3e5, critical_density: 2075}}\n"
 			"hybrid:\n  oracle: [{fixed: {otherwise: discrete, boxes: [{lower: [0, 0], upper: [0.04, 0.08], zone: discrete}, "
 			"{lower: [0.04, 0], upper: [0.05, 0.08], zone: hybrid}, {lower: [0.05, 0], upper: [0.11, 0.08], zone: continuum}, "
 			"{lower: [0.11, 0], upper: [0.12, 0.08], zone: hybrid}, {lower: [0.12, 0], upper: [0.16, 0.08], zone: discrete}]}}]\n"
-			"  substeps: 20\n",
+			"  substeps: 20\n  update: 400\n",
 			speed[k]);
 		quern_run *run = open_text(text, &o);
 		if (!run) fail_msg("%s", o.said);
