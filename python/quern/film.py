@@ -17,13 +17,14 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NoReturn
 
 import numpy
 
 from .program import QuernError, call, sentence_of
 
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 FORMS = (".mp4", ".webm", ".gif", ".png")
 USUAL = 0.95  # of the frames have all their values within the range of colours: one that bursts must not take them all
 
@@ -105,12 +106,42 @@ def draw(folder: pathlib.Path, frames: list[int], place: pathlib.Path, given: ar
     """A picture for each frame, called by its place in the film, drawn on all cores."""
     wishes = ["--chains"] * given.chains
     wishes += [f"--{name}={value}" for name in ("field", "vectors") if (value := getattr(given, name))]
-    with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as workers, stopping(workers):
-        measures = list(workers.map(lambda k: json.loads(render(folder, k, [*wishes, "--measure"])), frames))
+    with noting_signals() as came, concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as workers, stopping(workers):
+        measures = each(workers, came, lambda k: json.loads(render(folder, k, [*wishes, "--measure"])), frames)
         fixed = joined(measures) + [f"--{name}={value}" for name in ("view", "range") if (value := getattr(given, name))]
         fixed = [*wishes, *fixed, "--width", str(given.width)]
         names = [str(place / f"{k:06d}.png") for k in range(len(frames))]
-        list(workers.map(lambda k, name: render(folder, k, [*fixed, "-o", name]), frames, names))
+        each(workers, came, lambda k, name: render(folder, k, [*fixed, "-o", name]), frames, names)
+
+
+def each(workers: concurrent.futures.Executor, came: list[int], work: Callable, *items: list) -> list:
+    """What the work gives for each, in their order; looks ten times a second whether a signal has come."""
+    futures = [workers.submit(work, *one) for one in zip(*items)]
+    waiting = set(futures)
+    while waiting and not came:
+        done, waiting = concurrent.futures.wait(waiting, timeout=0.1, return_when=concurrent.futures.FIRST_EXCEPTION)
+        if any(one.exception() for one in done):
+            break
+    if came:
+        raise KeyboardInterrupt
+    return [one.result() for one in futures]
+
+
+@contextlib.contextmanager
+def noting_signals() -> Iterator[list[int]]:
+    """Signals that would interrupt are noted: an exception amid a lock of the threads would leave it open or shut for ever."""
+    came: list[int] = []
+    before = {number: signal.getsignal(number) for number in STOPS}
+    before = {number: handler for number, handler in before.items() if callable(handler)}  # others are ignored, as under nohup
+    for number in before:
+        signal.signal(number, lambda which, _: came.append(which))
+    try:
+        yield came
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if came:
+        raise KeyboardInterrupt
 
 
 @contextlib.contextmanager
@@ -204,7 +235,7 @@ def interrupt(*_) -> NoReturn:
 
 def main(words: list[str] | None = None) -> int:
     given = arguments(words)
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in STOPS[1:]:
         if signal.getsignal(number) != signal.SIG_IGN:  # as under nohup
             signal.signal(number, interrupt)
     try:
