@@ -41,6 +41,8 @@ typedef struct quern_contact_batch {
 	 * evaluation, which is the way by which springs are stretched, and no other column may be taken for it: an integrator
 	 * evaluates dashpots at the step's end (docs/theory/grains.md, section 3). With `means` 1 `turn` is such a mean too. */
 	const quern_real *mean_velocity[3], *mean_spin[3];
+	quern_real
+		lag; /* s^2: `velocity` lacks so much of its own second derivative, see quern_dashpot_share; 0: of nothing */
 } quern_contact_batch;
 
 typedef struct quern_contact_ops {
@@ -104,6 +106,13 @@ QUERN_INLINE quern_onset quern_first_touch(
 	const quern_real first = steps < 1 ? steps : 1, second = steps > 1 ? steps - 1 : 0;
 	const quern_real in = 8 * first < 1 ? 8 * first : 1, out = 8 * second < 1 ? 8 * second : 1;
 	return QUERN_VALUE(quern_onset, first * dt, 0.5 * in + one_over * first + (1 - (0.5 + one_over)) * out);
+}
+
+/* A velocity that the last acceleration predicts lacks `lag` times its second derivative (quern_contact_batch), which a spring of
+ * `stiffness` on `mass` makes -stiffness/mass times the velocity itself: so the dashpot of that spring sees too much of it, and takes
+ * its share m/(m + lag k) of the coefficient; 1 exactly where nothing lags. docs/theory/contacts.md, section 1 */
+QUERN_INLINE quern_real quern_dashpot_share(quern_real stiffness, quern_real mass, quern_real lag) {
+	return mass / (mass + lag * stiffness);
 }
 
 /* What the Coulomb cone leaves of an elastic force a and a dashpot's b: spring a + damper b, of size cap at most. */

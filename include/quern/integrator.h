@@ -41,6 +41,9 @@ typedef struct quern_integrator_ops {
 	quern_real damping;
 	/* Recommended step over half the shortest period of a contact, at most 0.1; 0 counts as 0.02. docs/theory/grains.md, section 2 */
 	quern_real step;
+	/* Of the second derivative of a velocity, in dt^2, by which that of `predict` is late: 1/2 where the last acceleration predicts it;
+	 * laws weaken their dashpots by it (quern_dashpot_share) */
+	quern_real lag;
 } quern_integrator_ops;
 
 /* After which share of the step forces are evaluated; below 1, all of their impulse is given in that step. */

@@ -40,11 +40,15 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
+/* Grains that roll as they are pushed along make a tangential spring act on m/3 (discs) or m/3.5 (spheres). */
+QUERN_INLINE quern_real turning_of(uint32_t dim) { return dim == 2 ? 3 : 3.5; }
+
 QUERN_INLINE void kernel(
 	const int dim, const bool rough, const bool energy, const hertz *self, const quern_contact_batch *b) {
 	const hertz law = *self;
 	const quern_real dt = b->dt, normal_loss = 2.2360679774997898 * law.damping_ratio; /* sqrt 5 zeta */
 	const quern_real tangential_loss = 1.8257418583505537 * law.damping_ratio;         /* 2 sqrt(5/6) zeta */
+	const quern_real turning = turning_of((uint32_t)dim), lag = b->lag;
 	const quern_real *restrict overlap = b->overlap, *restrict mass = b->mass, *restrict radius = b->radius;
 	quern_real *const *history = rough ? b->use[SHEAR].real : NULL;
 	QUERN_SIMD
@@ -58,7 +62,8 @@ QUERN_INLINE void kernel(
 		const quern_real r = __builtin_sqrt(radius[i]), k = 4.0 / 3 * law.modulus * r, elastic = k * d * root;
 		const quern_onset onset = quern_first_touch(overlap[i], -mean_n, dt, 0.25);
 		/* f_n = max(0, k d^(3/2) - sqrt 5 zeta sqrt(m k) d^(1/4) v_n) */
-		const quern_real damping = normal_loss * __builtin_sqrt(mass[i] * k * root) * onset.weight;
+		const quern_real damping = normal_loss * __builtin_sqrt(mass[i] * k * root) * onset.weight *
+								   quern_dashpot_share(1.5 * k * root, mass[i], lag);
 		const quern_real pushed = elastic - damping * vn, fn = pushed > 0 ? pushed : 0;
 		quern_vec f = quern_vec_scale(fn, n), viscous = quern_vec_scale(fn - elastic, n);
 		quern_real sheared = 0, rubbed = 0;
@@ -71,7 +76,8 @@ QUERN_INLINE void kernel(
 			const quern_real one_over = kt > 0 ? 1 / (kt > 0 ? kt : 1) : 0;
 			const quern_real shrink = kt < kt_before ? kt / (kt_before > 0 ? kt_before : 1) : 1;
 			const quern_real stiffness = 0.5 * (kt + kt_before);
-			const quern_real loss = tangential_loss * __builtin_sqrt(kt * mass[i]) * onset.weight;
+			const quern_real loss = tangential_loss * __builtin_sqrt(kt * mass[i]) * onset.weight *
+									quern_dashpot_share(turning * kt, mass[i], lag);
 			quern_vec was, now, drag;
 			if (dim == 3) {
 				const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3),
@@ -124,7 +130,7 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 	const hertz *law = self;
 	const quern_real contact =
 		2.8683 * quern_pow(mass * mass / (radius * law->modulus * law->modulus * law->impact_speed), 0.2);
-	const quern_real turning = law->friction > 0 ? (dim == 2 ? 3 : 3.5) * 4 * law->shear / law->modulus : 0;
+	const quern_real turning = law->friction > 0 ? turning_of(dim) * 4 * law->shear / law->modulus : 0;
 	return contact / __builtin_sqrt(turning > 1 ? turning : 1);
 }
 
@@ -133,7 +139,7 @@ static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_
 static quern_real damping(const void *self, uint32_t dim) {
 	const hertz *law = self;
 	const quern_real share = 0.91287092917527686 * law->damping_ratio; /* sqrt(5/6) */
-	return share * (law->friction > 0 ? __builtin_sqrt(dim == 2 ? 3 : 3.5) : 1);
+	return share * (law->friction > 0 ? __builtin_sqrt(turning_of(dim)) : 1);
 }
 
 /* dF/dd of F = k d^(3/2) at F = at_force: (3/2) k^(2/3) F^(1/3) */

@@ -43,11 +43,15 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
+/* Grains that roll as they are pushed along make a tangential spring act on m/3 (discs) or m/3.5 (spheres). */
+QUERN_INLINE quern_real turning_of(uint32_t dim) { return dim == 2 ? 3 : 3.5; }
+
 /* `dim`, `rough` and `energy` are constants in every caller, so dead branches vanish and names stay in the debugger. */
 QUERN_INLINE void kernel(
 	const int dim, const bool rough, const bool energy, const linear *self, const quern_contact_batch *b) {
 	const linear law = *self;
 	const quern_real dt = b->dt, kn = law.stiffness, kt = law.tangential_stiffness * kn, one_over_kt = 1 / kt;
+	const quern_real lag = b->lag, tangential = law.tangential_damping, turning = turning_of((uint32_t)dim);
 	const quern_real *restrict overlap = b->overlap, *restrict mass = b->mass;
 	quern_real *const *slip = rough ? b->use[SLIP].real : NULL;
 	QUERN_SIMD
@@ -57,7 +61,9 @@ QUERN_INLINE void kernel(
 		const quern_real d = overlap[i], vn = quern_vec_dot(v, n, dim), mean_n = quern_vec_dot(mean, n, dim);
 		const bool touching = d > 0;
 		const quern_onset onset = quern_first_touch(d, -mean_n, dt, 0);
-		const quern_real damping = law.loss * __builtin_sqrt(kn * mass[i]) * onset.weight;
+		const quern_real loss = law.loss * __builtin_sqrt(kn * mass[i]) * onset.weight,
+						 damping = loss * quern_dashpot_share(kn, mass[i], lag),
+						 shear_damping = tangential * loss * quern_dashpot_share(turning * kt, mass[i], lag);
 		/* f_n = max(0, k_n d - gamma_n v_n) */
 		const quern_real pushed = kn * d - damping * vn, fn = (touching & (pushed > 0)) ? pushed : 0;
 		quern_vec f = quern_vec_scale(fn, n), viscous = quern_vec_scale(fn - (touching ? kn * d : 0), n);
@@ -68,8 +74,7 @@ QUERN_INLINE void kernel(
 			const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { slip[0][i], slip[1][i], slip[2][i] };
 			const quern_vec was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
 			const quern_vec trial = quern_vec_axpy(onset.time, mean_t, was);
-			const quern_vec a = quern_vec_scale(kt, trial),
-							g = quern_vec_scale(law.tangential_damping * damping, vt);
+			const quern_vec a = quern_vec_scale(kt, trial), g = quern_vec_scale(shear_damping, vt);
 			const quern_cone cone = quern_cone_shares(a, g, law.friction * fn);
 			const quern_vec now = quern_vec_scale(touching ? cone.spring : 0, trial);
 			const quern_vec drag = quern_vec_scale(touching ? cone.damper : 0, g);
@@ -84,8 +89,8 @@ QUERN_INLINE void kernel(
 			const quern_real vt = n.x * v.y - n.y * v.x, was = slip[0][i];
 			const quern_real trial = was + onset.time * (n.x * mean.y - n.y * mean.x);
 			quern_real spring;
-			const quern_real total = quern_cone_planar(
-				kt * trial, law.tangential_damping * damping * vt, law.friction * fn, &spring);
+			const quern_real total =
+				quern_cone_planar(kt * trial, shear_damping * vt, law.friction * fn, &spring);
 			const quern_real now = touching ? spring * one_over_kt : 0, ft = touching ? total : 0;
 			slip[0][i] = now;
 			f.x += ft * n.y;
@@ -120,19 +125,19 @@ QUERN_INLINE void force(const int dim, const void *self, const quern_contact_bat
 static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }
 static void force_3d(const void *self, const quern_contact_batch *b) { force(3, self, b); }
 
-/* pi/omega of the stiffest mode; rotation makes a tangential spring act on m/3 (discs) or m/3.5 (spheres). */
+/* pi/omega of the stiffest mode */
 static quern_real period(const void *self, uint32_t dim, quern_real mass, quern_real radius) {
 	const linear *law = self;
 	(void)radius;
-	const quern_real turning = law->friction > 0 ? (dim == 2 ? 3 : 3.5) * law->tangential_stiffness : 0;
+	const quern_real turning = law->friction > 0 ? turning_of(dim) * law->tangential_stiffness : 0;
 	return 3.14159265358979312 * __builtin_sqrt(mass / (law->stiffness * (turning > 1 ? turning : 1)));
 }
 
-/* Of the normal mode, and of the tangential one, whose spring and dashpot act on m/3 or m/3.5. */
+/* Of the normal mode, and of the tangential one. */
 static quern_real damping(const void *self, uint32_t dim) {
 	const linear *law = self;
-	const quern_real turning = dim == 2 ? 3 : 3.5,
-					 share = law->tangential_damping * __builtin_sqrt(turning / law->tangential_stiffness);
+	const quern_real share =
+		law->tangential_damping * __builtin_sqrt(turning_of(dim) / law->tangential_stiffness);
 	return 0.5 * law->loss * (law->friction > 0 && share > 1 ? share : 1);
 }
 

@@ -64,8 +64,9 @@ static const quern_integrator_ops ops = { .size = sizeof ops,
 	.open = { open_2d, open_3d },
 	.predict = { predict_2d, predict_3d },
 	.damping = 2,
+	.lag = 0.5,
 	.at = 0.5,
-	.step = 0.04 };
+	.step = 0.05 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,

@@ -130,7 +130,9 @@ static void give_means(const forces_work *w, bool asks, quern_contact_batch *b) 
 
 void quern_dem_call_laws(const forces_shared *sh, forces_work *w, const contact_chunk *c) {
 	quern_column use[QUERN_MOST_USES], use_second[QUERN_MOST_USES];
+	const quern_integrator_ops *integrator = dem_integrator(sh->s)->ops;
 	quern_contact_batch b = batch_of(sh, w, c->n);
+	b.lag = sh->predicts ? integrator->lag * sh->s->dt * sh->s->dt : 0;
 	law_row *rows = w->rows;
 	b.use = use;
 	b.use_second = use_second;
