@@ -227,22 +227,6 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 		   sh->farthest && sh->ways && sh->turned;
 }
 
-/* Half of how far two grains can have come nearer: half the diagonal of the box in which all ways lie. Grains that flow together have
- * come far, and no nearer. */
-static quern_real nearer_by_half(const forces_shared *sh, uint32_t n_blocks) {
-	quern_real square = 0;
-	for (uint32_t k = 0; k < sh->s->dim; k++) {
-		quern_real least = sh->ways[0].along[k][0], most = sh->ways[0].along[k][1];
-		for (uint32_t b = 1; b < n_blocks; b++) {
-			const quern_real *range = sh->ways[b].along[k];
-			least = range[0] < least ? range[0] : least;
-			most = range[1] > most ? range[1] : most;
-		}
-		square += (most - least) * (most - least);
-	}
-	return 0.5 * sqrt(square);
-}
-
 /* How far bodies have come at most since the last list: at the speed at the beginning of the step or at its end. */
 static quern_real sweep(const forces_shared *sh) {
 	const quern_step *s = sh->s;
@@ -251,18 +235,6 @@ static quern_real sweep(const forces_shared *sh) {
 	const quern_real now = s->time + (quern_real)s->within * s->dt;
 	*swept += quern_bodies_speed(s, SLOT_BODIES, now - s->dt, now + 2 * s->dt) * s->dt;
 	return *swept;
-}
-
-/* A list holds while neither two grains, nor a grain and a body, have used up the skin. Where a coupling moves grains as well, and says
- * how far from where the list was made, or where ways are those beside a box's own flow, only such ways count. */
-static quern_real used_of_skin(const forces_shared *sh, uint32_t n_blocks, quern_real farthest) {
-	const bool alone = !sh->use[FORCE_WEIGHT].real[0] && !sh->use[FORCE_LENT].real[0] && !sh->boxed;
-	bool wraps =
-		false; /* grains are brought back as a list is made, and nobody shall see them far outside of a periodic domain */
-	for (uint32_t k = 0; k < sh->s->dim; k++) wraps = wraps || sh->s->periodic[k];
-	const quern_real swept = sweep(sh), least = wraps ? 0.25 * farthest : 0,
-					 pair = alone ? fmin(farthest, fmax(least, nearer_by_half(sh, n_blocks))) : farthest;
-	return sh->n_bodies ? fmax(pair, 0.5 * (farthest + swept)) : pair;
 }
 
 /* Blocks in the order of their places, so that sums do not depend on who did what. */
@@ -280,7 +252,9 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 	if (!s->settling)
 		body_books_close(&sh->books_of_bodies, s, n_blocks, sh->by_place, &u[FORCE_IMPULSE], &u[FORCE_TWIST],
 			&u[FORCE_WORK], &u[FORCE_SUPPORT]);
-	*displacement = fmax(*displacement, used_of_skin(sh, n_blocks, farthest));
+	const bool alone = !u[FORCE_WEIGHT].real[0] && !u[FORCE_LENT].real[0] && !sh->boxed;
+	*displacement =
+		fmax(*displacement, quern_dem_used_of_skin(s, sh->ways, n_blocks, farthest, sweep(sh), alone));
 	if (sh->boxed) quern_dem_box_collect(sh, n_blocks);
 	if (u[FORCE_DAMPED].real[0]) u[FORCE_DAMPED].real[0][0] += energy[E_DAMPED];
 	if (u[FORCE_RUBBED].real[0]) u[FORCE_RUBBED].real[0][0] += energy[E_RUBBED];

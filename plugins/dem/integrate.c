@@ -10,37 +10,19 @@ static void fill_up(quern_real *column, uint32_t n) {
 }
 static quern_real sum_up(quern_real *restrict column, uint32_t n) {
 	fill_up(column, n);
-	for (uint32_t half = GRAINS / 2; half; half /= 2)
-		for (uint32_t i = 0; i < half; i++) column[i] += column[i + half];
+	for (uint32_t half = GRAINS / 2; half; half /= 2) {
+		const quern_real *upper = column + half;
+		for (uint32_t i = 0; i < half; i++) column[i] += upper[i];
+	}
 	return column[0];
 }
 static quern_real most_of(quern_real *restrict column, uint32_t n) {
 	fill_up(column, n);
-	for (uint32_t half = GRAINS / 2; half; half /= 2)
-		for (uint32_t i = 0; i < half; i++)
-			column[i] = column[i + half] > column[i] ? column[i + half] : column[i];
-	return column[0];
-}
-
-/* The least and the largest of n numbers, at most GRAINS, of any order. */
-static void range_of(quern_real *restrict column, uint32_t n, quern_real *least, quern_real *most) {
-	enum { LANES = 8 };
-	quern_real low[LANES], high[LANES];
-	for (uint32_t i = n; i % LANES; i++) column[i] = column[0];
-	for (uint32_t k = 0; k < LANES; k++) low[k] = high[k] = column[k];
-	for (uint32_t i = LANES; i < n; i += LANES) {
-		QUERN_SIMD
-		for (uint32_t k = 0; k < LANES; k++) {
-			low[k] = column[i + k] < low[k] ? column[i + k] : low[k];
-			high[k] = column[i + k] > high[k] ? column[i + k] : high[k];
-		}
+	for (uint32_t half = GRAINS / 2; half; half /= 2) {
+		const quern_real *upper = column + half;
+		for (uint32_t i = 0; i < half; i++) column[i] = upper[i] > column[i] ? upper[i] : column[i];
 	}
-	for (uint32_t half = LANES / 2; half; half /= 2)
-		for (uint32_t k = 0; k < half; k++) {
-			low[k] = low[k + half] < low[k] ? low[k + half] : low[k];
-			high[k] = high[k + half] > high[k] ? high[k + half] : high[k];
-		}
-	*least = low[0], *most = high[0];
+	return column[0];
 }
 
 /* The way since the last list and its square; how much of the velocity on the way of this step is kept on that of the next; and 1
@@ -87,7 +69,7 @@ QUERN_INLINE void compare(
 static void spread(const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
 	for (uint32_t k = 0; k < sh->s->dim; k++) {
 		quern_real *range = sh->ways[b].along[k], least, most;
-		range_of(w->grains[G_ALONG + k], n, &least, &most);
+		quern_dem_range(w->grains[G_ALONG + k], n, &least, &most);
 		const bool first = begin == sh->grain[b];
 		range[0] = first || least < range[0] ? least : range[0];
 		range[1] = first || most > range[1] ? most : range[1];
@@ -105,7 +87,7 @@ static void check_grains(
 			(quern_real *const[3]) { to[0] + begin, to[1] + begin, sh->s->dim == 3 ? to[2] + begin : NULL },
 			sh->use[FORCE_ANCHOR].real, w->grains[G_WAY]);
 	}
-	range_of(w->grains[G_LOST], n, &none, &lost);
+	quern_dem_range(w->grains[G_LOST], n, &none, &lost);
 	for (uint32_t i = 0; lost > 0 && i < n && sh->bad[b] < 0; i++)
 		if (w->grains[G_LOST][i] > 0) sh->bad[b] = (int32_t)(begin + i);
 	const quern_real farthest = most_of(w->grains[G_WAY], n);

@@ -11,12 +11,13 @@ typedef struct {
 	const quern_bound *bound;
 	uint32_t n, n_spin;
 	quern_real *farthest; /* by chunk: square of the way since the last list */
+	ways *ways;           /* by chunk */
 	bool boxed;
 	dem_box box;
 } opening;
 
 typedef struct {
-	_Alignas(64) quern_real position[3][CHUNK], velocity[3][CHUNK], spin[3][CHUNK], way[CHUNK];
+	_Alignas(64) quern_real position[3][CHUNK], velocity[3][CHUNK], spin[3][CHUNK], way[CHUNK], along[CHUNK];
 } opened;
 
 /* A column's new numbers, but for grains that are held. */
@@ -36,8 +37,9 @@ static quern_real most_of(quern_real *restrict way, const int32_t *restrict held
 	for (uint32_t i = 0; i < n; i++) way[i] = (held && held[i]) || !(way[i] < INFINITY) ? 0 : way[i];
 	while (n > 1) {
 		const uint32_t half = (n + 1) / 2;
+		const quern_real *restrict upper = way + half;
 		QUERN_SIMD
-		for (uint32_t i = 0; i < n - half; i++) way[i] = way[i + half] > way[i] ? way[i + half] : way[i];
+		for (uint32_t i = 0; i < n - half; i++) way[i] = upper[i] > way[i] ? upper[i] : way[i];
 		n = half;
 	}
 	return way[0];
@@ -52,6 +54,8 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 	quern_column own[QUERN_MOST_USES];
 	if (!w) {
 		o->farthest[chunk] = INFINITY;
+		for (uint32_t k = 0; k < dim; k++)
+			o->ways[chunk].along[k][0] = -INFINITY, o->ways[chunk].along[k][1] = INFINITY;
 		return;
 	}
 	quern_integrator_batch b = { .n = n, .cap = CHUNK, .dt = o->s->dt, .use = own };
@@ -73,11 +77,17 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 	quern_real *restrict way = w->way;
 	memset(way, 0, n * sizeof *way);
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real *restrict x = w->position[k], *restrict from = u[OPEN_ANCHOR].real[k] + begin;
-		QUERN_SIMD
-		for (uint32_t i = 0; i < n; i++) way[i] += (x[i] - from[i]) * (x[i] - from[i]);
+		const quern_real *restrict x = u[OPEN_POSITION].real[k] + begin, *restrict from =
+																			 u[OPEN_ANCHOR].real[k] + begin;
+		quern_real *restrict along = w->along, *range = o->ways[chunk].along[k];
 		keep(u[OPEN_POSITION].real[k] + begin, w->position[k], held, n);
 		keep(u[OPEN_VELOCITY].real[k] + begin, w->velocity[k], held, n);
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			along[i] = x[i] - from[i];
+			way[i] += along[i] * along[i];
+		}
+		quern_dem_range(along, n, &range[0], &range[1]);
 	}
 	if (o->boxed)
 		quern_dem_box_ways(&o->box, &u[OPEN_BOX_LISTED], begin, n,
@@ -95,12 +105,18 @@ quern_status quern_dem_open(const void *self, const quern_step *s) {
 	o.n_spin = s->use[OPEN_SPIN].real[0] ? (s->dim == 3 ? 3 : 1) : 0;
 	const uint32_t chunks = (o.n + CHUNK - 1) / CHUNK;
 	o.farthest = s->host->memory(s->run, chunks * sizeof(quern_real));
-	if (!o.farthest) return QUERN_E_MEMORY;
+	o.ways = s->host->memory(s->run, chunks * sizeof(ways));
+	if (!o.farthest || !o.ways) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, chunks, open_chunk, &o);
-	quern_real *farthest = s->use[OPEN_DISPLACEMENT].real[0];
-	for (uint32_t c = 0; c < chunks; c++) {
-		const quern_real way = sqrt(o.farthest[c]);
-		*farthest = way > *farthest ? way : *farthest;
-	}
+	quern_real farthest = 0, *displacement = s->use[OPEN_DISPLACEMENT].real[0];
+	for (uint32_t c = 0; c < chunks; c++) farthest = fmax(farthest, sqrt(o.farthest[c]));
+	const quern_real now = s->time + (quern_real)s->within * s->dt,
+					 *swept = s->settling ? NULL : s->use[OPEN_SWEPT].real[0];
+	/* bodies are on their way through this step as well, which no sum has yet */
+	const quern_real with_this =
+		swept ? *swept + quern_bodies_speed(s, SLOT_BODIES, now, now + s->dt) * s->dt : 0;
+	const bool alone = !s->use[OPEN_WEIGHT].real[0] && !s->use[OPEN_LENT].real[0] && !o.boxed;
+	*displacement =
+		fmax(*displacement, quern_dem_used_of_skin(s, o.ways, chunks, farthest, with_this, alone));
 	return QUERN_OK;
 }
