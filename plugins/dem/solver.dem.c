@@ -55,7 +55,7 @@ static const quern_param pair_rows[] = {
 		.rows = word_rows, .item_size = sizeof(dem_word), .flags = QUERN_REQUIRED),
 	QUERN_END_PARAMS
 };
-static const quern_param source_rows[] = { SOURCE_KEYS(50), BLEND_ROWS(dem_source), QUERN_END_PARAMS };
+static const quern_param source_rows[] = { SOURCE_KEYS(40), BLEND_ROWS(dem_source), QUERN_END_PARAMS };
 static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .unless = "materials"),
 	QUERN_PARAM(dem, materials, NULL,
 		"Several materials, by name: {sand: {density: ..., radius: ...}, ...}. The first stands for all "
@@ -82,7 +82,7 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		dem, source, NULL, "Regions that pour grains.", .rows = source_rows, .item_size = sizeof(dem_source)),
 	QUERN_PARAM(dem, skin, "1",
 		"Verlet skin over the mean diameter; results do not depend on it, the cost does.", .def = 0.1,
-		.planar = 0.2, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
+		.planar = 0.4, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
 	QUERN_PARAM(dem, step, "1",
 		"Recommended step over half the shortest period of a contact; default: the integrator's own.",
 		.max = 0.1, .flags = QUERN_MAYBE | QUERN_MIN_OPEN | QUERN_ADVANCED),

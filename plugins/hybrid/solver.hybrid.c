@@ -12,7 +12,7 @@ static const quern_param params[] = {
 		"once before the run. scene.yaml has the number.",
 		.text = "substeps", .def = 10, .min = 1, .max = MOST_SUBSTEPS),
 	QUERN_PARAM(
-		hybrid, update, "1", "Grain steps between updates of the zones.", .def = 200, .min = 1, .max = 1e9),
+		hybrid, update, "1", "Grain steps between updates of the zones.", .def = 160, .min = 1, .max = 1e9),
 	QUERN_PARAM(hybrid, samples, "1", "Samples of the contact stress between updates.", .def = 8, .min = 1,
 		.max = 10000, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, hysteresis, "1", "Mean diameters by which a surface must move before a zone follows.",
@@ -20,7 +20,7 @@ static const quern_param params[] = {
 	QUERN_PARAM(hybrid, growth, "1",
 		"Grain steps in which the radius of a grain that was put into a hole too small for it grows by the mean "
 		"radius; 0: none is put there.",
-		.def = 3500, .max = 1e9),
+		.def = 2800, .max = 1e9),
 	QUERN_PARAM(hybrid, gain, "1",
 		"Motion beyond twice what there was and gravity gave that ends the run, over what lifts all by a "
 		"diameter; 0: none does.",

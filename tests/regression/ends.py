@@ -48,7 +48,7 @@ def sets(end, every=None):
 
 
 def later(place):
-    """10 ms in steps of 3, and then to 20: as many steps as in one go."""
+    """10 ms in steps of 3, and then to 20: as many steps as in one go, or one more, since 10 ms is where a step ends."""
     out, once = place / "later", place / "once"
     run(out, *sets(10, 3))
     expect(out, 0, 3, 6, 9, 10)
@@ -56,8 +56,10 @@ def later(place):
     expect(out, 0, 3, 6, 9, 10, 12, 15, 18, 20)
     run(once, *sets(20, 3))
     one, two = lab.summary(out), lab.summary(once)
-    assert one["steps"] == two["steps"] and one["time_end"] == 0.02 and one["status"] == "done"
-    print(f"a later end: 10 ms and 10 more, {one['steps']} steps as in one go")
+    assert one["status"] == two["status"] == "done", (one["status"], two["status"])
+    assert 0 <= one["steps"] - two["steps"] <= 1, (one["steps"], two["steps"])
+    assert math.isclose(one["time_end"], 0.02, rel_tol=1e-12), one["time_end"]
+    print(f"a later end: 10 ms and 10 more, {one['steps']} steps, {two['steps']} in one go")
 
 
 def later_on_the_way(place):
@@ -73,7 +75,7 @@ def earlier(place):
     run(out, *sets(20, 3), "--until", "4 ms")
     before = bytes_of(out)
     now = lab.summary(out)["time_end"]
-    assert 0.004 <= now < 0.00403, now
+    assert 0.004 <= now < 0.00405, now  # a step is 0.049 ms
     said = run(out, *sets(3.5, 3), resume=True, status=2)
     assert "time.end is 0.0035 s" in said and f"come to {now:.9g} s" in said, said
     assert bytes_of(out) == before, "a refused run has changed its folder"

@@ -110,7 +110,7 @@ def check_warnings():
     with tempfile.TemporaryDirectory() as folder:
         for command in (["plan"], ["run", "--quiet", "--until", "0", "-o", folder]):
             said = warns(command, "two_grains", "time.end=1e9", "output.every=1e9")
-            assert re.search(r"warning: this will take long on \d+ cores?: .* and about \d+ days of running", said), said
+            assert re.search(r"warning: this will take long on \d+ cores?: .* and about \d+(\.\d)? days of running", said), said
     print("plan and run warn of points in bodies, of contacts too soft, and of runs too long")
 
 
