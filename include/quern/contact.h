@@ -41,8 +41,9 @@ typedef struct quern_contact_batch {
 	 * evaluation, which is the way by which springs are stretched, and no other column may be taken for it: an integrator
 	 * evaluates dashpots at the step's end (docs/theory/grains.md, section 3). With `means` 1 `turn` is such a mean too. */
 	const quern_real *mean_velocity[3], *mean_spin[3];
-	quern_real
-		lag; /* s^2: `velocity` lacks so much of its own second derivative, see quern_dashpot_share; 0: of nothing */
+	/* s^2: `velocity` and `spin` are late by `lag` times their second derivatives in time (quern_dashpot_share), the means are not;
+	 * 0: neither is */
+	quern_real lag;
 } quern_contact_batch;
 
 typedef struct quern_contact_ops {
@@ -108,9 +109,11 @@ QUERN_INLINE quern_onset quern_first_touch(
 	return QUERN_VALUE(quern_onset, first * dt, 0.5 * in + one_over * first + (1 - (0.5 + one_over)) * out);
 }
 
-/* A velocity that the last acceleration predicts lacks `lag` times its second derivative (quern_contact_batch), which a spring of
- * `stiffness` on `mass` makes -stiffness/mass times the velocity itself: so the dashpot of that spring sees too much of it, and takes
- * its share m/(m + lag k) of the coefficient; 1 exactly where nothing lags. docs/theory/contacts.md, section 1 */
+/* A velocity that is late by `lag` (quern_contact_batch) times its second derivative, which a spring of `stiffness` on `mass` makes
+ * -stiffness/mass times the velocity itself, but for what the dashpot does: so the dashpot of that spring sees too much of it, and takes
+ * this share of its coefficient, m/(m + lag k); 1 exactly where nothing is late. A tangential spring of grains that roll as it pushes them
+ * acts on a third (discs) or 2/7 (spheres) of the pair's mass, or on all of it with 3 or 3.5 times the stiffness. docs/theory/contacts.md,
+ * section 1 */
 QUERN_INLINE quern_real quern_dashpot_share(quern_real stiffness, quern_real mass, quern_real lag) {
 	return mass / (mass + lag * stiffness);
 }

@@ -41,8 +41,8 @@ typedef struct quern_integrator_ops {
 	quern_real damping;
 	/* Recommended step over half the shortest period of a contact, at most 0.1; 0 counts as 0.02. docs/theory/grains.md, section 2 */
 	quern_real step;
-	/* Of the second derivative of a velocity, in dt^2, by which that of `predict` is late: 1/2 where the last acceleration predicts it;
-	 * laws weaken their dashpots by it (quern_dashpot_share) */
+	/* By how much of its second derivative the velocity of `predict` is late, in dt^2: 1/2 where the last acceleration predicts it by half
+	 * a step; at most 1. Laws may weaken their dashpots by it (quern_dashpot_share). 0, or no `predict`: it is not late. */
 	quern_real lag;
 } quern_integrator_ops;
 

@@ -278,7 +278,12 @@ static void spring(
 
 static void law(const quern_check *c) {
 	quern_check_tally drift = { .name = "no force" }, push = { .name = "constant force" },
-					  ring = { .name = "a spring" }, way = { .name = "moved by the velocity" };
+					  ring = { .name = "a spring" }, way = { .name = "moved by the velocity" },
+					  late = { .name = "late by" };
+	const quern_integrator_ops *ops = c->ops;
+	const bool sound =
+		ops->lag >= 0 && ops->lag <= 1 && (!(ops->lag > 0) || ops->predict[0] || ops->predict[1]);
+	c->host->measure(&late, sound ? 0 : 1, 0, "lag is %.6g, of 0 to 1, and of `predict` alone", ops->lag);
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it) {
@@ -291,6 +296,7 @@ static void law(const quern_check *c) {
 	c->host->tell(c, &drift, NULL);
 	c->host->tell(c, &push, NULL);
 	c->host->tell(c, &ring, NULL);
+	c->host->tell(c, &late, NULL);
 	if (way.tried) c->host->tell(c, &way, NULL);
 }
 

@@ -147,6 +147,16 @@ void quern_dem_check_grains(const forces_shared *, uint32_t b);
 quern_status quern_dem_judge_contacts(const forces_shared *, uint32_t n_blocks);
 quern_status quern_dem_judge_grains(const forces_shared *, uint32_t n_blocks);
 
+/* ---- skin.c ---- */
+
+/* The least and the largest of n numbers of any order; the column is filled up to a multiple of 32. */
+void quern_dem_range(quern_real *column, uint32_t n, quern_real *least, quern_real *most);
+/* A list holds while neither two grains, nor a grain and a body, have used up the skin: this is half of what they have used, by the ways
+ * of n parts of the grains, the longest of all ways, and how far bodies have come. Where grains are not `alone`, since a coupling moves
+ * them as well, and says how far from where the list was made, or ways are those beside a box's own flow, only the longest counts. */
+quern_real quern_dem_used_of_skin(
+	const quern_step *, const ways *, uint32_t n, quern_real farthest, quern_real swept, bool alone);
+
 /* ---- box.c ---- */
 /* Differences in `normal` become those of nearest images; notes in `crossed`, which may be NULL, which those are. */
 void quern_dem_box_bring(
@@ -157,14 +167,6 @@ void quern_dem_box_motion(
 /* What contacts bear, and what they do on images; of a pair across blocks the first grain's block keeps the books. */
 void quern_dem_box_book(const forces_shared *, const forces_work *, const contact_chunk *, quern_real *sums);
 void quern_dem_box_collect(const forces_shared *, uint32_t n_blocks);
-/* The least and the largest of n numbers of any order; the column is filled up to a multiple of 32. */
-void quern_dem_range(quern_real *column, uint32_t n, quern_real *least, quern_real *most);
-/* A list holds while neither two grains, nor a grain and a body, have used up the skin: this is half of what they have used, by the ways
- * of n parts of the grains, the longest of all ways, and how far bodies have come. Where grains are not `alone`, since a coupling moves
- * them as well, and says how far from where the list was made, or ways are those beside a box's own flow, only the longest counts. */
-quern_real quern_dem_used_of_skin(
-	const quern_step *, const ways *, uint32_t n, quern_real farthest, quern_real swept, bool alone);
-
 /* Squares of ways beside the box's own strain since the list, of which `listed` holds lengths and offset; `anchor` from `begin` on. */
 void quern_dem_box_ways(const dem_box *, const quern_column *listed, uint32_t begin, uint32_t n,
 	quern_real *const x[3], quern_real *const anchor[3], quern_real *way);

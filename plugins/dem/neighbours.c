@@ -88,6 +88,20 @@ static uint32_t *places_of(
 #endif
 
 /* Grains of one place keep the order that they had by their blocks' places. */
+/* Before the release grains of one cell stand in an order that lists while settling have left, which is another one where settling was
+ * part of another run. From there on they are taken in the order of their ids: what a kept state leads to does not depend on who kept it. */
+static bool order_before(const listing *l, uint32_t n, uint64_t *key, void *work, const uint32_t **order) {
+	const quern_step *s = l->s;
+	*order = s->host->parts(s->run, "grain")->entry;
+	if (s->settling || s->step || s->within) return true;
+	int32_t *by_id = s->host->memory(s->run, ((size_t)n + 1) * sizeof *by_id);
+	if (!by_id) return false;
+	for (uint32_t i = 0; i < n; i++) key[i] = (uint64_t)s->use[NEAR_ID].id[i];
+	quern_sort_order(n, key, *order, by_id, work);
+	*order = (const uint32_t *)(const void *)by_id;
+	return true;
+}
+
 static quern_status sort_grains(listing *l) {
 	const quern_step *s = l->s;
 	if (!set_job(l)) return QUERN_E_MEMORY;
@@ -99,11 +113,13 @@ static quern_status sort_grains(listing *l) {
 	int32_t *from = (int32_t *)(void *)(key + n + 2);
 	uint32_t *block = (uint32_t *)(void *)(from + n + 2), *by_place = NULL;
 	void *work = block + n + 2;
+	const uint32_t *order;
+	if (!order_before(l, n, key, work, &order)) return QUERN_E_MEMORY;
 	const size_t wanted = l->ops->keys(l->search->self, &l->job, key);
 #ifdef QUERN_PERMUTED_BLOCKS
 	permute_blocks(n, key);
 #endif
-	quern_sort_order(n, key, s->host->parts(s->run, "grain")->entry, from, work);
+	quern_sort_order(n, key, order, from, work);
 	uint32_t n_blocks = 0;
 	for (uint32_t i = 0; i < n; i++)
 		if (!i || key[from[i]] >> 32 != key[from[i - 1]] >> 32) block[n_blocks++] = i;

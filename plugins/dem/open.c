@@ -77,8 +77,7 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 	quern_real *restrict way = w->way;
 	memset(way, 0, n * sizeof *way);
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real *restrict x = u[OPEN_POSITION].real[k] + begin, *restrict from =
-																			 u[OPEN_ANCHOR].real[k] + begin;
+		const quern_real *x = u[OPEN_POSITION].real[k] + begin, *from = u[OPEN_ANCHOR].real[k] + begin;
 		quern_real *restrict along = w->along, *range = o->ways[chunk].along[k];
 		keep(u[OPEN_POSITION].real[k] + begin, w->position[k], held, n);
 		keep(u[OPEN_VELOCITY].real[k] + begin, w->velocity[k], held, n);

@@ -39,7 +39,7 @@ static quern_real nearer_by_half(const ways *of, uint32_t n, uint32_t dim) {
 		}
 		square += (most - least) * (most - least);
 	}
-	return 0.5 * sqrt(square);
+	return square < INFINITY ? 0.5 * sqrt(square) : INFINITY; /* also where one is not a number */
 }
 
 quern_real quern_dem_used_of_skin(

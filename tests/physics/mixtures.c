@@ -215,7 +215,7 @@ static double step_of(const char *more, const char *pair, const char *place, cha
 	return dt;
 }
 
-/* A 25th of half the period of the pair whose ratio of mass to stiffness is the least. */
+/* A 20th of half the period of the pair whose ratio of mass to stiffness is the least. */
 static void steps(void **unused) {
 	static const char four[] =
 		"{position: [0, 0, 0], material: sand}, {position: [0.1, 0, 0], material: sand}, {position: "

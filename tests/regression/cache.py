@@ -82,6 +82,14 @@ def shared(place, cache):
     assert len(files(cache)) == 2
 
 
+def by_twin(place, _):
+    """The hybrid from a state that its grains alone have kept, whose lists were made at other times: the bits of its own."""
+    cache = place / "kept_by_twin"
+    assert KEPT in run(place / "twin", cache, "--set=model=grains")
+    assert TAKEN in run(place / "from_twin", cache)
+    lab.same(place / "none", place / "from_twin", "a state kept by grains alone")
+
+
 def apart(place, cache):
     """What acts does: seed, gravity, bodies, laws by their contents, and the plugin's own object."""
     for k, option in enumerate(["seed=3", "gravity=[0, -9.0]", "bodies.1.plane.contact.friction=0.1",
