@@ -46,11 +46,15 @@ QUERN_INLINE quern_real turning_of(uint32_t dim) { return dim == 2 ? 3 : 3.5; }
 QUERN_INLINE void kernel(
 	const int dim, const bool rough, const bool energy, const hertz *self, const quern_contact_batch *b) {
 	const hertz law = *self;
-	const quern_real dt = b->dt, normal_loss = 2.2360679774997898 * law.damping_ratio; /* sqrt 5 zeta */
-	const quern_real tangential_loss = 1.8257418583505537 * law.damping_ratio;         /* 2 sqrt(5/6) zeta */
-	const quern_real turning = turning_of((uint32_t)dim), lag = b->lag;
+	const quern_real dt = b->dt, lag = b->lag, turning = turning_of((uint32_t)dim);
+	const quern_real normal = 4.0 / 3 * law.modulus,
+					 shear = 8 * law.shear;                           /* times sqrt(r d): k sqrt d and k_t */
+	const quern_real loss_n = 2.2360679774997898 * law.damping_ratio, /* sqrt 5 zeta */
+		loss_t =
+			1.8257418583505537 * law.damping_ratio * __builtin_sqrt(shear / normal); /* 2 sqrt(5/6) zeta */
 	const quern_real *restrict overlap = b->overlap, *restrict mass = b->mass, *restrict radius = b->radius;
 	quern_real *const *history = rough ? b->use[SHEAR].real : NULL;
+	if (rough && dim == 3) QUERN_TURN_SPRINGS(history, b);
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim),
@@ -58,12 +62,12 @@ QUERN_INLINE void kernel(
 		const quern_real vn = quern_vec_dot(v, n, dim), mean_n = quern_vec_dot(mean, n, dim);
 		/* "touches" is written d > 0 below: one truth value for all of it is what gcc does not vectorise */
 		const bool touching = overlap[i] > 0;
-		const quern_real d = touching ? overlap[i] : 0, root = __builtin_sqrt(d);
-		const quern_real r = __builtin_sqrt(radius[i]), k = 4.0 / 3 * law.modulus * r, elastic = k * d * root;
+		const quern_real d = touching ? overlap[i] : 0, root = __builtin_sqrt(radius[i] * d),
+						 stiff = normal * root, kt = shear * root, elastic = stiff * d;
 		const quern_onset onset = quern_first_touch(overlap[i], -mean_n, dt, 0.25);
 		/* f_n = max(0, k d^(3/2) - sqrt 5 zeta sqrt(m k) d^(1/4) v_n) */
-		const quern_real damping = normal_loss * __builtin_sqrt(mass[i] * k * root) * onset.weight *
-								   quern_dashpot_share(1.5 * k * root, mass[i], lag);
+		const quern_real loss = __builtin_sqrt(mass[i] * stiff) * onset.weight,
+						 damping = loss_n * loss * quern_dashpot_share(1.5 * stiff, mass[i], lag);
 		const quern_real pushed = elastic - damping * vn, fn = pushed > 0 ? pushed : 0;
 		quern_vec f = quern_vec_scale(fn, n), viscous = quern_vec_scale(fn - elastic, n);
 		quern_real sheared = 0, rubbed = 0;
@@ -71,22 +75,18 @@ QUERN_INLINE void kernel(
 			/* k_t = 8 G* sqrt(r d); what is kept is the force, which an unloading contact gives up in proportion */
 			const quern_vec vt = quern_vec_axpy(-vn, n, v), mean_t = quern_vec_axpy(-mean_n, n, mean);
 			const quern_real before = d + mean_n * onset.time,
-							 root_before = __builtin_sqrt(before > 0 ? before : 0);
-			const quern_real kt = 8 * law.shear * r * root, kt_before = 8 * law.shear * r * root_before;
+							 root_before = __builtin_sqrt(radius[i] * (before > 0 ? before : 0));
+			const quern_real kt_before = shear * root_before;
 			const quern_real one_over = kt > 0 ? 1 / (kt > 0 ? kt : 1) : 0;
-			const quern_real shrink = kt < kt_before ? kt / (kt_before > 0 ? kt_before : 1) : 1;
-			const quern_real stiffness = 0.5 * (kt + kt_before);
-			const quern_real loss = tangential_loss * __builtin_sqrt(kt * mass[i]) * onset.weight *
-									quern_dashpot_share(turning * kt, mass[i], lag);
+			const quern_real shrink = root < root_before ? root / (root_before > 0 ? root_before : 1) : 1;
+			const quern_real stiffness = 0.5 * (kt + kt_before),
+							 shear_damping = loss_t * loss * quern_dashpot_share(turning * kt, mass[i], lag);
 			quern_vec was, now, drag;
-			if (dim == 3) {
-				const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3),
-								old = { history[0][i], history[1][i], history[2][i] };
-				was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
-			} else was = (quern_vec) { -n.y * history[0][i], n.x * history[0][i], 0 };
+			if (dim == 3) was = QUERN_VEC_AT(history, i, 3);
+			else was = (quern_vec) { -n.y * history[0][i], n.x * history[0][i], 0 };
 			const quern_vec trial =
 				quern_vec_axpy(onset.time * stiffness, mean_t, quern_vec_scale(shrink, was));
-			const quern_vec g = quern_vec_scale(loss, vt);
+			const quern_vec g = quern_vec_scale(shear_damping, vt);
 			const quern_cone cone = quern_cone_shares(trial, g, law.friction * fn);
 			now = quern_vec_scale(d > 0 ? cone.spring : 0, trial);
 			drag = quern_vec_scale(d > 0 ? cone.damper : 0, g);

@@ -54,6 +54,7 @@ QUERN_INLINE void kernel(
 	const quern_real lag = b->lag, tangential = law.tangential_damping, turning = turning_of((uint32_t)dim);
 	const quern_real *restrict overlap = b->overlap, *restrict mass = b->mass;
 	quern_real *const *slip = rough ? b->use[SLIP].real : NULL;
+	if (rough && dim == 3) QUERN_TURN_SPRINGS(slip, b);
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->velocity, i, dim),
@@ -61,8 +62,8 @@ QUERN_INLINE void kernel(
 		const quern_real d = overlap[i], vn = quern_vec_dot(v, n, dim), mean_n = quern_vec_dot(mean, n, dim);
 		const bool touching = d > 0;
 		const quern_onset onset = quern_first_touch(d, -mean_n, dt, 0);
-		const quern_real loss = law.loss * __builtin_sqrt(kn * mass[i]) * onset.weight,
-						 damping = loss * quern_dashpot_share(kn, mass[i], lag),
+		const quern_real loss = law.loss * __builtin_sqrt(kn * mass[i]) * onset.weight;
+		const quern_real damping = loss * quern_dashpot_share(kn, mass[i], lag),
 						 shear_damping = tangential * loss * quern_dashpot_share(turning * kt, mass[i], lag);
 		/* f_n = max(0, k_n d - gamma_n v_n) */
 		const quern_real pushed = kn * d - damping * vn, fn = (touching & (pushed > 0)) ? pushed : 0;
@@ -71,8 +72,7 @@ QUERN_INLINE void kernel(
 		if (rough && dim == 3) {
 			/* xi' = v_t in the tangent plane; |k_t s xi + gamma_t v_t| = mu f_n */
 			const quern_vec vt = quern_vec_axpy(-vn, n, v), mean_t = quern_vec_axpy(-mean_n, n, mean);
-			const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { slip[0][i], slip[1][i], slip[2][i] };
-			const quern_vec was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
+			const quern_vec was = QUERN_VEC_AT(slip, i, 3);
 			const quern_vec trial = quern_vec_axpy(onset.time, mean_t, was);
 			const quern_vec a = quern_vec_scale(kt, trial), g = quern_vec_scale(shear_damping, vt);
 			const quern_cone cone = quern_cone_shares(a, g, law.friction * fn);

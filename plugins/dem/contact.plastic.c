@@ -51,6 +51,7 @@ QUERN_INLINE void kernel(
 	const quern_real *restrict overlap = b->overlap;
 	quern_real *restrict deepest = b->use[DEEPEST].real[0];
 	quern_real *const *slip = rough ? b->use[SLIP].real : NULL;
+	if (rough && dim == 3) QUERN_TURN_SPRINGS(slip, b);
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_vec n = QUERN_VEC_AT(b->normal, i, dim), v = QUERN_VEC_AT(b->mean_velocity, i, dim);
@@ -69,10 +70,7 @@ QUERN_INLINE void kernel(
 			if (dim == 3) {
 				/* xi' = v_t in the tangent plane; |k_t s xi| = mu f_n */
 				const quern_vec vt = quern_vec_axpy(-vn, n, v);
-				const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3),
-								old = { slip[0][i], slip[1][i], slip[2][i] };
-				const quern_vec was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
-				const quern_vec trial = quern_vec_axpy(onset.time, vt, was);
+				const quern_vec was = QUERN_VEC_AT(slip, i, 3), trial = quern_vec_axpy(onset.time, vt, was);
 				const quern_cone cone =
 					quern_cone_shares(quern_vec_scale(kt, trial), (quern_vec) { 0, 0, 0 }, cap);
 				const quern_vec now = quern_vec_scale(touching ? cone.spring : 0, trial);

@@ -80,6 +80,7 @@ QUERN_INLINE void kernel_3d(const bool rolls, const bool twists, const bool ener
 	const quern_real dt = b->dt, k = law.stiffness, ko = law.twisting_stiffness * k, one_over_ko = 1 / ko;
 	const quern_real *restrict overlap = b->overlap, *restrict mass = b->mass, *restrict radius = b->radius;
 	quern_real *const *roll = b->use[ROLL].real, *const *twist = b->use[TWIST].real;
+	if (rolls) QUERN_TURN_SPRINGS(roll, b);
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
 		const quern_vec n = QUERN_VEC_AT(b->normal, i, 3), u = QUERN_VEC_AT(b->mean_velocity, i, 3);
@@ -93,8 +94,7 @@ QUERN_INLINE void kernel_3d(const bool rolls, const bool twists, const bool ener
 		if (rolls) {
 			const quern_vec v = quern_vec_scale(r, quern_vec_cross(spin, n)),
 							mean_v = quern_vec_scale(r, quern_vec_cross(mean, n));
-			const quern_vec turn = QUERN_VEC_AT(b->turn, i, 3), old = { roll[0][i], roll[1][i], roll[2][i] };
-			const quern_vec was = quern_into_plane(old, n, quern_vec_dot(turn, n, 3) * dt);
+			const quern_vec was = QUERN_VEC_AT(roll, i, 3);
 			const quern_vec trial = quern_vec_axpy(onset.time, mean_v, was), a = quern_vec_scale(k, trial);
 			const quern_vec g = quern_vec_scale(law.loss * __builtin_sqrt(k * mass[i]) * onset.weight, v);
 			const quern_cone cone = quern_cone_shares(a, g, law.friction * normal);

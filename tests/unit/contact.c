@@ -75,6 +75,33 @@ static void always_on_the_cone(void **state) {
 	assert_true(met > 10000 && clipped > 10000);
 }
 
+/* How far the total is from the cone, over the larger of the two forces. */
+static double off_the_cone(quern_vec a, quern_vec b, double cap) {
+	const quern_cone c = quern_cone_shares(a, b, cap);
+	assert_true(c.spring >= 0 && c.spring <= 1 && c.damper >= 0 && c.damper <= 1);
+	if (length(quern_vec_add(a, b)) <= cap) return 0;
+	return fabs(length(total(a, b, c)) - cap) / fmax(length(a), length(b));
+}
+
+/* Where digits are lost: both nearly opposite, or nearly at right angles and the dashpot's nearly as large as the cone. */
+static void to_the_last_digits(void **state) {
+	static const quern_vec spring = { 0x1.18df7fb68b2b2p-2, 0x1.3fddc901757afp+3, 0 },
+						   dashpot = { -0x1.ffceae3b9c70bp-1, 0x1.c16a5c7c05dc3p-6, 0 };
+	double worst = off_the_cone(spring, dashpot, 1);
+	(void)state;
+	srand(7);
+	for (int k = 0; k < 200000; k++) {
+		const quern_vec a = some(pow(10, uniform())), way = some(1);
+		const double small = pow(10, -8 * fabs(uniform()) - 1);
+		const quern_vec aside = quern_vec_axpy(-quern_vec_dot(way, a, 3) / quern_vec_dot(a, a, 3), a, way);
+		const quern_vec opposite = quern_vec_axpy(-2 * fabs(uniform()), a, quern_vec_scale(small, aside)),
+						across = quern_vec_axpy(small * uniform(), a, aside);
+		worst = fmax(worst, off_the_cone(a, opposite, small * pow(10, 2 * fabs(uniform()))));
+		worst = fmax(worst, off_the_cone(a, across, length(across) * (1 + 1e-15 * (k % 7))));
+	}
+	assert_true(worst < 4e-15);
+}
+
 /* A small change of either force or of the cap changes the result by little: there is no jump between the cases. */
 static void without_a_jump(void **state) {
 	double worst = 0;
@@ -94,6 +121,6 @@ static void without_a_jump(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(closed_forms), cmocka_unit_test(always_on_the_cone),
-		cmocka_unit_test(without_a_jump) };
+		cmocka_unit_test(to_the_last_digits), cmocka_unit_test(without_a_jump) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
