@@ -146,6 +146,8 @@ BROKEN = [
         ("? 0.5 * dt * now : dt * now);\n\t\t\tnx", "? 0.5 * dt * (now - a[i]) : dt * now);\n\t\t\tnx")],
      "moved by the velocity"),
     ("hides its damping", "dem/integrator.damped.c", [(".damps = 1, ", "")], "constant force"),
+    ("is late by more than a step", VERLET, [(".lag = 0.5", ".lag = 1.5")], "late by"),
+    ("is late by what it does not predict", "integrator", [(".close =", ".lag = 0.5, .close =")], "late by"),
     ("damps upwards", "dem/integrator.damped.c", [("a * v > 0 ? -local : local", "a * v > 0 ? local : -local")],
      "a spring"),
     ("overlaps", "packers/packer.random.c", [(" && job->free(job, spot)", "")], "no overlap"),
