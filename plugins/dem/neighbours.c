@@ -87,7 +87,6 @@ static uint32_t *places_of(
 }
 #endif
 
-/* Grains of one place keep the order that they had by their blocks' places. */
 /* Before the release grains of one cell stand in an order that lists while settling have left, which is another one where settling was
  * part of another run. From there on they are taken in the order of their ids: what a kept state leads to does not depend on who kept it. */
 static bool order_before(const listing *l, uint32_t n, uint64_t *key, void *work, const uint32_t **order) {
@@ -102,6 +101,7 @@ static bool order_before(const listing *l, uint32_t n, uint64_t *key, void *work
 	return true;
 }
 
+/* Grains of one place keep the order that they had by their blocks' places. */
 static quern_status sort_grains(listing *l) {
 	const quern_step *s = l->s;
 	if (!set_job(l)) return QUERN_E_MEMORY;
