@@ -174,30 +174,34 @@ static void bring_out(const update *d, uint32_t c) {
 	if (to >= 0) quern_hybrid_pass(d, c, (uint32_t)to);
 }
 
+static bool owed_by_grains(const update *d, uint32_t c) {
+	return d->zone[c] == QUERN_DISCRETE && quern_hybrid_is_owed(d->u, c, d->s->dim);
+}
+
 /* Grains are only placed where the continuum is near: a discrete cell gives its entry to the nearest hybrid one that is not behind a
  * body; where there is none the entry waits. */
 quern_status quern_hybrid_hand_over(update *d) {
 	bool *source = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1), any = false;
 	bool *open = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1);
+	bool *asked = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1);
 	int32_t *nearest = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(int32_t));
-	if (!source || !open || !nearest) return QUERN_E_MEMORY;
+	if (!source || !open || !asked || !nearest) return QUERN_E_MEMORY;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		const uint32_t c = nth_cell(d, q);
-		if (d->zone[c] == QUERN_DISCRETE && !(d->open[c] > 0) && quern_hybrid_is_owed(d->u, c, d->s->dim))
-			bring_out(d, c);
+		if (owed_by_grains(d, c) && !(d->open[c] > 0)) bring_out(d, c);
 	}
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		source[c] = d->zone[c] == QUERN_HYBRID && d->open[c] > 0;
 		open[c] = d->open[c] > 0;
-		any = any || (d->zone[c] == QUERN_DISCRETE && quern_hybrid_is_owed(d->u, c, d->s->dim));
+		asked[c] = owed_by_grains(d, c);
+		any = any || asked[c];
 	}
 	if (!any) return QUERN_OK;
-	const quern_status status = quern_hybrid_nearest(d, source, open, nearest);
+	const quern_status status = quern_hybrid_nearest(d, source, open, asked, nearest);
 	if (status != QUERN_OK) return status;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		const uint32_t c = nth_cell(d, q);
-		if (d->zone[c] == QUERN_DISCRETE && nearest[c] >= 0 && quern_hybrid_is_owed(d->u, c, d->s->dim))
-			quern_hybrid_pass(d, c, (uint32_t)nearest[c]);
+		if (nearest[c] >= 0 && owed_by_grains(d, c)) quern_hybrid_pass(d, c, (uint32_t)nearest[c]);
 	}
 	return QUERN_OK;
 }

@@ -155,6 +155,16 @@ void quern_hybrid_open_place(const update *d, uint32_t c, const int32_t cell[3],
 	}
 }
 
+/* How far from a place no body can be, from what a cell's centre knows. */
+static quern_real free_way(const update *d, uint32_t entry, const quern_real x[3]) {
+	int32_t cell[3];
+	quern_real centre[3], aside = 0;
+	if (!quern_grid_cell_of(d->g, entry, cell)) return 0;
+	quern_hybrid_centre(d, cell, centre);
+	for (uint32_t k = 0; k < d->s->dim; k++) aside += (x[k] - centre[k]) * (x[k] - centre[k]);
+	return fmax(d->wall[entry] - sqrt(aside), 0);
+}
+
 /* Goes along the line by steps as long as nothing can be in the way, so that no wall is too thin. */
 bool quern_hybrid_walled(
 	const update *d, const bool *meant, uint32_t entry, const quern_real from[3], const quern_real to[3]) {
@@ -163,6 +173,7 @@ bool quern_hybrid_walled(
 	if (d->wall[entry] >= 2 * d->g->cell) return false; /* within a cell, or from centre to centre */
 	for (uint32_t k = 0; k < d->s->dim; k++) length += (to[k] - from[k]) * (to[k] - from[k]);
 	length = sqrt(length);
+	way = free_way(d, entry, from);
 	for (int i = 0; i < 64 && way < length; i++) {
 		quern_real x[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) x[k] = from[k] + way / length * (to[k] - from[k]);

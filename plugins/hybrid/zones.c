@@ -25,6 +25,8 @@ typedef struct {
 	bool boxes;           /* the source is a whole cell, not its centre */
 	bool walls;           /* nothing goes through a body */
 	quern_real most;      /* m: what is farther away nobody asks for */
+	bool *asked;          /* by cell, until it is reached; NULL: all are asked for */
+	uint32_t left;        /* of those */
 	bool failed;
 } spreading;
 
@@ -98,6 +100,10 @@ static void spread(spreading *p, const bool *open) {
 		memcpy(home.at, p->d->g->at[home.block], sizeof home.at);
 		if (e.distance > p->most) break;
 		if (e.distance > p->distance[e.cell] || !quern_grid_cell_of(p->d->g, e.cell, cell)) continue;
+		if (p->asked && p->asked[e.cell]) {
+			p->asked[e.cell] = false;
+			if (!--p->left) break;
+		}
 		for (int z = -depth; z <= depth; z++)
 			for (int y = -1; y <= 1; y++)
 				for (int x = -1; x <= 1; x++) {
@@ -128,11 +134,14 @@ static bool spreading_init(spreading *p, update *d, bool boxes, quern_real *dist
 	return true;
 }
 
-quern_status quern_hybrid_nearest(update *d, const bool *source, const bool *through, int32_t *nearest) {
+quern_status quern_hybrid_nearest(
+	update *d, const bool *source, const bool *through, bool *asked, int32_t *nearest) {
 	spreading p;
 	quern_real *distance = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	if (!spreading_init(&p, d, false, distance)) return QUERN_E_MEMORY;
 	p.walls = true;
+	p.asked = asked;
+	for (uint32_t c = 0; c < d->n_cells; c++) p.left += asked[c];
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
 	spread(&p, through);
