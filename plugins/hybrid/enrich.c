@@ -33,6 +33,8 @@ typedef struct enriching {
 	uint32_t n_numbers, cap_numbers;
 	uint32_t waited, taken; /* numbers that waited before; of these, how many are given to a cell now */
 	int32_t fresh;          /* the next number that nobody has had */
+	quern_real *rest,
+		*around; /* kg by cell: what grains lack and are not to get yet, below 0: have too much; the same of it and all cells that touch it */
 } enriching;
 
 static quern_real mass_of(const hybrid *h, quern_real r) { return quern_radius_mass(r, h->density, h->dim); }
@@ -76,17 +78,56 @@ static bool lacks_something(const update *d, uint32_t c) {
 	return d->zone[c] == QUERN_HYBRID && lacking(d, c) > 1e-9 * d->full;
 }
 
-/* Half a grain over would never be paid back: a cell gets the next grain while all of it is lacking. Sums round, and where all grains
- * are alike a debt may be just one of them. */
+/* Entries of a cell and of those that touch it, at a corner too; how many there are. */
+static uint32_t touching(const update *d, const int32_t cell[3], uint32_t entry[27]) {
+	const int depth = d->g->dim == 3 ? 1 : 0;
+	uint32_t n = 0;
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -1; y <= 1; y++)
+			for (int x = -1; x <= 1; x++) {
+				const int32_t c =
+					quern_grid_entry_back(d->g, (int32_t[3]) { cell[0] + x, cell[1] + y, cell[2] + z });
+				if (c >= 0) entry[n++] = (uint32_t)c;
+			}
+	return n;
+}
+
+static bool measure_rests(enriching *e) {
+	const update *d = e->d;
+	const size_t bytes = ((size_t)d->n_cells + 1) * sizeof(quern_real);
+	uint32_t near[27];
+	int32_t cell[3];
+	e->rest = d->s->host->memory(d->s->run, bytes);
+	e->around = d->s->host->memory(d->s->run, bytes);
+	if (!e->rest || !e->around) return false;
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		e->rest[c] = d->zone[c] == QUERN_HYBRID ? lacking(d, c) : 0;
+		e->around[c] = 0;
+	}
+	for (uint32_t c = 0; c < d->n_cells; c++) {
+		if (!quern_grid_cell_of(d->g, c, cell)) continue;
+		const uint32_t n = touching(d, cell, near);
+		for (uint32_t k = 0; k < n; k++) e->around[c] += e->rest[near[k]];
+	}
+	return true;
+}
+
+/* A cell holds a few grains. If each got one only when a whole one is lacking, all would lack half of one in the mean, an eighth of their grains in 2-D; half a
+ * grain too much in each would never be paid back, since none is taken away. So a cell that lacks anything gets one while its block of cells lacks half of one, and no
+ * block with it has one too many then. Sums round, and where all grains are alike a debt may be just that. */
 static bool share_out(enriching *e, packed_cell *p) {
 	const update *d = e->d;
-	const quern_real share = grain_share(d, p->c);
-	quern_real rest = lacking(d, p->c);
+	const quern_real rounding = 1e-9, share = grain_share(d, p->c);
+	uint32_t near[27];
+	const uint32_t n = touching(d, p->cell, near);
 	p->first = e->n_numbers;
 	for (;; p->wanted++) {
-		const quern_real mass = share * mass_of(d->h, radius_of(d, next_number(e)));
-		if (!(rest > (1 - 1e-9) * mass)) return true;
-		rest -= mass;
+		const quern_real mass = share * mass_of(d->h, radius_of(d, next_number(e))), least = rounding * mass;
+		bool lacks = e->rest[p->c] > least && e->around[p->c] > 0.5 * mass + least;
+		for (uint32_t k = 0; k < n; k++) lacks = lacks && e->around[near[k]] > least;
+		if (!lacks) return true;
+		e->rest[p->c] -= mass;
+		for (uint32_t k = 0; k < n; k++) e->around[near[k]] -= mass;
 		if (!take_number(e)) return false;
 	}
 }
@@ -236,7 +277,7 @@ static bool find_cells(enriching *e) {
 	size_t most = 0;
 	for (uint32_t c = 0; c < d->n_cells; c++) most += lacks_something(d, c);
 	e->cell = d->s->host->memory(d->s->run, (most + 1) * sizeof *e->cell);
-	if (!e->cell) return false;
+	if (!e->cell || !measure_rests(e)) return false;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		packed_cell p = { .all = e, .c = nth_cell(d, q) };
 		if (!lacks_something(d, p.c) || !quern_grid_cell_of(d->g, p.c, p.cell)) continue;

@@ -66,6 +66,57 @@ static void far_entries_find_a_cell(void **state) {
 	harness_close(run);
 }
 
+enum { SIDE = 16 };
+
+/* One grain in each cell of a periodic square, half of it points. */
+static quern_run *open_sparse(void) {
+	char path[HARNESS_PATH];
+	FILE *out = harness_file(path);
+	fprintf(out, "x y\n");
+	for (int j = 0; j < SIDE; j++)
+		for (int i = 0; i < SIDE; i++) fprintf(out, "%.17g %.17g\n", (i + 0.3) * cell, (j + 0.3) * cell);
+	fclose(out);
+	quern_run *run = harness_open(1,
+		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [%g, %g], periodic: [true, true]}\n"
+		"time: {end: 1e-6, step: 1e-9}\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm}},\n"
+		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
+		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+		"hybrid: {oracle: [{fixed: {otherwise: hybrid}}], substeps: 1, update: 1}\n",
+		SIDE * cell, SIDE * cell, path, cell);
+	unlink(path);
+	harness_steps(run, 3);
+	return run;
+}
+
+/* Cells that each lack a share of a grain get as many grains as all of them lack, to two thirds of a grain in a block of nine, though
+ * hardly one of them lacks a whole one; and none where others beside them have as much too much. */
+static void debts_round_together(void **state) {
+	static const double lacks[][2] = { { 0.2, 0.2 }, { 0.4, 0.4 }, { 0.8, 0.8 }, { 1.3, 1.3 }, { 0.3, 0.9 },
+		{ -0.4, -0.4 }, { 1.2, -1.2 } };
+	const double side = SIDE, mass = 2500 * 3.14159265358979312e-6;
+	bool good = true;
+	(void)state;
+	table_head("grains that 256 cells get, of those that they lack, by turns");
+	for (size_t k = 0; k < sizeof lacks / sizeof *lacks; k++) {
+		quern_run *run = open_sparse();
+		const uint32_t before = quern_host_table.set(run, "grain").n;
+		char name[60];
+		assert_int_equal(before, SIDE * SIDE);
+		for (int j = 0; j < SIDE; j++)
+			for (int i = 0; i < SIDE; i++)
+				harness_field(run, "cell.owed").real[0][cell_at(run, (i + 0.5) * cell, (j + 0.5) * cell)] +=
+					mass * lacks[k][(i + j) % 2];
+		update(run);
+		const double wanted = fmax(0, 0.5 * (lacks[k][0] + lacks[k][1]) * side * side),
+					 got = quern_host_table.set(run, "grain").n - before;
+		snprintf(name, sizeof name, "%g and %g of a grain", lacks[k][0], lacks[k][1]);
+		good &= table_row(name, got / (side * side), wanted / (side * side), 0.667 / 9);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 /* A box whose walls cut its cells, or are a quarter of a cell thick, filled with grains: `walls` is false, so that only the
  * top is a surface. Below its zone no grain is left, along the walls and the floor neither. */
 static void walls_are_no_surface(void **state) {
@@ -167,6 +218,7 @@ static void rough_floors_are_no_surface(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell),
-		cmocka_unit_test(walls_are_no_surface), cmocka_unit_test(rough_floors_are_no_surface) };
+		cmocka_unit_test(debts_round_together), cmocka_unit_test(walls_are_no_surface),
+		cmocka_unit_test(rough_floors_are_no_surface) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
