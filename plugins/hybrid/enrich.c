@@ -33,8 +33,8 @@ typedef struct enriching {
 	uint32_t n_numbers, cap_numbers;
 	uint32_t waited, taken; /* numbers that waited before; of these, how many are given to a cell now */
 	int32_t fresh;          /* the next number that nobody has had */
-	quern_real *rest,
-		*around; /* kg by cell: what grains lack and are not to get yet, below 0: have too much; the same of it and all cells that touch it */
+	/* grains' kg by cell: what they lack and are not to get yet, below 0 what they have too much; the same of its block, the cell and all that touch it */
+	quern_real *rest, *around;
 } enriching;
 
 static quern_real mass_of(const hybrid *h, quern_real r) { return quern_radius_mass(r, h->density, h->dim); }
@@ -78,18 +78,33 @@ static bool lacks_something(const update *d, uint32_t c) {
 	return d->zone[c] == QUERN_HYBRID && lacking(d, c) > 1e-9 * d->full;
 }
 
-/* Entries of a cell and of those that touch it, at a corner too; how many there are. */
-static uint32_t touching(const update *d, const int32_t cell[3], uint32_t entry[27]) {
-	const int depth = d->g->dim == 3 ? 1 : 0;
+/* Entries of the zone's cells in a block, a cell and those that touch it; how many there are. Along a short periodic axis each comes once. */
+static uint32_t block_of(const update *d, uint32_t c, const int32_t cell[3], uint32_t entry[27]) {
+	const quern_grid_view *g = d->g;
+	quern_grid_cursor home = { .block = (int32_t)(c / QUERN_BLOCK_CELLS) };
+	int32_t low[3] = { 0 }, high[3] = { 0 };
 	uint32_t n = 0;
-	for (int z = -depth; z <= depth; z++)
-		for (int y = -1; y <= 1; y++)
-			for (int x = -1; x <= 1; x++) {
-				const int32_t c =
-					quern_grid_entry_back(d->g, (int32_t[3]) { cell[0] + x, cell[1] + y, cell[2] + z });
-				if (c >= 0) entry[n++] = (uint32_t)c;
+	memcpy(home.at, g->at[home.block], sizeof home.at);
+	for (uint32_t k = 0; k < g->dim; k++) {
+		low[k] = g->periodic[k] && g->cells[k] < 3 ? 0 : -1;
+		high[k] = g->periodic[k] && g->cells[k] < 2 ? 0 : 1;
+	}
+	for (int32_t z = low[2]; z <= high[2]; z++)
+		for (int32_t y = low[1]; y <= high[1]; y++)
+			for (int32_t x = low[0]; x <= high[0]; x++) {
+				int32_t at[3] = { cell[0] + x, cell[1] + y, cell[2] + z };
+				quern_grid_cursor near = home;
+				const int32_t there = quern_grid_bring_back(g, at) ? quern_grid_entry_near(g, &near, at) : -1;
+				if (there >= 0 && d->zone[there] == QUERN_HYBRID) entry[n++] = (uint32_t)there;
 			}
 	return n;
+}
+
+/* In a cell that is too full grains have too much only beyond their share of all that is there. */
+static quern_real rest_of(const update *d, uint32_t c) {
+	const quern_real share = grain_share(d, c), lacks = lacking(d, c),
+					 over = share * cell_holds(d, c) - d->in_grains[c];
+	return (lacks > 0 ? lacks : over < 0 ? over : 0) / share;
 }
 
 static bool measure_rests(enriching *e) {
@@ -100,29 +115,30 @@ static bool measure_rests(enriching *e) {
 	e->rest = d->s->host->memory(d->s->run, bytes);
 	e->around = d->s->host->memory(d->s->run, bytes);
 	if (!e->rest || !e->around) return false;
+	for (uint32_t c = 0; c < d->n_cells; c++)
+		if (d->zone[c] == QUERN_HYBRID) e->rest[c] = rest_of(d, c);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
-		e->rest[c] = d->zone[c] == QUERN_HYBRID ? lacking(d, c) : 0;
+		if (d->zone[c] != QUERN_HYBRID || !quern_grid_cell_of(d->g, c, cell)) continue;
+		const uint32_t n = block_of(d, c, cell, near);
 		e->around[c] = 0;
-	}
-	for (uint32_t c = 0; c < d->n_cells; c++) {
-		if (!quern_grid_cell_of(d->g, c, cell)) continue;
-		const uint32_t n = touching(d, cell, near);
 		for (uint32_t k = 0; k < n; k++) e->around[c] += e->rest[near[k]];
 	}
 	return true;
 }
 
-/* A cell holds a few grains. If each got one only when a whole one is lacking, all would lack half of one in the mean, an eighth of their grains in 2-D; half a
- * grain too much in each would never be paid back, since none is taken away. So a cell that lacks anything gets one while its block of cells lacks half of one, and no
- * block with it has one too many then. Sums round, and where all grains are alike a debt may be just that. */
+/* A cell holds a few grains. If each got one only when a whole one is lacking, all would lack half
+ * of one in the mean, an eighth of their grains in 2-D; half a grain too much in each would never be
+ * paid back, since none is taken away. So a cell that lacks anything gets one while its block lacks
+ * half of one, unless a block that it is in would have a whole one too many then. Sums round, and
+ * where all grains are alike a debt may be just that. */
 static bool share_out(enriching *e, packed_cell *p) {
 	const update *d = e->d;
-	const quern_real rounding = 1e-9, share = grain_share(d, p->c);
+	const quern_real rounding = 1e-9;
 	uint32_t near[27];
-	const uint32_t n = touching(d, p->cell, near);
+	const uint32_t n = block_of(d, p->c, p->cell, near);
 	p->first = e->n_numbers;
 	for (;; p->wanted++) {
-		const quern_real mass = share * mass_of(d->h, radius_of(d, next_number(e))), least = rounding * mass;
+		const quern_real mass = mass_of(d->h, radius_of(d, next_number(e))), least = rounding * mass;
 		bool lacks = e->rest[p->c] > least && e->around[p->c] > 0.5 * mass + least;
 		for (uint32_t k = 0; k < n; k++) lacks = lacks && e->around[near[k]] > least;
 		if (!lacks) return true;
@@ -276,6 +292,7 @@ static bool find_cells(enriching *e) {
 	const update *d = e->d;
 	size_t most = 0;
 	for (uint32_t c = 0; c < d->n_cells; c++) most += lacks_something(d, c);
+	if (!most) return true;
 	e->cell = d->s->host->memory(d->s->run, (most + 1) * sizeof *e->cell);
 	if (!e->cell || !measure_rests(e)) return false;
 	for (uint32_t q = 0; q < d->n_cells; q++) {

@@ -193,7 +193,7 @@ quern_status quern_hybrid_hand_over(update *d) {
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		source[c] = d->zone[c] == QUERN_HYBRID && d->open[c] > 0;
 		open[c] = d->open[c] > 0;
-		asked[c] = owed_by_grains(d, c);
+		asked[c] = open[c] && owed_by_grains(d, c);
 		any = any || asked[c];
 	}
 	if (!any) return QUERN_OK;
@@ -201,7 +201,7 @@ quern_status quern_hybrid_hand_over(update *d) {
 	if (status != QUERN_OK) return status;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		const uint32_t c = nth_cell(d, q);
-		if (nearest[c] >= 0 && owed_by_grains(d, c)) quern_hybrid_pass(d, c, (uint32_t)nearest[c]);
+		if (nearest[c] >= 0) quern_hybrid_pass(d, c, (uint32_t)nearest[c]);
 	}
 	return QUERN_OK;
 }

@@ -174,6 +174,7 @@ bool quern_hybrid_walled(
 	for (uint32_t k = 0; k < d->s->dim; k++) length += (to[k] - from[k]) * (to[k] - from[k]);
 	length = sqrt(length);
 	way = free_way(d, entry, from);
+	if (way <= near) way = 0;
 	for (int i = 0; i < 64 && way < length; i++) {
 		quern_real x[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) x[k] = from[k] + way / length * (to[k] - from[k]);

@@ -25,8 +25,9 @@ typedef struct {
 	bool boxes;           /* the source is a whole cell, not its centre */
 	bool walls;           /* nothing goes through a body */
 	quern_real most;      /* m: what is farther away nobody asks for */
-	bool *asked;          /* by cell, until it is reached; NULL: all are asked for */
-	uint32_t left;        /* of those */
+	const bool *asked;    /* by cell; NULL: all are asked for */
+	uint32_t left;        /* of those, not reached yet */
+	bool *reached;        /* by cell: nothing comes nearer any more; NULL: what comes later may be nearer */
 	bool failed;
 } spreading;
 
@@ -74,7 +75,7 @@ static quern_real length_of(const spreading *p, const int32_t way[3]) {
 
 static void offer(spreading *p, uint32_t cell, const int32_t way[3]) {
 	const quern_real distance = length_of(p, way);
-	if (!(distance < p->distance[cell])) return;
+	if (!(distance < p->distance[cell]) || (p->reached && p->reached[cell])) return;
 	p->distance[cell] = distance;
 	memcpy(p->way[cell], way, sizeof p->way[cell]);
 	push(p, (heap_entry) { distance, cell, p->place ? p->place[cell / N] * N + cell % N : cell });
@@ -100,10 +101,8 @@ static void spread(spreading *p, const bool *open) {
 		memcpy(home.at, p->d->g->at[home.block], sizeof home.at);
 		if (e.distance > p->most) break;
 		if (e.distance > p->distance[e.cell] || !quern_grid_cell_of(p->d->g, e.cell, cell)) continue;
-		if (p->asked && p->asked[e.cell]) {
-			p->asked[e.cell] = false;
-			if (!--p->left) break;
-		}
+		if (p->reached) p->reached[e.cell] = true;
+		if (p->asked && p->asked[e.cell] && !--p->left) break;
 		for (int z = -depth; z <= depth; z++)
 			for (int y = -1; y <= 1; y++)
 				for (int x = -1; x <= 1; x++) {
@@ -134,21 +133,25 @@ static bool spreading_init(spreading *p, update *d, bool boxes, quern_real *dist
 	return true;
 }
 
+/* Distance is that of the straight line and not of the way, which is as long where it goes round a body: who comes first stays, so that no one counts who
+ * is near behind the body, and the answer for one cell does not depend on who else asks. */
 quern_status quern_hybrid_nearest(
-	update *d, const bool *source, const bool *through, bool *asked, int32_t *nearest) {
+	update *d, const bool *source, const bool *through, const bool *asked, int32_t *nearest) {
 	spreading p;
 	quern_real *distance = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	if (!spreading_init(&p, d, false, distance)) return QUERN_E_MEMORY;
 	p.walls = true;
 	p.asked = asked;
-	for (uint32_t c = 0; c < d->n_cells; c++) p.left += asked[c];
+	p.reached = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1);
+	if (!p.reached) return QUERN_E_MEMORY;
+	for (uint32_t c = 0; c < d->n_cells; c++) p.left += asked[c], p.reached[c] = false;
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
 	spread(&p, through);
 	for (uint32_t c = 0; c < d->n_cells; c++) {
 		int32_t cell[3];
 		nearest[c] = -1;
-		if (!isfinite(distance[c]) || !quern_grid_cell_of(d->g, c, cell)) continue;
+		if (!asked[c] || !p.reached[c] || !quern_grid_cell_of(d->g, c, cell)) continue;
 		for (uint32_t k = 0; k < d->g->dim; k++) cell[k] += p.way[c][k];
 		nearest[c] = quern_grid_entry_back(d->g, cell);
 	}

@@ -66,7 +66,8 @@ static void crowd(quern_run *run, int dim, bool hyper, bool open) {
 	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
 		const int column = (int)floor(x.real[0][i] / cell) - first;
 		if (w.real[0][i] == 1 && i % 4) x.real[0][i] -= (column % 4) * cell;
-		m.real[0][i] *= 0.8 + 0.4 * uniform();
+		m.real[0][i] *=
+			(0.8 + 0.4 * uniform()) * (w.real[0][i] < 1 ? 0.5 : 1); /* no grains are lacking there */
 		const double p = open ? 0 : 100 * uniform(), strain = open ? 0.3 * uniform() : -p / 1e5;
 		volume.real[0][i] = m.real[0][i] / density * (1 + strain);
 		for (int k = 0; k < (dim == 2 ? 3 : 6); k++) {
