@@ -66,6 +66,53 @@ static void far_entries_find_a_cell(void **state) {
 	harness_close(run);
 }
 
+static double in_points(quern_run *run, int32_t c) {
+	const quern_column x = harness_field(run, "point.position"), m = harness_field(run, "point.mass"),
+					   w = harness_field(run, "point.weight");
+	double sum = 0;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+		if (cell_at(run, x.real[0][i], x.real[1][i]) == c) sum += w.real[0][i] * m.real[0][i];
+	return sum;
+}
+
+/* A plate along half of a box; a hybrid cell A far above it and one, B, just below. What is owed just above goes to A, whoever else owes
+ * something: B is near in a straight line alone, and is not reached but round the plate's end, where A is nearer. */
+static void plates_are_gone_round(void **state) {
+	(void)state;
+	for (int other = 0; other <= 1; other++) {
+		char path[HARNESS_PATH];
+		FILE *out = harness_file(path);
+		fprintf(out, "x y\n");
+		for (int j = 0; j < 14; j++)
+			for (int i = 0; i < 20; i++) fprintf(out, "%.17g %.17g\n", (i + 0.3) * cell, (j + 0.3) * cell);
+		fclose(out);
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.08, 0.056]}\n"
+			"time: {end: 1e-6, step: 1e-9}\n"
+			"bodies: [{box: {lower: [-0.01, 0.0239], upper: [0.04, 0.0241]}}]\n"
+			"grains: {material: {density: 2500, radius: {mean: 0.8 mm}},\n"
+			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
+			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+			"hybrid: {oracle: [{fixed: {otherwise: discrete, boxes: [{lower: [0.008, 0.052], upper: [0.012, 0.056], zone: hybrid},"
+			" {lower: [0.008, 0.02], upper: [0.012, 0.0235], zone: hybrid}]}}], substeps: 1, update: 1}\n",
+			path, cell);
+		unlink(path);
+		harness_steps(run, 3);
+		const int32_t a = cell_at(run, 0.01, 0.054), b = cell_at(run, 0.01, 0.022),
+					  owed = cell_at(run, 0.01, 0.03);
+		assert_int_equal(harness_field(run, "cell.zone").index[a], QUERN_HYBRID);
+		assert_int_equal(harness_field(run, "cell.zone").index[b], QUERN_HYBRID);
+		const double before[2] = { in_points(run, a), in_points(run, b) };
+		harness_field(run, "cell.owed").real[0][owed] = 1e-4;
+		if (other) harness_field(run, "cell.owed").real[0][cell_at(run, 0.074, 0.006)] = 1e-12;
+		update(run);
+		assert_true(harness_field(run, "cell.owed").real[0][cell_at(run, 0.01, 0.03)] == 0);
+		assert_true(fabs(in_points(run, cell_at(run, 0.01, 0.054)) - before[0] - 1e-4) < 1e-9);
+		assert_true(fabs(in_points(run, cell_at(run, 0.01, 0.022)) - before[1]) < 1e-9);
+		harness_close(run);
+	}
+}
+
 /* One grain in each of so many cells, which the oracle takes for hybrid ones, all or some of them. */
 typedef struct sparse {
 	const char *name, *periodic, *oracle, *weights;
@@ -246,7 +293,7 @@ static void rough_floors_are_no_surface(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell),
-		cmocka_unit_test(debts_round_together), cmocka_unit_test(walls_are_no_surface),
-		cmocka_unit_test(rough_floors_are_no_surface) };
+		cmocka_unit_test(plates_are_gone_round), cmocka_unit_test(debts_round_together),
+		cmocka_unit_test(walls_are_no_surface), cmocka_unit_test(rough_floors_are_no_surface) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
