@@ -87,7 +87,7 @@ static const quern_use uses[] = { QUERN_END_USES };
 static const quern_set sets[] = { { .name = "point",
 									  .plural = "points",
 									  .counted = 1,
-									  .cost = { 40e-9, 100e-9 },
+									  .cost = { 32e-9, 70e-9 },
 									  .doc = "Material points, sorted by grid block and cell." },
 	{ .name = "node", .doc = "What points bring to the nodes.", .rows = 8 },
 	{ .name = "motion", .doc = "How nodes move.", .rows = 8 },
