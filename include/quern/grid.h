@@ -88,6 +88,9 @@ static inline int32_t quern_grid_block(const quern_grid_view *g, const int32_t a
 	return -1;
 }
 
+/* Blocks have 2^shift cells along each axis: quotients and rests without dividing. */
+QUERN_INLINE int quern_grid_shift(const quern_grid_view *g) { return g->dim == 2 ? 3 : 2; }
+
 /* Where somebody looked last; neighbours in space are mostly neighbours in the list, too. Begins as { -1 }. */
 typedef struct quern_grid_cursor {
 	int32_t block, at[3];
@@ -97,12 +100,13 @@ typedef struct quern_grid_cursor {
  * last block is tried first. */
 static inline int32_t quern_grid_entry_near(
 	const quern_grid_view *g, quern_grid_cursor *last, const int32_t cell[3]) {
-	const int32_t edge = (int32_t)g->edge;
+	const int shift = quern_grid_shift(g);
+	const int32_t rest = (1 << shift) - 1;
 	int32_t at[3], place = 0;
 	bool same = last->block >= 0;
 	for (int k = 2; k >= 0; k--) {
-		at[k] = cell[k] / edge;
-		place = place * edge + cell[k] % edge;
+		at[k] = cell[k] >> shift;
+		place = place << shift | (cell[k] & rest);
 		same = same && at[k] == last->at[k];
 		if (cell[k] < 0) return -1;
 	}
@@ -126,11 +130,12 @@ QUERN_INLINE int32_t quern_grid_entry_back(const quern_grid_view *g, int32_t cel
 
 /* The cell of an entry, or the node at its lower corner; false for what a block has beyond the domain's end. */
 QUERN_INLINE bool quern_grid_cell_of(const quern_grid_view *g, uint32_t entry, int32_t cell[3]) {
-	const uint32_t edge = g->edge, b = entry / QUERN_BLOCK_CELLS, k = entry % QUERN_BLOCK_CELLS;
-	const uint32_t place[3] = { k % edge, k / edge % edge, k / (edge * edge) };
+	const int shift = quern_grid_shift(g);
+	const uint32_t b = entry / QUERN_BLOCK_CELLS, k = entry % QUERN_BLOCK_CELLS, rest = (1u << shift) - 1;
+	const uint32_t place[3] = { k & rest, k >> shift & rest, k >> 2 * shift };
 	bool inside = true;
 	for (uint32_t a = 0; a < 3; a++) {
-		cell[a] = a < g->dim ? g->at[b][a] * (int32_t)edge + (int32_t)place[a] : 0;
+		cell[a] = a < g->dim ? g->at[b][a] * (1 << shift) + (int32_t)place[a] : 0;
 		inside = inside && cell[a] < g->cells[a];
 	}
 	return inside;

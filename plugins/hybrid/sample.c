@@ -15,39 +15,40 @@ typedef struct {
 
 /* Entries of the cells at the corners of a hat, -1 for none. In the midst of a block one is looked for, and the others are
  * steps away. */
-static void corners_of(sampling *p, const int32_t low[3], int32_t entry[8]) {
-	const uint32_t dim = p->s->dim;
-	const int32_t edge = (int32_t)p->g->edge;
+QUERN_INLINE void corners_of(sampling *p, const int32_t low[3], int32_t entry[8], const uint32_t dim) {
+	const int shift = dim == 2 ? 3 : 2;
+	const int32_t last = (1 << shift) - 1;
 	bool together = true;
 	for (uint32_t k = 0; k < dim; k++)
-		together = together && low[k] >= 0 && low[k] % edge != edge - 1 && low[k] + 1 < p->g->cells[k];
-	if (together) entry[0] = quern_grid_entry_near(p->g, &p->last, low);
-	for (uint32_t corner = together; corner < 1u << dim; corner++) {
-		int32_t cell[3] = { 0 }, way = 0;
-		for (uint32_t k = 3; k-- > 0;) way = way * edge + (int32_t)(corner >> k & 1);
-		for (uint32_t k = 0; k < dim; k++) cell[k] = low[k] + (int32_t)(corner >> k & 1);
-		if (together) {
-			entry[corner] = entry[0] < 0 ? -1 : entry[0] + way;
-			continue;
+		together = together && low[k] >= 0 && (low[k] & last) != last && low[k] + 1 < p->g->cells[k];
+	if (together) {
+		const int32_t first = quern_grid_entry_near(p->g, &p->last, low);
+		for (uint32_t corner = 0; corner < 1u << dim; corner++) {
+			int32_t way = 0;
+			for (uint32_t k = dim; k-- > 0;) way = way << shift | (int32_t)(corner >> k & 1);
+			entry[corner] = first < 0 ? -1 : first + way;
 		}
+		return;
+	}
+	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
+		int32_t cell[3] = { 0 };
+		for (uint32_t k = 0; k < dim; k++) cell[k] = low[k] + (int32_t)(corner >> k & 1);
 		if (!quern_grid_bring_back(p->g, cell)) quern_grid_hold(p->g, cell);
 		entry[corner] = quern_grid_entry_near(p->g, &p->last, cell);
 	}
 }
 
-/* -1/V (f b + b f)/2, shared out by hats centred at the cells; what would go behind a wall stays before it. */
-static void add(sampling *p, quern_vec at, quern_vec f, quern_vec b) {
-	const uint32_t dim = p->s->dim;
+QUERN_INLINE void add_in(sampling *p, quern_vec at, quern_vec f, quern_vec b, const uint32_t dim) {
 	const quern_real x[3] = { at.x, at.y, at.z };
 	const quern_column *stress = &p->s->use[S_STRESS];
 	int32_t low[3] = { 0 }, entry[8];
 	quern_real part[3] = { 0 };
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real t = (x[k] - p->g->lower[k]) / p->g->cell - 0.5;
-		low[k] = (int32_t)floor(t);
-		part[k] = t - floor(t);
+		const quern_real t = (x[k] - p->g->lower[k]) / p->g->cell - 0.5, below = floor(t);
+		low[k] = (int32_t)below;
+		part[k] = t - below;
 	}
-	corners_of(p, low, entry);
+	corners_of(p, low, entry, dim);
 	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
 		quern_real w = -p->one_over_volume;
 		for (uint32_t k = 0; k < dim; k++) w *= corner >> k & 1 ? part[k] : 1 - part[k];
@@ -55,6 +56,12 @@ static void add(sampling *p, quern_vec at, quern_vec f, quern_vec b) {
 		const symmetric share = symmetric_dyad(w, f, b);
 		SYMMETRIC_ADD(stress->real, entry[corner], share, dim);
 	}
+}
+
+/* -1/V (f b + b f)/2, shared out by hats centred at the cells; what would go behind a wall stays before it. */
+static void add(sampling *p, quern_vec at, quern_vec f, quern_vec b) {
+	if (p->s->dim == 2) add_in(p, at, f, b, 2);
+	else add_in(p, at, f, b, 3);
 }
 
 /* The branch goes from centre to centre, or between a centre and the contact where the other grain is fixed: that one
