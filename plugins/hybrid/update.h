@@ -92,8 +92,8 @@ bool quern_hybrid_walled(
 
 /* ---- zones.c ---- */
 quern_status quern_hybrid_zones(update *);
-/* By cell that is asked for: the cell with `source` set that is nearest, by centres, as one goes from cell to cell with `through` and through no body; -1 if
- * there is none, or nobody asks. */
+/* By cell that is asked for: the cell with `source` set that reaches it first in the order of distances between centres, from cell to cell with `through` and through no body;
+ * -1 if there is none, or nobody asks. */
 quern_status quern_hybrid_nearest(
 	update *, const bool *source, const bool *through, const bool *asked, int32_t *nearest);
 /* By cell with `through` set: m from its centre to the nearest cell with `source` set, from cell to cell with

@@ -169,7 +169,7 @@ static quern_real free_way(const update *d, uint32_t entry, const quern_real x[3
 bool quern_hybrid_walled(
 	const update *d, const bool *meant, uint32_t entry, const quern_real from[3], const quern_real to[3]) {
 	const quern_real near = 1e-6 * d->g->cell;
-	quern_real length = 0, way = 0;
+	quern_real length = 0, way;
 	if (d->wall[entry] >= 2 * d->g->cell) return false; /* within a cell, or from centre to centre */
 	for (uint32_t k = 0; k < d->s->dim; k++) length += (to[k] - from[k]) * (to[k] - from[k]);
 	length = sqrt(length);

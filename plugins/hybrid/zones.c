@@ -133,8 +133,8 @@ static bool spreading_init(spreading *p, update *d, bool boxes, quern_real *dist
 	return true;
 }
 
-/* Distance is that of the straight line and not of the way, which is as long where it goes round a body: who comes first stays, so that no one counts who
- * is near behind the body, and the answer for one cell does not depend on who else asks. */
+/* Distance is that of the straight line and not of the way, which is longer round a body: who comes first stays,
+ * mostly the one with the shortest way, and the answer for one cell does not depend on who else asks. */
 quern_status quern_hybrid_nearest(
 	update *d, const bool *source, const bool *through, const bool *asked, int32_t *nearest) {
 	spreading p;
@@ -144,7 +144,7 @@ quern_status quern_hybrid_nearest(
 	p.asked = asked;
 	p.reached = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1);
 	if (!p.reached) return QUERN_E_MEMORY;
-	for (uint32_t c = 0; c < d->n_cells; c++) p.left += asked[c], p.reached[c] = false;
+	for (uint32_t c = 0; c < d->n_cells; c++) p.left += asked[c];
 	for (uint32_t c = 0; c < d->n_cells; c++)
 		if (source[c]) offer(&p, c, (const int32_t[3]) { 0, 0, 0 });
 	spread(&p, through);

@@ -76,7 +76,7 @@ static double in_points(quern_run *run, int32_t c) {
 }
 
 /* A plate along half of a box; a hybrid cell A far above it and one, B, just below. What is owed just above goes to A, whoever else owes
- * something: B is near in a straight line alone, and is not reached but round the plate's end, where A is nearer. */
+ * something: it is reached first. B is near in a straight line alone, and comes round the plate's end. */
 static void plates_are_gone_round(void **state) {
 	(void)state;
 	for (int other = 0; other <= 1; other++) {
@@ -164,7 +164,7 @@ static double grains_got(quern_run *run, const sparse *l, double *lacking) {
 #define ALL "otherwise: hybrid"
 #define BAND "ramp: 24 mm, boxes: [{lower: [0, 0], upper: [8 mm, 1], zone: discrete}]"
 /* Cells that each lack a share of a grain get as many grains as all of them lack, to two thirds of a grain in a block of nine (or of the six
- * that there are), though hardly one of them lacks a whole one; and none where others beside them have as much too much. */
+ * that there are), most of them though none lacks a whole one; and none where others beside them have as much too much. */
 static void debts_round_together(void **state) {
 	static const sparse of[] = {
 		{ "cells lack 0.2 of a grain", "true, true", ALL, "half", 16, 16, { 0.2, 0.2 }, 0.667 / 9 },
