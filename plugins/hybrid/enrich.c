@@ -16,6 +16,7 @@ typedef struct {
 	int32_t cell[3];
 	quern_real lower[3], upper[3];
 	uint32_t first, wanted; /* numbers of its grains, in `numbers` */
+	uint32_t whole, most;   /* of these, how many it lacks all of; how many may be placed now */
 	new_grain *grain;
 	uint32_t n;
 	quern_real part; /* of its radius that a grain begins with */
@@ -128,20 +129,21 @@ static bool measure_rests(enriching *e) {
 
 /* A cell holds a few grains. If each got one only when a whole one is lacking, all would lack half
  * of one in the mean, an eighth of their grains in 2-D; half a grain too much in each would never be
- * paid back, since none is taken away. So a cell that lacks anything gets one while its block lacks
+ * paid back, since none is taken away. So a cell that lacks anything, and holds as much, gets one while its block lacks
  * half of one, unless a block that it is in would have a whole one too many then. Sums round, and
  * where all grains are alike a debt may be just that. */
 static bool share_out(enriching *e, packed_cell *p) {
 	const update *d = e->d;
-	const quern_real rounding = 1e-9;
+	const quern_real rounding = 1e-9, holds = cell_holds(d, p->c);
 	uint32_t near[27];
 	const uint32_t n = block_of(d, p->c, p->cell, near);
 	p->first = e->n_numbers;
 	for (;; p->wanted++) {
 		const quern_real mass = mass_of(d->h, radius_of(d, next_number(e))), least = rounding * mass;
-		bool lacks = e->rest[p->c] > least && e->around[p->c] > 0.5 * mass + least;
+		bool lacks = holds >= mass && e->rest[p->c] > least && e->around[p->c] > 0.5 * mass + least;
 		for (uint32_t k = 0; k < n; k++) lacks = lacks && e->around[near[k]] > least;
 		if (!lacks) return true;
+		p->whole += e->rest[p->c] > mass - least;
 		e->rest[p->c] -= mass;
 		for (uint32_t k = 0; k < n; k++) e->around[near[k]] -= mass;
 		if (!take_number(e)) return false;
@@ -203,7 +205,7 @@ static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
 static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 	packed_cell *p = job->scene;
 	const update *d = p->all->d;
-	if (p->n == p->wanted) return false;
+	if (p->n >= p->most) return false;
 	if (!p->grain) p->grain = malloc(p->wanted * sizeof(new_grain));
 	if (!p->grain) return p->failed = true, false;
 	new_grain *g = &p->grain[p->n++];
@@ -212,7 +214,7 @@ static bool job_place(quern_pack_job *job, const quern_spot *spot) {
 		.weight = grain_share(d, p->c),
 		.cell = (int32_t)p->c };
 	memcpy(g->position, spot->x, sizeof g->position);
-	return p->n < p->wanted;
+	return p->n < p->most;
 }
 
 /* ---- one cell ---- */
@@ -268,13 +270,16 @@ static void enrich_cell(packed_cell *p) {
 	memcpy(job.upper, p->upper, sizeof job.upper);
 	find_upstream(d, p->c, job.upstream);
 	const quern_packer_ops *ops = packer->ops;
-	const bool grows = d->h->growth > 0;
+	/* what is rounded up finds room or waits: where nothing presses, grains that are squeezed in would */
+	const bool grows = d->h->growth > 0 && (!ops->shrinks || p->whole == p->wanted);
 	if (grows && ops->shrinks) job.growth = QUERN_GROWS_ALONE;
-	for (uint32_t k = 0; k < 4 && p->n < p->wanted && (!k || (grows && !ops->shrinks)); k++) {
+	p->most = p->wanted;
+	for (uint32_t k = 0; k < 4 && p->n < p->most && (!k || (grows && !ops->shrinks)); k++) {
 		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
 		p->part = parts[k];
 		job.counter = ((uint64_t)d->u[U_UPDATES].index[0] << 32) + ((uint64_t)k << 24);
 		ops->pack[d->s->dim - 2](packer->self, &job);
+		p->most = p->whole;
 	}
 	free(seed);
 	settle(p);
