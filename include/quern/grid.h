@@ -88,8 +88,8 @@ static inline int32_t quern_grid_block(const quern_grid_view *g, const int32_t a
 	return -1;
 }
 
-/* Blocks have 2^shift cells along each axis: quotients and rests without dividing. */
-QUERN_INLINE int quern_grid_shift(const quern_grid_view *g) { return g->dim == 2 ? 3 : 2; }
+/* Blocks have 2^shift cells along each axis, which is their `edge`: quotients and rests without dividing. */
+QUERN_INLINE int quern_block_shift(uint32_t dim) { return dim == 2 ? 3 : 2; }
 
 /* Where somebody looked last; neighbours in space are mostly neighbours in the list, too. Begins as { -1 }. */
 typedef struct quern_grid_cursor {
@@ -100,7 +100,7 @@ typedef struct quern_grid_cursor {
  * last block is tried first. */
 static inline int32_t quern_grid_entry_near(
 	const quern_grid_view *g, quern_grid_cursor *last, const int32_t cell[3]) {
-	const int shift = quern_grid_shift(g);
+	const int shift = quern_block_shift(g->dim);
 	const int32_t rest = (1 << shift) - 1;
 	int32_t at[3], place = 0;
 	bool same = last->block >= 0;
@@ -130,7 +130,7 @@ QUERN_INLINE int32_t quern_grid_entry_back(const quern_grid_view *g, int32_t cel
 
 /* The cell of an entry, or the node at its lower corner; false for what a block has beyond the domain's end. */
 QUERN_INLINE bool quern_grid_cell_of(const quern_grid_view *g, uint32_t entry, int32_t cell[3]) {
-	const int shift = quern_grid_shift(g);
+	const int shift = quern_block_shift(g->dim);
 	const uint32_t b = entry / QUERN_BLOCK_CELLS, k = entry % QUERN_BLOCK_CELLS, rest = (1u << shift) - 1;
 	const uint32_t place[3] = { k & rest, k >> shift & rest, k >> 2 * shift };
 	bool inside = true;

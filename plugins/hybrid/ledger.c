@@ -178,7 +178,7 @@ static bool owed_by_grains(const update *d, uint32_t c) {
 	return d->zone[c] == QUERN_DISCRETE && quern_hybrid_is_owed(d->u, c, d->s->dim);
 }
 
-/* Grains are only placed where the continuum is near: a discrete cell gives its entry to the nearest hybrid one that is not behind a
+/* Grains are only placed where the continuum is near: a discrete cell gives its entry to the hybrid one that reaches it first, through no
  * body; where there is none the entry waits. */
 quern_status quern_hybrid_hand_over(update *d) {
 	bool *source = d->s->host->memory(d->s->run, (size_t)d->n_cells + 1), any = false;

@@ -16,7 +16,7 @@ typedef struct {
 /* Entries of the cells at the corners of a hat, -1 for none. In the midst of a block one is looked for, and the others are
  * steps away. */
 QUERN_INLINE void corners_of(sampling *p, const int32_t low[3], int32_t entry[8], const uint32_t dim) {
-	const int shift = dim == 2 ? 3 : 2;
+	const int shift = quern_block_shift(dim);
 	const int32_t last = (1 << shift) - 1;
 	bool together = true;
 	for (uint32_t k = 0; k < dim; k++)

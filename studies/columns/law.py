@@ -13,8 +13,11 @@ import argparse
 import csv
 import math
 import pathlib
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import findings  # noqa: E402: found there
 GRAVITY, MOST_BROAD, LEAST_SLENDER = 9.81, 2.5, 3.5
 WIDTH = {"0.5": 0.282, "1": 0.198, "2": 0.14, "4": 0.099, "6": 0.081, "8": 0.07}  # m, of the cases of studies/columns.yaml
 
@@ -40,12 +43,9 @@ def look(run, width):
 def found(folder):
     """For each method and seed: aspect, run-out and time of every column."""
     by = {}
-    with open(folder / "table.csv") as file:
-        for line in csv.DictReader(file):
-            row = {key.split(" [")[0]: value for key, value in line.items()}
-            if row["status"] == "done":
-                seeds = by.setdefault(name_of(row), {})
-                seeds.setdefault(row["seed"], []).append(look(folder / "runs" / row["run"], WIDTH[f"{float(row['aspect']):g}"]))
+    for row in findings.rows(folder):
+        seeds = by.setdefault(name_of(row), {})
+        seeds.setdefault(row["seed"], []).append(look(folder / "runs" / row["run"], WIDTH[f"{float(row['aspect']):g}"]))
     return by
 
 

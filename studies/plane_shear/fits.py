@@ -6,15 +6,14 @@
 
 Writes between the marks of the page. Straight lines are by least squares over I <= 0.1, the curve mu_s + (mu_2 - mu_s)/(I_0/I + 1) over all I, each
 seed by itself: a constant is the mean over seeds, with the standard deviation between them. I is that of the normal stress that was there."""
-import argparse
-import csv
 import pathlib
-import re
+import sys
 
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-BEGIN, END = "<!-- fits -->\n", "<!-- end of fits -->"
+sys.path.insert(0, str(ROOT / "tools"))
+import findings  # noqa: E402: found there
 PRESSURE = 0.01  # Pa, times 1/I^2: of the study
 CRUZ = np.sqrt(np.pi) / 2  # I of da Cruz et al., with the root of a disc's mass, over ours
 
@@ -22,15 +21,12 @@ CRUZ = np.sqrt(np.pi) / 2  # I of da Cruz et al., with the root of a disc's mass
 def found(folder):
     """By seed: I asked, friction, packing fraction, normal stress over what was asked, and I, each by I asked."""
     seeds = {}
-    with open(folder / "table.csv") as file:
-        for line in csv.DictReader(file):
-            row = {key.split(" [")[0]: value for key, value in line.items()}
-            if row["status"] == "done":
-                at = float(row["inertial_number"])
-                normal = float(row["normal"]) + float(row["normal_kinetic"])
-                shear = float(row["shear"]) + float(row["shear_kinetic"])
-                over = normal * at ** 2 / PRESSURE
-                seeds.setdefault(int(row["seed"]), []).append((at, -shear / normal, float(row["packing"]), over, at / np.sqrt(over)))
+    for row in findings.rows(folder):
+        at = float(row["inertial_number"])
+        normal = float(row["normal"]) + float(row["normal_kinetic"])
+        shear = float(row["shear"]) + float(row["shear_kinetic"])
+        over = normal * at ** 2 / PRESSURE
+        seeds.setdefault(int(row["seed"]), []).append((at, -shear / normal, float(row["packing"]), over, at / np.sqrt(over)))
     return {seed: np.array(sorted(rows)).T for seed, rows in seeds.items()}
 
 
@@ -82,16 +78,5 @@ def tables(seeds):
     return "\n".join(rows) + "\n"
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/plane_shear")
-    parser.add_argument("--page", type=pathlib.Path, default=ROOT / "docs/validation/plane_shear.md")
-    args = parser.parse_args()
-    text = tables(found(args.sweep))
-    page = args.page.read_text()
-    args.page.write_text(re.sub(f"{BEGIN}.*?{END}", lambda _: BEGIN + text + END, page, flags=re.S))
-    print(text, end="")
-
-
 if __name__ == "__main__":
-    main()
+    findings.write(__doc__, "plane_shear", "fits", lambda folder: tables(found(folder)))

@@ -6,26 +6,22 @@
 
 Writes between the marks of the page. W^(2/3) is a straight line over the width L: its zero is at k D, and its slope gives C in
 W = C rho_b sqrt(g) (L - k D)^(3/2). R^2 is that of the line."""
-import argparse
-import csv
 import math
 import pathlib
-import re
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import findings  # noqa: E402: found there
 DENSITY, DIAMETER, GRAVITY = 2008, 2e-3, 9.81  # of configs/silo.yaml
-BEGIN, END = "<!-- beverloo -->\n", "<!-- end of beverloo -->"
 
 
 def rates(folder):
     """Widths in m and mean rates in kg/s, by method."""
     found = {}
-    with open(folder / "table.csv") as file:
-        for line in csv.DictReader(file):
-            row = {key.split(" [")[0]: value for key, value in line.items()}
-            if row["status"] == "done":
-                method = row["model"] or row["method"]
-                found.setdefault(method, {}).setdefault(float(row["opening"]) * DIAMETER, []).append(float(row["rate"]))
+    for row in findings.rows(folder):
+        method = row["model"] or row["method"]
+        found.setdefault(method, {}).setdefault(float(row["opening"]) * DIAMETER, []).append(float(row["rate"]))
     return {method: sorted((width, sum(w) / len(w)) for width, w in by.items()) for method, by in found.items()}
 
 
@@ -37,24 +33,13 @@ def straight(points):
     return xy / xx, xm - ym * xx / xy, xy * xy / (xx * yy)
 
 
-def table(found):
+def table(folder):
     rows = ["| method | C | k | R² |", "|---|---|---|---|"]
-    for method, points in found.items():
+    for method, points in rates(folder).items():
         slope, zero, square = straight([(width, rate ** (2 / 3)) for width, rate in points])
         rows.append(f"| {method} | {slope ** 1.5 / (DENSITY * math.sqrt(GRAVITY)):.3f} | {zero / DIAMETER:.2f} | {square:.5f} |")
     return "\n".join(rows) + "\n"
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/silo")
-    parser.add_argument("--page", type=pathlib.Path, default=ROOT / "docs/validation/silo.md")
-    args = parser.parse_args()
-    text = table(rates(args.sweep))
-    page = args.page.read_text()
-    args.page.write_text(re.sub(f"{BEGIN}.*?{END}", lambda _: BEGIN + text + END, page, flags=re.S))
-    print(text, end="")
-
-
 if __name__ == "__main__":
-    main()
+    findings.write(__doc__, "silo", "beverloo", table)

@@ -7,18 +7,17 @@
 Writes between the marks of the page: for the grains 12 to 52 mm above the floor in four slices along the flow, the mean of cos 6 theta over all neighbours of each, those whose
 centres are less than 1.3 mean diameters away, with the angle theta of the line between the two to the flow; from 5 s on. It is 0 where they lie in any direction and 1 in a
 lattice whose rows lie along the flow."""
-import argparse
-import csv
 import math
 import pathlib
-import re
+import sys
 
 import h5py
 import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import findings  # noqa: E402: found there
 LENGTH, DIAMETER, LOWEST, HIGHEST, FROM = 0.16, 2e-3, 12e-3, 52e-3, 5.0  # of configs/strip.yaml; s
-BEGIN, END = "<!-- alignment -->\n", "<!-- end of alignment -->"
 SLICES = [(130, 145), (145, 160), (0, 15), (15, 30)]  # mm, from the strip's exit on to its entry
 
 
@@ -49,11 +48,8 @@ def of_run(folder):
 def runs(folder):
     """Folders of runs, by spread and model."""
     found = {}
-    with open(folder / "table.csv") as file:
-        for line in csv.DictReader(file):
-            row = {key.split(" [")[0]: value for key, value in line.items()}
-            if row["status"] == "done":
-                found.setdefault((row["spread"], row["model"] or "hybrid"), []).append(folder / "runs" / row["run"])
+    for row in findings.rows(folder):
+        found.setdefault((row["spread"], row["model"] or "hybrid"), []).append(folder / "runs" / row["run"])
     return found
 
 
@@ -66,16 +62,5 @@ def table(folder):
     return "\n".join(rows) + "\n"
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/strip_long")
-    parser.add_argument("--page", type=pathlib.Path, default=ROOT / "docs/validation/strip_long.md")
-    args = parser.parse_args()
-    text = table(args.sweep)
-    page = args.page.read_text()
-    args.page.write_text(re.sub(f"{BEGIN}.*?{END}", lambda _: BEGIN + text + END, page, flags=re.S))
-    print(text, end="")
-
-
 if __name__ == "__main__":
-    main()
+    findings.write(__doc__, "strip_long", "alignment", table)

@@ -75,17 +75,22 @@ static double in_points(quern_run *run, int32_t c) {
 	return sum;
 }
 
+/* A file of grains, one in each cell. */
+static void put_one_each(char path[HARNESS_PATH], int columns, int rows) {
+	FILE *out = harness_file(path);
+	fprintf(out, "x y\n");
+	for (int j = 0; j < rows; j++)
+		for (int i = 0; i < columns; i++) fprintf(out, "%.17g %.17g\n", (i + 0.3) * cell, (j + 0.3) * cell);
+	fclose(out);
+}
+
 /* A plate along half of a box; a hybrid cell A far above it and one, B, just below. What is owed just above goes to A, whoever else owes
  * something: it is reached first. B is near in a straight line alone, and comes round the plate's end. */
 static void plates_are_gone_round(void **state) {
 	(void)state;
 	for (int other = 0; other <= 1; other++) {
 		char path[HARNESS_PATH];
-		FILE *out = harness_file(path);
-		fprintf(out, "x y\n");
-		for (int j = 0; j < 14; j++)
-			for (int i = 0; i < 20; i++) fprintf(out, "%.17g %.17g\n", (i + 0.3) * cell, (j + 0.3) * cell);
-		fclose(out);
+		put_one_each(path, 20, 14);
 		quern_run *run = harness_open(1,
 			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.08, 0.056]}\n"
 			"time: {end: 1e-6, step: 1e-9}\n"
@@ -122,12 +127,7 @@ typedef struct sparse {
 
 static quern_run *open_sparse(const sparse *l) {
 	char path[HARNESS_PATH];
-	FILE *out = harness_file(path);
-	fprintf(out, "x y\n");
-	for (int j = 0; j < l->rows; j++)
-		for (int i = 0; i < l->columns; i++)
-			fprintf(out, "%.17g %.17g\n", (i + 0.3) * cell, (j + 0.3) * cell);
-	fclose(out);
+	put_one_each(path, l->columns, l->rows);
 	quern_run *run = harness_open(1,
 		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [%g, %g], periodic: [%s]}\n"
 		"time: {end: 1e-6, step: 1e-9}\n"
