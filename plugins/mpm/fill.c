@@ -88,6 +88,16 @@ static quern_status find_places(
 		item->above.n ? " and above that body" : "", p->cell / p->points);
 }
 
+/* By numbers that belong to the place. */
+static void move_off(const mpm *p, const quern_step *s, const filling *f, uint32_t place, quern_real x[3]) {
+	const quern_real most = 0.5 * f->item->jitter;
+	const uint64_t key = (uint64_t)(f->item - (const mpm_fill *)p->fill.items) << 32 | place;
+	quern_real u[4];
+	for (uint64_t pair = 0; pair < 2; pair++)
+		s->host->random(p->stream + STREAM_FILLS, key, pair, u + 2 * pair);
+	for (uint32_t k = 0; k < p->dim; k++) x[k] += most * (2 * u[k] - 1) * f->lattice.spacing[k];
+}
+
 static void place(const mpm *p, const quern_step *s, const filling *f, uint32_t i) {
 	const quern_column *u = s->use;
 	const quern_real volume = lattice_volume(&f->lattice, p->dim);
@@ -95,6 +105,7 @@ static void place(const mpm *p, const quern_step *s, const filling *f, uint32_t 
 		quern_real x[3] = { 0 };
 		if (!f->in[q]) continue;
 		lattice_place(&f->lattice, f->item->lower, q, p->dim, x);
+		if (f->item->jitter > 0) move_off(p, s, f, q, x);
 		for (uint32_t k = 0; k < p->dim; k++) {
 			u[FILL_POSITION].real[k][i] = x[k];
 			u[FILL_VELOCITY].real[k][i] = f->item->velocity[k];

@@ -38,11 +38,12 @@ typedef struct mpm {
 } mpm;
 
 enum { STRESS_NONE, STRESS_AT_REST };
+enum { STREAM_SOURCES, STREAM_FILLS };
 enum { RASTERISE_AUTO, RASTERISE_PLAIN, RASTERISE_AFFINE };
 
 typedef struct mpm_fill {
 	quern_real lower[3], upper[3]; /* m, of the box around its region */
-	quern_real velocity[3], lateral;
+	quern_real velocity[3], lateral, jitter;
 	int32_t stress;
 	quern_list above;
 } mpm_fill;

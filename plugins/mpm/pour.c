@@ -66,7 +66,7 @@ static bool draw_way(pouring *w) {
 	if (!key || !work || !w->way) return false;
 	for (uint32_t k = 0; k < n; k++) {
 		quern_real u[2];
-		s->host->random(w->p->stream, (uint64_t)w->i << 32 | k, (uint64_t)s->step, u);
+		s->host->random(w->p->stream + STREAM_SOURCES, (uint64_t)w->i << 32 | k, (uint64_t)s->step, u);
 		key[k] = (uint64_t)(u[0] * 0x1p32);
 	}
 	quern_sort_order(n, key, NULL, w->way, work);

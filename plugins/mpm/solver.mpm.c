@@ -11,6 +11,9 @@ static const char *const stresses[] = { "none", "at_rest", NULL };
 static const char *const rasters[] = { "auto", "plain", "affine", NULL };
 static const quern_param fill_rows[] = { REGION_ABOVE(mpm_fill),
 	QUERN_PARAM(mpm_fill, velocity, "m/s", "Velocity at the start."),
+	QUERN_PARAM(mpm_fill, jitter, "1",
+		"How far a point may be off its place at the start, over half the distance to the next one; a little of it shows by several seeds what is chance.",
+		.max = 1),
 	QUERN_PARAM(mpm_fill, stress, "1", "Stress at the start: none, or that of the weight above.",
 		.choices = stresses),
 	QUERN_PARAM(mpm_fill, lateral, "1", "Horizontal over vertical stress at rest.", .def = 0.6, .max = 10),

@@ -86,15 +86,25 @@ def table(by):
     return "\n".join(rows) + "\n"
 
 
+def mean_of(values):
+    """The mean and its standard error; infinite of one value alone."""
+    n = len(values)
+    mean = sum(values) / n
+    return mean, math.sqrt(sum((x - mean) ** 2 for x in values) / (n - 1) / n) if n > 1 else math.inf
+
+
 def convergence(by):
-    """Run-outs of each aspect in cells of 8, 4 and 2 mm, and the order in which the last two are nearer than the first two."""
+    """Run-outs of each aspect in cells of 8, 4 and 2 mm, and the order in which the last two are nearer than the first two; none where the last
+    two do not differ by more than twice their error."""
     rows = ["| material | aspect | 8 mm | 4 mm | 2 mm | order |", "|---|---|---|---|---|---|"]
-    for material in sorted({name.rpartition(", ")[0] for name in by}):
-        sizes = [[one for columns in by[f"{material}, {cell} mm"].values() for one in sorted(columns)] for cell in (8, 4, 2)]
-        for aspect, *three in zip(sorted(WIDTH, key=float), *sizes):
-            coarse, middle, fine = (one[1] for one in three)
-            order = f"{math.log2(abs((coarse - middle) / (middle - fine))):.1f}"
-            rows.append(f"| {material} | {aspect} | {coarse:.3f} | {middle:.3f} | {fine:.3f} | {order} |")
+    for material in sorted({name.rpartition(", ")[0] for name in by}, reverse=True):
+        sizes = [[sorted(columns) for columns in by[f"{material}, {cell} mm"].values()] for cell in (8, 4, 2)]
+        for k, aspect in enumerate(sorted(WIDTH, key=float)):
+            means = [mean_of([columns[k][1] for columns in seeds]) for seeds in sizes]
+            (coarse, _), (middle, one), (fine, other) = means
+            surely = abs(middle - fine) > 2 * math.hypot(one, other)
+            order = f"{math.log2(abs((coarse - middle) / (middle - fine))):.1f}" if surely else ""
+            rows.append(f"| `{material}` | {aspect} | {' | '.join(f'{mean:.3f} ± {error:.3f}' for mean, error in means)} | {order} |")
     return "\n".join(rows) + "\n"
 
 

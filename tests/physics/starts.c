@@ -117,6 +117,42 @@ static void points_in_bodies_are_left_out(void **state) {
 	assert_true(good);
 }
 
+/* Places of the points of a lattice of 10 to a side in a unit square, which are moved off theirs by `jitter`. */
+static void lattice_places(double jitter, int seed, double x[2][100]) {
+	quern_run *run = harness_open(1,
+		"{quern: 1, dimension: 2, seed: %d, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [1, 1]}, time: {end: 1},\n"
+		"continuum: {cell: 0.2, material: {elastic: {bulk_modulus: 1e6, density: 1500}}, fill: {jitter: %g, "
+		"region: {box: {lower: [0, 0], upper: [1, 1]}}}}}\n",
+		seed, jitter);
+	const quern_column places = harness_field(run, "point.position");
+	assert_int_equal(harness_count(run, "point"), 100);
+	for (int k = 0; k < 2; k++)
+		for (int i = 0; i < 100; i++) x[k][i] = places.real[k][i];
+	harness_close(run);
+}
+
+/* Points may be moved off their lattice: by no more than is asked, to all sides alike, another way with another seed, and always the
+ * same way with the same. */
+static void points_off_their_places(void **state) {
+	double plain[2][100], moved[2][100], again[2][100], other[2][100];
+	(void)state;
+	lattice_places(0, 1, plain);
+	lattice_places(0.5, 1, moved);
+	lattice_places(0.5, 1, again);
+	lattice_places(0.5, 2, other);
+	assert_memory_equal(moved, again, sizeof moved);
+	for (int k = 0; k < 2; k++) {
+		double sum = 0, square = 0, least = 1;
+		for (int i = 0; i < 100; i++) {
+			const double off = (moved[k][i] - plain[k][i]) / (0.5 * 0.1 * 0.5);
+			assert_true(fabs(off) <= 1 + 1e-9);
+			sum += off / 100, square += off * off / 100;
+			least = fmin(least, fabs(moved[k][i] - other[k][i]));
+		}
+		assert_true(fabs(sum) < 0.2 && fabs(square - 1.0 / 3) < 0.1 && least > 0);
+	}
+}
+
 /* What plan and run say about settling is within a factor of three of what it takes, in steps: it scales with the height
  * of the fill and with the step. A tenth of the stiffness needs a third of the steps. */
 static void settling_is_estimated(void **state) {
@@ -172,6 +208,7 @@ static void steps_may_be_as_short(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(height_is_along_gravity),
 		cmocka_unit_test(stiffness_is_that_of_the_whole), cmocka_unit_test(points_in_bodies_are_left_out),
-		cmocka_unit_test(settling_is_estimated), cmocka_unit_test(steps_may_be_as_short) };
+		cmocka_unit_test(settling_is_estimated), cmocka_unit_test(points_off_their_places),
+		cmocka_unit_test(steps_may_be_as_short) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
