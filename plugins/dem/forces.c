@@ -103,7 +103,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	const forces_shared *sh = arg;
 	forces_work w;
-	char *base = sh->s->host->scratch(sh->s->run, worker, lay_out(sh, &w, NULL));
+	char *base = sh->s->host->scratch(sh->s->run, worker, sh->bytes);
 	if (!base) {
 		sh->bad[b] = (int32_t)sh->grain[b];
 		return;
@@ -130,8 +130,7 @@ static void pack_block(void *arg, uint32_t b, uint32_t worker) {
  * are: they need no zeros, which the host's memory would get first. */
 static bool pack_grains(forces_shared *sh, const quern_set_view grains) {
 	const quern_step *s = sh->s;
-	forces_work w;
-	const size_t own = (lay_out(sh, &w, NULL) + 63) & ~(size_t)63, row = sizeof *sh->place,
+	const size_t own = (sh->bytes + 63) & ~(size_t)63, row = sizeof *sh->place,
 				 motions = packed_motions((int)s->dim), means = sh->means ? motions : 0;
 	char *base = s->host->scratch(s->run, 0, own + (1 + motions + means) * row * grains.n);
 	if (!base) return false;
@@ -144,6 +143,8 @@ static bool pack_grains(forces_shared *sh, const quern_set_view grains) {
 
 /* All blocks: the same whether they move or are looked at. */
 static bool act_on_blocks(forces_shared *sh, const quern_set_view grains) {
+	forces_work w;
+	sh->bytes = lay_out(sh, &w, NULL);
 	if ((sh->contact || sh->predicts) && !pack_grains(sh, grains)) return false;
 	sh->s->host->parallel(sh->s->run, grains.n_blocks, move_block, sh);
 	return true;

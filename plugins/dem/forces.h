@@ -58,6 +58,7 @@ typedef struct forces_shared {
 	const quern_step *s;
 	const quern_column *use;
 	uint32_t cap, most_grains, n_bodies, n_laws;
+	size_t bytes; /* of a worker's columns */
 	bool spin, couple;
 	quern_real waits;   /* 1: as much of the kick again is given in the next step; 0: all of it in this one */
 	bool predicts;      /* dashpots act on other velocities than those by which grains have moved */
