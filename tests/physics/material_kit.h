@@ -6,7 +6,7 @@
 #include "table.h"
 #include <quern/material.h>
 
-enum { POINTS = 10000, COLUMNS = 19, FIELDS = 4 };
+enum { POINTS = 100000, COLUMNS = 19, FIELDS = 4 };
 enum { MU_I, DRUCKER_PRAGER, ELASTIC, MATERIALS };
 extern const char *const ids[MATERIALS];
 
