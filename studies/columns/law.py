@@ -95,7 +95,7 @@ def mean_of(values):
 
 def convergence(by):
     """Run-outs of each aspect in cells of 8, 4 and 2 mm, and the order in which the last two are nearer than the first two; none where the last
-    two do not differ by more than twice their error."""
+    two do not differ by more than twice their error; `to and fro` where the second change is the other way."""
     rows = ["| material | aspect | 8 mm | 4 mm | 2 mm | order |", "|---|---|---|---|---|---|"]
     for material in sorted({name.rpartition(", ")[0] for name in by}, reverse=True):
         sizes = [[sorted(columns) for columns in by[f"{material}, {cell} mm"].values()] for cell in (8, 4, 2)]
@@ -103,7 +103,8 @@ def convergence(by):
             means = [mean_of([columns[k][1] for columns in seeds]) for seeds in sizes]
             (coarse, _), (middle, one), (fine, other) = means
             surely = abs(middle - fine) > 2 * math.hypot(one, other)
-            order = f"{math.log2(abs((coarse - middle) / (middle - fine))):.1f}" if surely else ""
+            ratio = (coarse - middle) / (middle - fine)
+            order = f"{math.log2(abs(ratio)):.1f}{', to and fro' if ratio < 0 else ''}" if surely else ""
             rows.append(f"| `{material}` | {aspect} | {' | '.join(f'{mean:.3f} ± {error:.3f}' for mean, error in means)} | {order} |")
     return "\n".join(rows) + "\n"
 
