@@ -12,7 +12,8 @@ static const char *const rasters[] = { "auto", "plain", "affine", NULL };
 static const quern_param fill_rows[] = { REGION_ABOVE(mpm_fill),
 	QUERN_PARAM(mpm_fill, velocity, "m/s", "Velocity at the start."),
 	QUERN_PARAM(mpm_fill, jitter, "1",
-		"How far a point may be off its place at the start, over half the distance to the next one; a little of it shows by several seeds what is chance.",
+		"Moves each point at the start along each axis at random, by at most this share of half the distance between points. With a "
+		"small one, such as 0.001, several seeds show how much of a result is chance.",
 		.max = 1),
 	QUERN_PARAM(mpm_fill, stress, "1", "Stress at the start: none, or that of the weight above.",
 		.choices = stresses),

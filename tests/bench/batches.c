@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* batches - what it costs that laws are plugins: nanoseconds for a contact or a point, with the law
+/* batches - what the call of a plugin's law costs: nanoseconds for a contact or a point, with the law
  *
  *   loaded    as a run has it: from a shared object, called through its table
  *   linked    from the same source in this program, called through its table
@@ -8,7 +8,7 @@
  *   batches ROUNDS     a line of CSV for each law; the three take turns, and the least of all rounds counts
  *   batches check      whether all three leave the same bits
  *
- * A batch has 256 entries, as in a run, and stays in the cache, as there. docs/bench.md */
+ * A batch has 256 contacts or 64 points, as in a run, and stays in the cache. docs/bench.md */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,6 +17,7 @@
 #include <cmocka.h>
 
 #include "../physics/plugin_alone.h"
+#include "twin.h"
 #include <math.h>
 #include <quern/columns.h>
 #include <quern/contact.h>
@@ -26,7 +27,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { N = 256, CALLS = 200, COLUMNS = 56 };
+enum { CONTACTS = 256, POINTS = 64, N = CONTACTS, CALLS = 200, COLUMNS = 56 }; /* batches as in a run */
 typedef enum { LOADED, LINKED, INLINED, WAYS } way;
 
 /* All columns of a batch. */
@@ -57,7 +58,9 @@ static void uses(store *s, const quern_plugin *plugin, uint32_t dim, quern_colum
 
 static quern_contact_batch contacts(store *s, const quern_plugin *plugin, uint32_t dim, quern_column *use) {
 	const uint32_t turns = dim == 3 ? 3 : 1;
-	quern_contact_batch b = { .n = N, .cap = N, .dt = 1e-5, .use = use, .use_second = use, .lag = 5e-11 };
+	quern_contact_batch b = {
+		.n = CONTACTS, .cap = N, .dt = 1e-5, .use = use, .use_second = use, .lag = 5e-11
+	};
 	quern_real *normal[3];
 	b.overlap = range(s, -1e-6, 1e-5);
 	b.radius = range(s, 4e-4, 6e-4);
@@ -79,53 +82,41 @@ static quern_contact_batch contacts(store *s, const quern_plugin *plugin, uint32
 }
 
 static quern_material_batch points(store *s, const quern_plugin *plugin, uint32_t dim, quern_column *use) {
-	quern_material_batch b = { .n = N, .cap = N, .dt = 1e-5, .use = use };
+	quern_material_batch b = { .n = POINTS, .cap = N, .dt = 1e-5, .use = use };
 	vectors(s, b.gradient, dim * dim, 1);
 	b.grid_density = range(s, 1990, 2010);
 	b.density = range(s, 2000, 2010);
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++)
 		b.stress[k] = k < dim ? range(s, -1500, -500) : range(s, -100, 100);
-	b.wave_speed = range(s, 0, 0);
 	b.mean_pressure = range(s, 900, 1100);
 	uses(s, plugin, dim, use);
 	return b;
 }
 
-#define TWIN(name, batch)                                                                                    \
-	extern const quern_library name##_table;                                                                 \
-	void name##_loop_2d(const void *, const batch *, uint32_t);                                              \
-	void name##_loop_3d(const void *, const batch *, uint32_t)
-TWIN(linear, quern_contact_batch);
-TWIN(hertz, quern_contact_batch);
-TWIN(mu_i, quern_material_batch);
-TWIN(drucker_prager, quern_material_batch);
+extern const twin linear_twin, hertz_twin, mu_i_twin, drucker_prager_twin;
 
 typedef struct law {
 	const char *id;
-	const quern_library *linked;
-	void (*contact[2])(const void *, const quern_contact_batch *, uint32_t);
-	void (*material[2])(const void *, const quern_material_batch *, uint32_t);
+	const twin *twin;
+	bool contact; /* or a material */
 	alone_value value[5];
 } law;
 
 static const law laws[] = {
-	{ "contact.linear", &linear_table, .contact = { linear_loop_2d, linear_loop_3d },
-		.value = { { "stiffness", 1e5 } } },
-	{ "contact.hertz", &hertz_table, .contact = { hertz_loop_2d, hertz_loop_3d },
-		.value = { { "young", 1e8 }, { "poisson", 0.3 }, { "impact_speed", 1 } } },
-	{ "material.mu_i", &mu_i_table, .material = { mu_i_loop_2d, mu_i_loop_3d },
-		.value = { { "bulk_modulus", 3e5 }, { "diameter", 1e-3 }, { "grain_density", 2500 },
+	{ "contact.linear", &linear_twin, true, { { "stiffness", 1e5 } } },
+	{ "contact.hertz", &hertz_twin, true, { { "young", 1e8 }, { "poisson", 0.3 }, { "impact_speed", 1 } } },
+	{ "material.mu_i", &mu_i_twin, false,
+		{ { "bulk_modulus", 3e5 }, { "diameter", 1e-3 }, { "grain_density", 2500 },
 			{ "critical_density", 2000 } } },
-	{ "material.drucker_prager", &drucker_prager_table,
-		.material = { drucker_prager_loop_2d, drucker_prager_loop_3d },
-		.value = { { "bulk_modulus", 3e5 }, { "density", 2000 } } },
+	{ "material.drucker_prager", &drucker_prager_twin, false,
+		{ { "bulk_modulus", 3e5 }, { "density", 2000 } } },
 };
 
 /* A law with the batch that it works on, as it was made. */
 typedef struct bench {
 	const law *law;
 	alone loaded;
-	uint32_t dim;
+	uint32_t dim, n;
 	store fresh, now;
 	quern_column use[QUERN_MOST_USES];
 	union {
@@ -140,36 +131,24 @@ static void open_bench(bench *b, const law *l, uint32_t dim) {
 	b->dim = dim;
 	b->loaded = alone_make(l->id, dim, l->value);
 	assert_int_equal(b->loaded.status, QUERN_OK);
-	if (l->contact[0]) b->batch.contact = contacts(&b->now, b->loaded.plugin, dim, b->use);
+	b->n = l->contact ? CONTACTS : POINTS;
+	if (l->contact) b->batch.contact = contacts(&b->now, b->loaded.plugin, dim, b->use);
 	else b->batch.material = points(&b->now, b->loaded.plugin, dim, b->use);
 	b->fresh = b->now;
 }
 
-static void call_contact(const bench *b, way w, uint32_t calls) {
-	const quern_plugin *plugin = w == LOADED ? b->loaded.plugin : b->law->linked->plugin;
-	const quern_contact_ops *ops = plugin->ops;
-	if (w == INLINED) b->law->contact[b->dim - 2](b->loaded.self, &b->batch.contact, calls);
-	else
-		for (uint32_t k = 0; k < calls; k++) ops->force[b->dim - 2](b->loaded.self, &b->batch.contact);
-}
-
-static void call_material(const bench *b, way w, uint32_t calls) {
-	const quern_plugin *plugin = w == LOADED ? b->loaded.plugin : b->law->linked->plugin;
-	const quern_material_ops *ops = plugin->ops;
-	if (w == INLINED) b->law->material[b->dim - 2](b->loaded.self, &b->batch.material, calls);
-	else
-		for (uint32_t k = 0; k < calls; k++) ops->update[b->dim - 2](b->loaded.self, &b->batch.material);
-}
-
 /* Nanoseconds for one entry. */
 static double time_calls(bench *b, way w) {
+	const twin *source = b->law->twin;
+	const quern_plugin *plugin = w == LOADED ? b->loaded.plugin : source->linked->plugin;
 	struct timespec begin, end;
 	b->now = b->fresh;
 	clock_gettime(CLOCK_MONOTONIC, &begin);
-	if (b->law->contact[0]) call_contact(b, w, CALLS);
-	else call_material(b, w, CALLS);
+	if (w == INLINED) source->inlined[b->dim - 2](b->loaded.self, &b->batch, CALLS);
+	else source->call(plugin, b->dim, b->loaded.self, &b->batch, CALLS);
 	clock_gettime(CLOCK_MONOTONIC, &end);
-	return (1e9 * (double)(end.tv_sec - begin.tv_sec) + (double)(end.tv_nsec - begin.tv_nsec)) / (N * CALLS);
+	return (1e9 * (double)(end.tv_sec - begin.tv_sec) + (double)(end.tv_nsec - begin.tv_nsec)) /
+		   (b->n * CALLS);
 }
 
 static int compare(bench *b) {
