@@ -10,8 +10,9 @@ enum { SWEEPS = 4 };
 /* Shares of what points carry, of what a cell shall carry, between which they may be changed. */
 static const quern_real least_kept = 0.3, least_shared = 0.5, most_shared = 1.6, least_alone = 0.6,
 						most_alone = 1.6;
-/* Of a full cell's mass: points that carry less are not pushed; a rounding error would move them. */
-static const quern_real least_pushed = 0.01;
+/* Of a full cell's mass: points that carry less are not pushed; a rounding error would move them. For the same reason no debt makes
+ * them lighter than `least_left`: one that nobody else takes would have a share of them at each update, without end. */
+static const quern_real least_pushed = 0.01, least_left = 0.02;
 /* Of sqrt(g D): what an update may change in velocity where all moves alike. */
 static const quern_real nudge = 0.04;
 
@@ -34,7 +35,7 @@ static void bounds_of(const absorbing *a, uint32_t c, quern_real *low, quern_rea
 		*low = least_alone * a->before[c];
 		*high = a->before[c] > 0 ? fmin(most_alone * a->before[c], room) : room;
 	}
-	*low = fmin(*low, now);
+	*low = fmin(fmax(*low, least_left * point_share(d, c) * cell_room(d, c)), now);
 	*high = fmax(*high, now);
 }
 

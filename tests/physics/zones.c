@@ -192,6 +192,38 @@ static void debts_round_together(void **state) {
 	assert_true(good);
 }
 
+/* A cell alone among discrete ones owes more than it holds, and nobody takes that: its points get lighter, but not without end, and all that is
+ * neither theirs nor the grains' stays owed. */
+static void debts_leave_points(void **state) {
+	static const char *const zones[] = { "hybrid", "continuum" };
+	(void)state;
+	for (size_t k = 0; k < sizeof zones / sizeof *zones; k++) {
+		char path[HARNESS_PATH];
+		put_one_each(path, 9, 9);
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.036, 0.036]}\n"
+			"time: {end: 1e-6, step: 1e-9}\n"
+			"grains: {material: {density: 2500, radius: {mean: 1 mm}},\n"
+			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
+			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+			"hybrid: {oracle: [{fixed: {otherwise: discrete, boxes: [{lower: [0.016, 0.016], upper: [0.02, 0.02], zone: %s}]}}],"
+			" weights: half, substeps: 1, update: 1}\n",
+			path, cell, zones[k]);
+		unlink(path);
+		harness_steps(run, 3);
+		const int32_t c = cell_at(run, 0.018, 0.018);
+		const double before = in_points(run, c), debt = -0.02, full = 1900 * cell * cell;
+		assert_true(before > 0.1 * full);
+		harness_field(run, "cell.owed").real[0][c] += debt;
+		for (int j = 0; j < 60; j++) update(run);
+		const double left = in_points(run, c);
+		assert_true(left < 0.5 * before);
+		assert_true(left > 0.01 * full);
+		assert_true(fabs(left + harness_field(run, "cell.owed").real[0][c] - before - debt) < 1e-12);
+		harness_close(run);
+	}
+}
+
 /* A box whose walls cut its cells, or are a quarter of a cell thick, filled with grains: `walls` is false, so that only the
  * top is a surface. Below its zone no grain is left, along the walls and the floor neither. */
 static void walls_are_no_surface(void **state) {
@@ -294,6 +326,7 @@ static void rough_floors_are_no_surface(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell),
 		cmocka_unit_test(plates_are_gone_round), cmocka_unit_test(debts_round_together),
-		cmocka_unit_test(walls_are_no_surface), cmocka_unit_test(rough_floors_are_no_surface) };
+		cmocka_unit_test(debts_leave_points), cmocka_unit_test(walls_are_no_surface),
+		cmocka_unit_test(rough_floors_are_no_surface) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
