@@ -11,6 +11,10 @@ static const quern_real flowing = 30, flowing_alone = 3;
 static const quern_real shaken = 30;
 /* Of densities within a cell: a rate over that at which they go to what the cell holds. */
 static const quern_real evening = 10;
+/* What is counted in one cell is noise of some percent. The mean of those around is not, and may be followed faster by a factor. */
+static const quern_real faster_around = 2;
+/* Of a cell's excess: below, there is a surface; above, no more counts. */
+static const quern_real most_excess = 0.1;
 /* What is full, over what was full at first: that varies by so much. */
 static const quern_real dead_band = 1.01;
 
@@ -96,6 +100,32 @@ QUERN_INLINE quern_real closed_from(const mpm *p, quern_real pressure) {
 	return dense * (pressure > 0 ? p->loosest : p->density);
 }
 
+/* Over the cells of the block that touch a cell, and itself: its mean, of those that are no surface. */
+QUERN_INLINE quern_real mean_excess(const gather_work *w, const gather_memory *m, uint32_t c, const int dim) {
+	const int32_t edge = (int32_t)w->g->edge,
+				  at[3] = { (int32_t)c % edge, (int32_t)c / edge % edge, (int32_t)c / edge / edge };
+	const int32_t deep = dim == 3 ? 1 : 0;
+	quern_real sum = 0;
+	uint32_t n = 0;
+	for (int32_t z = at[2] - deep; z <= at[2] + deep; z++)
+		for (int32_t y = at[1] - 1; y <= at[1] + 1; y++)
+			for (int32_t x = at[0] - 1; x <= at[0] + 1; x++) {
+				if (x < 0 || y < 0 || z < 0 || x >= edge || y >= edge || z >= edge) continue;
+				const quern_real excess = m->excess[(z * edge + y) * edge + x];
+				const bool counts = excess >= -most_excess;
+				sum += counts ? fmin(excess, most_excess) : 0;
+				n += counts;
+			}
+	return n ? sum / n : 0;
+}
+
+QUERN_INLINE void find_excess(const gather_work *w, gather_memory *m, const int dim) {
+	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++)
+		m->excess[c] = m->mean[c] > 0 && m->level[c] > 0 ? m->held[c] / m->mean[c] - 1 : -1;
+	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++)
+		m->excess_around[c] = m->excess[c] >= -most_excess ? mean_excess(w, m, c, dim) : 0;
+}
+
 /* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
  * where the cell is full; in one that is not they are spray beside it. */
 QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b, const int dim) {
@@ -127,6 +157,7 @@ QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b
 		const quern_real room = m->room[c] + (m->held[c] > closed_from(w->p, m->level[c]) ? m->loose[c] : 0);
 		m->level[c] = room > 0 ? m->level[c] / room : 0;
 	}
+	if (w->p->alone) find_excess(w, m, dim);
 }
 
 /* 0 at rest, 1 in flow, by the square of the shear rate. */
@@ -161,9 +192,10 @@ static quern_real follow_alone(const gather_work *w, const gather_memory *m, uin
 	const quern_real sheared = rate * rate / (rate * rate + shaken * trace * trace),
 					 time = w->s->dt * COUNT_EVERY, shear = rate * sheared * time;
 	const quern_real evened = evening * w->p->follow * shear, part = w->p->follow * shear,
-					 off = m->held[c] / m->mean[c] - 1;
-	return (evened / (1 + evened) * (1 - m->density[i] / m->mean[c]) +
-			   (off < -0.1 ? 0 : part / (1 + part) * fmin(off, 0.1))) /
+					 soon = faster_around * part,
+					 excess = m->excess[c] < -most_excess ? 0 : fmin(m->excess[c], most_excess);
+	return (evened / (1 + evened) * (1 - m->density[i] / m->mean[c]) + part / (1 + part) * excess +
+			   soon / (1 + soon) * m->excess_around[c]) /
 		   time;
 }
 

@@ -32,6 +32,8 @@ typedef struct gather_memory {
 	 * are not open */
 	quern_real level[QUERN_BLOCK_CELLS], room[QUERN_BLOCK_CELLS], loose[QUERN_BLOCK_CELLS],
 		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
+	/* a continuum alone: by what share a cell holds more than its points know, and the mean of that around it */
+	quern_real excess[QUERN_BLOCK_CELLS], excess_around[QUERN_BLOCK_CELLS];
 	/* of what a strain measures: at points, and by cell the mean over what bears, and the volume of that; the gradient as nodes say it */
 	_Alignas(64) quern_real measured[QUERN_STRAIN_MOST][STENCIL], raw[9][STENCIL];
 	quern_real strained[QUERN_STRAIN_MOST][QUERN_BLOCK_CELLS], bearing[QUERN_BLOCK_CELLS];

@@ -13,7 +13,7 @@ typedef struct {
 
 /* Of flow that goes to a density of its own: by what share of it that falls at most; pressure over K for each unit of shear, and of what the
  * density is off by as a share; how far off counts; by what share the pressure changes in a step at most. */
-static const quern_real widest = 0.2, steepness = 2, off_most = 0.1, step_most = 0.5;
+static const quern_real widest = 0.2, steepness = 20, off_most = 0.1, step_most = 0.5;
 
 static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
 										  "Bulk modulus K; in 2-D lambda + G.", .from = "grain.bulk_modulus",
@@ -95,19 +95,22 @@ QUERN_INLINE quern_real loosest_of(const mu_i *law) {
 	return flow > 0 && flow < law->critical_density ? flow : law->critical_density;
 }
 
-/* By which factor the pressure p of a point changes that shears by `strain` at this inertial number, and the density from which on such a flow
- * bears. Implicit in p to first order: where p is little its inertial number answers faster than the step. */
+/* By which factor the pressure p of a point changes that shears by `strain`, and the density from which on such a flow bears. Its inertial number is
+ * that of the pressure around it. To first order it is taken for the point's own, and at the end of the step: if a mean alone counted, which follows late,
+ * waves of pressure and density would grow; if the root of the point's own did, what scatters would be too loose in the mean. */
 typedef struct {
 	quern_real grown, least;
 } dilatancy;
 QUERN_INLINE dilatancy dilate(
-	const mu_i *law, quern_real p, quern_real rho, quern_real strain, quern_real number) {
-	const quern_real loose = law->dilation * number, wide = loose < widest ? loose : widest,
-					 flow = law->flow_density * (1 - wide), share = p / law->bulk_modulus,
-					 off = rho / (flow * (1 + share)) - 1, gain = steepness * law->bulk_modulus * strain;
+	const mu_i *law, quern_real p, quern_real around, quern_real rho, quern_real strain, quern_real number) {
+	const quern_real loose = law->dilation * number, own = loose * (1.5 - 0.5 * p / around),
+					 wide = own > 0 ? own < widest ? own : widest : 0, flow = law->flow_density * (1 - wide),
+					 least = law->flow_density * (1 - (loose < widest ? loose : widest)),
+					 share = p / law->bulk_modulus, off = rho / (flow * (1 + share)) - 1,
+					 gain = steepness * law->bulk_modulus * strain;
 	return (
 		dilatancy) { 1 + within(gain * within(off, off_most) / (p + gain * (0.5 * wide + share)), step_most),
-		flow < law->critical_density ? flow : law->critical_density };
+		least < law->critical_density ? least : law->critical_density };
 }
 
 QUERN_INLINE void put_outputs(const int dim, const mu_i *law, const quern_material_batch *b) {
@@ -152,8 +155,9 @@ QUERN_INLINE void kernel(const int dim, const bool rated, const bool relaxed, co
 		if (dilates) {
 			const bool slides = flows & (p > 0);
 			const quern_real now = (tau - (slides ? flow : 0)) * per_strain;
-			const dilatancy d = dilate(&law, slides ? p : law.bulk_modulus, rho, now * dt,
-				(slides | known) ? now * thick / __builtin_sqrt(around) : 0);
+			const dilatancy d =
+				dilate(&law, slides ? p : law.bulk_modulus, slides ? around : law.bulk_modulus, rho, now * dt,
+					(slides | known) ? now * thick / __builtin_sqrt(around) : 0);
 			grown = slides ? d.grown : 1;
 			least = known ? d.least : critical;
 			bore = (symmetric_mean(dim, old) < 0) & (rho >= loosest);
