@@ -96,20 +96,25 @@ QUERN_INLINE quern_real loosest_of(const mu_i *law) {
 }
 
 /* By which factor the pressure p of a point changes that shears by `strain`, and the density from which on such a flow bears. Its inertial number is
- * that of the pressure around it. To first order it is taken for the point's own, and at the end of the step: if a mean alone counted, which follows late,
+ * that of the pressure around it, to first order that of the point's own, and at the end of the step: if a mean alone counted, which follows late,
  * waves of pressure and density would grow; if the root of the point's own did, what scatters would be too loose in the mean. */
 typedef struct {
 	quern_real grown, least;
 } dilatancy;
 QUERN_INLINE dilatancy dilate(
 	const mu_i *law, quern_real p, quern_real around, quern_real rho, quern_real strain, quern_real number) {
-	const quern_real loose = law->dilation * number, own = loose * (1.5 - 0.5 * p / around),
-					 wide = own > 0 ? own < widest ? own : widest : 0, flow = law->flow_density * (1 - wide),
-					 least = law->flow_density * (1 - (loose < widest ? loose : widest)),
-					 share = p / law->bulk_modulus, off = rho / (flow * (1 + share)) - 1,
-					 gain = steepness * law->bulk_modulus * strain;
-	return (
-		dilatancy) { 1 + within(gain * within(off, off_most) / (p + gain * (0.5 * wide + share)), step_most),
+	const quern_real
+		loose = law->dilation * number,
+		answers = 0.5 * loose * p / around, own = 1.5 * loose - answers,
+		wide = own > 0 ? own < widest ? own : widest : 0,
+		least = law->flow_density * (1 - (loose < widest ? loose : widest)),
+		share =
+			p /
+			law->bulk_modulus, /* e^share to second order: where flow is no looser, waves are not to grow */
+		flow = law->flow_density * (1 - wide) * (1 + share * (1 + 0.5 * share)),
+		gain = steepness * law->bulk_modulus * strain;
+	return (dilatancy) { 1 + within(gain * within(rho / flow - 1, off_most) / (p + gain * (answers + share)),
+								 step_most),
 		least < law->critical_density ? least : law->critical_density };
 }
 
@@ -242,7 +247,7 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.friction = friction,
 	.loosest = loosest };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 2,
+	.revision = 3,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.mu_i",
 	.brief = "Grains as a fluid whose friction grows with the rate of flow: mu(I).",

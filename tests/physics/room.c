@@ -173,7 +173,7 @@ static void heaps_keep_their_room(void **unused) {
 /* ---- flow at a density of its own ---- */
 
 /* In steady flow the whole layer has one inertial number, and so one density but for what pressure adds. If pressure answered to density with a mean of
- * the pressure alone, waves of both would grow, and swell the layer by 6 %. */
+ * the pressure alone, waves of both would grow, and swell the layer by a tenth. */
 static void flow_has_its_density(void **unused) {
 	(void)unused;
 	static const char *const transfers[] = { "picflip", "apic" };
