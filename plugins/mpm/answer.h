@@ -11,8 +11,9 @@ static const quern_real flowing = 30, flowing_alone = 3;
 static const quern_real shaken = 30;
 /* Of densities within a cell: a rate over that at which they go to what the cell holds. */
 static const quern_real evening = 10;
-/* What is counted in one cell is noise of some percent. The mean of those around is not, and may be followed faster by a factor. */
-static const quern_real faster_around = 2;
+/* What is counted in one cell is noise of some percent, the mean of those around of less: what that one has beyond `noise_around` is followed faster
+ * by a factor, up to `most_around`. Where pressure is more than `waves` of the bulk modulus it presses by as much itself: those are waves, not lost room. */
+static const quern_real noise_around = 0.02, most_around = 0.03, faster_around = 10, waves = 0.03;
 /* Of a cell's excess: below, there is a surface; above, no more counts. */
 static const quern_real most_excess = 0.1;
 /* What is full, over what was full at first: that varies by so much. */
@@ -81,11 +82,13 @@ static const quern_real own_part = 0.25, own_part_alone = 0.5;
 
 /* The grid's density in the middle of a cell is smooth, but the same where full cells and empty ones take turns; what is counted in
  * a cell is neither. A continuum alone is counted by hats around the centres of cells (scatter.c). */
-static quern_real density_of(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c) {
+static quern_real density_of(
+	const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c, bool *inside) {
 	const quern_real *fullness = w->s->use[GATHER_FULLNESS].real[0];
 	const quern_real centre = centre_density(w, m, c);
 	if (w->p->alone) {
-		if (!surrounded(w, m, b, c)) return centre;
+		*inside = surrounded(w, m, b, c);
+		if (!*inside) return centre;
 		const quern_row *node = w->trips.node + (size_t)b * QUERN_BLOCK_CELLS + c;
 		return centre +
 			   own_part_alone * ((*node)[node_held(w->s->dim)] / quern_grid_cell_volume(w->g) - centre);
@@ -100,7 +103,8 @@ QUERN_INLINE quern_real closed_from(const mpm *p, quern_real pressure) {
 	return dense * (pressure > 0 ? p->loosest : p->density);
 }
 
-/* Over the cells of the block that touch a cell, and itself: its mean, of those that are no surface. */
+/* Over the cells of the block that touch a cell, and itself, the mean beyond noise; of those that lie inside, since at a surface or a body it is off for
+ * reasons of its own. */
 QUERN_INLINE quern_real mean_excess(const gather_work *w, const gather_memory *m, uint32_t c, const int dim) {
 	const int32_t edge = (int32_t)w->g->edge,
 				  at[3] = { (int32_t)c % edge, (int32_t)c / edge % edge, (int32_t)c / edge / edge };
@@ -111,19 +115,22 @@ QUERN_INLINE quern_real mean_excess(const gather_work *w, const gather_memory *m
 		for (int32_t y = at[1] - 1; y <= at[1] + 1; y++)
 			for (int32_t x = at[0] - 1; x <= at[0] + 1; x++) {
 				if (x < 0 || y < 0 || z < 0 || x >= edge || y >= edge || z >= edge) continue;
-				const quern_real excess = m->excess[(z * edge + y) * edge + x];
-				const bool counts = excess >= -most_excess;
+				const int32_t there = (z * edge + y) * edge + x;
+				const quern_real excess = m->excess[there];
+				const bool counts = m->inside[there] && excess >= -most_excess;
 				sum += counts ? fmin(excess, most_excess) : 0;
 				n += counts;
 			}
-	return n ? sum / n : 0;
+	return n ? fmin(fmax(0, sum / n - noise_around), most_around) : 0;
 }
 
 QUERN_INLINE void find_excess(const gather_work *w, gather_memory *m, const int dim) {
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++)
 		m->excess[c] = m->mean[c] > 0 && m->level[c] > 0 ? m->held[c] / m->mean[c] - 1 : -1;
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++)
-		m->excess_around[c] = m->excess[c] >= -most_excess ? mean_excess(w, m, c, dim) : 0;
+		m->excess_around[c] = m->inside[c] && m->excess[c] >= -most_excess && m->level[c] < waves * w->p->bulk
+								  ? mean_excess(w, m, c, dim)
+								  : 0;
 }
 
 /* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
@@ -152,7 +159,8 @@ QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b
 	}
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
 		const bool any = m->room[c] + m->loose[c] > 0;
-		m->held[c] = any ? density_of(w, m, b, c) : 0;
+		m->inside[c] = false;
+		m->held[c] = any ? density_of(w, m, b, c, &m->inside[c]) : 0;
 		m->mean[c] = m->room[c] > 0 ? m->mean[c] / m->room[c] : 0;
 		const quern_real room = m->room[c] + (m->held[c] > closed_from(w->p, m->level[c]) ? m->loose[c] : 0);
 		m->level[c] = room > 0 ? m->level[c] / room : 0;
