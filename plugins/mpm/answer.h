@@ -81,7 +81,7 @@ static bool surrounded(const gather_work *w, const gather_memory *m, uint32_t b,
 static const quern_real own_part = 0.25, own_part_alone = 0.5;
 
 /* The grid's density in the middle of a cell is smooth, but the same where full cells and empty ones take turns; what is counted in
- * a cell is neither. A continuum alone is counted by hats around the centres of cells (scatter.c). */
+ * a cell is neither. A continuum alone is counted by hats around the centres of cells (scatter.c), and `inside` is whether that one is. */
 static quern_real density_of(
 	const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c, bool *inside) {
 	const quern_real *fullness = w->s->use[GATHER_FULLNESS].real[0];
@@ -124,6 +124,7 @@ QUERN_INLINE quern_real mean_excess(const gather_work *w, const gather_memory *m
 	return n ? fmin(fmax(0, sum / n - noise_around), most_around) : 0;
 }
 
+/* What cells hold more than their points know. */
 QUERN_INLINE void find_excess(const gather_work *w, gather_memory *m, const int dim) {
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++)
 		m->excess[c] = m->mean[c] > 0 && m->level[c] > 0 ? m->held[c] / m->mean[c] - 1 : -1;

@@ -103,18 +103,15 @@ typedef struct {
 } dilatancy;
 QUERN_INLINE dilatancy dilate(
 	const mu_i *law, quern_real p, quern_real around, quern_real rho, quern_real strain, quern_real number) {
-	const quern_real
-		loose = law->dilation * number,
-		answers = 0.5 * loose * p / around, own = 1.5 * loose - answers,
-		wide = own > 0 ? own < widest ? own : widest : 0,
-		least = law->flow_density * (1 - (loose < widest ? loose : widest)),
-		share =
-			p /
-			law->bulk_modulus, /* e^share to second order: where flow is no looser, waves are not to grow */
-		flow = law->flow_density * (1 - wide) * (1 + share * (1 + 0.5 * share)),
-		gain = steepness * law->bulk_modulus * strain;
-	return (dilatancy) { 1 + within(gain * within(rho / flow - 1, off_most) / (p + gain * (answers + share)),
-								 step_most),
+	const quern_real loose = law->dilation * number, answers = 0.5 * loose * p / around,
+					 own = 1.5 * loose - answers, wide = own > 0 ? own < widest ? own : widest : 0;
+	/* e^share to second order: where flow is no looser for being fast, waves are not to grow */
+	const quern_real share = p / law->bulk_modulus,
+					 flow = law->flow_density * (1 - wide) * (1 + share * (1 + 0.5 * share));
+	const quern_real gain = steepness * law->bulk_modulus * strain,
+					 more = gain * within(rho / flow - 1, off_most) / (p + gain * (answers + share));
+	const quern_real least = law->flow_density * (1 - (loose < widest ? loose : widest));
+	return (dilatancy) { 1 + within(more, step_most),
 		least < law->critical_density ? least : law->critical_density };
 }
 

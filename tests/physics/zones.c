@@ -192,25 +192,17 @@ static void debts_round_together(void **state) {
 	assert_true(good);
 }
 
+#define ALONE "otherwise: discrete, boxes: [{lower: [0.016, 0.016], upper: [0.02, 0.02], zone: "
 /* A cell alone among discrete ones owes more than it holds, and nobody takes that: its points get lighter, but not without end, and all that is
  * neither theirs nor the grains' stays owed. */
 static void debts_leave_points(void **state) {
-	static const char *const zones[] = { "hybrid", "continuum" };
+	static const sparse of[] = {
+		{ "hybrid", "false, false", ALONE "hybrid}]", "half", 9, 9, { 0, 0 }, 0 },
+		{ "continuum", "false, false", ALONE "continuum}]", "half", 9, 9, { 0, 0 }, 0 },
+	};
 	(void)state;
-	for (size_t k = 0; k < sizeof zones / sizeof *zones; k++) {
-		char path[HARNESS_PATH];
-		put_one_each(path, 9, 9);
-		quern_run *run = harness_open(1,
-			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.036, 0.036]}\n"
-			"time: {end: 1e-6, step: 1e-9}\n"
-			"grains: {material: {density: 2500, radius: {mean: 1 mm}},\n"
-			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
-			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-			"hybrid: {oracle: [{fixed: {otherwise: discrete, boxes: [{lower: [0.016, 0.016], upper: [0.02, 0.02], zone: %s}]}}],"
-			" weights: half, substeps: 1, update: 1}\n",
-			path, cell, zones[k]);
-		unlink(path);
-		harness_steps(run, 3);
+	for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
+		quern_run *run = open_sparse(&of[k]);
 		const int32_t c = cell_at(run, 0.018, 0.018);
 		const double before = in_points(run, c), debt = -0.02, full = 1900 * cell * cell;
 		assert_true(before > 0.1 * full);
