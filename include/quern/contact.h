@@ -34,7 +34,9 @@ typedef struct quern_contact_batch {
 	quern_real *dashpot[3]; /* N on first, ADDed: the part of `force` that damps or clamps */
 	quern_real *stored;     /* J, ADDed: in the normal spring */
 	quern_real *sheared;    /* J, ADDed: in the tangential spring */
-	quern_real *rubbed;     /* J, ADDed: lost in this step other than by `dashpot`: to sliding, to yielding */
+	/* J, ADDed: lost in this step other than by `dashpot`: to sliding, to yielding, and what springs give up where a pair has
+	 * opened; of a pair of whose history a number is not as in a new one a law is asked once more, wherever it is by then */
+	quern_real *rubbed;
 	quern_real
 		*drag_couple[3]; /* N m on first, ADDed: the part of `couple` that damps; NULL without couples too */
 	/* m/s, rad/s; NULL unless the table says `means`: the mean of `velocity` and of `spin` over the time dt since the last
@@ -44,6 +46,8 @@ typedef struct quern_contact_batch {
 	/* s^2: `velocity` and `spin` are late by `lag` times their second derivatives in time (quern_dashpot_share), the means are not;
 	 * 0: neither is */
 	quern_real lag;
+	uint32_t losses_only,
+		pad; /* 1: `stored` and `sheared` are there, but what is added to them is not looked at */
 } quern_contact_batch;
 
 typedef struct quern_contact_ops {
@@ -73,6 +77,12 @@ QUERN_KIND(contact, quern_contact_ops, "A force between two grains in contact.",
 #endif
 
 /* ==== what laws share ==== */
+
+/* What of energies a batch asks for. */
+enum { QUERN_NO_ENERGY, QUERN_LOSSES, QUERN_ALL_ENERGY };
+QUERN_INLINE int quern_energy_asked(const quern_contact_batch *b) {
+	return !b->stored ? QUERN_NO_ENERGY : b->losses_only ? QUERN_LOSSES : QUERN_ALL_ENERGY;
+}
 
 /* Damping ratio zeta of a linear contact m x'' + 2 zeta w m x' + w^2 m x = 0 whose force is never attractive and which
  * rebounds with restitution e in (0, 1]: -ln e = 2 zeta F(zeta), F(zeta) = R_C(zeta^2, 1) (Schwager & Poeschel 2007,

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { LOSSES_ONLY = 1 }; /* a pass */
+
 static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	const quern_contact_ops *ops = k->ops;
 	const uint32_t dim = k->dim, turns = quern_check_axial(dim);
@@ -29,6 +31,7 @@ static void call(const quern_check_kernel *k, const quern_check_batch *b) {
 	batch.stored = quern_check_at(k, b, STORED, 0);
 	batch.sheared = quern_check_at(k, b, SHEARED, 0);
 	batch.rubbed = quern_check_at(k, b, RUBBED, 0);
+	batch.losses_only = k->pass == LOSSES_ONLY;
 	QUERN_CHECK_VECTOR(batch.drag_couple, k, b, DRAG_COUPLE, turns);
 	k->host->columns(k, b, k->use, use);
 	k->host->columns(k, b, k->use_second, use_second);
@@ -274,15 +277,64 @@ static void alone(quern_check_kernel *k, quern_check_tally *t) {
 	}
 }
 
-static void apart(quern_check_kernel *k, quern_check_tally *t) {
+/* All pairs part in one step, with the velocities that this takes. */
+static void part(quern_check_kernel *k) {
 	const quern_contact_ops *ops = k->ops;
-	const quern_use *rows = k->check->uses;
 	for (uint32_t i = 0; i < k->n; i++) {
 		const quern_real radius = quern_check_given(k, RADIUS, 0)[i];
 		const quern_real reach = ops->reach ? ops->reach(k->self, radius) : 0;
-		quern_check_given(k, OVERLAP, 0)[i] = -reach - (i % 3 ? 1e-3 * radius : 0);
+		quern_real *overlap = &quern_check_given(k, OVERLAP, 0)[i];
+		const quern_real to = -reach - (i % 3 ? 1e-3 * radius : 0), speed = (*overlap - to) / k->dt;
+		for (uint32_t c = 0; c < k->dim; c++) {
+			const quern_real v = speed * quern_check_given(k, NORMAL, c)[i];
+			quern_check_given(k, VELOCITY, c)[i] = v;
+			if (k->at[MEAN_VELOCITY] >= 0) quern_check_given(k, MEAN_VELOCITY, c)[i] = v;
+		}
+		*overlap = to;
 	}
+}
+
+/* Where nobody asks for what springs hold, all else is the same. */
+static void only_losses(quern_check_kernel *k, quern_check_tally *t) {
+	static const int given[] = { FORCE, COUPLE, DASHPOT, DRAG_COUPLE, RUBBED };
+	enum { GIVEN = sizeof given / sizeof *given };
+	quern_real *was = k->host->memory((size_t)GIVEN * k->n, sizeof *was);
+	act(k);
+	for (int g = 0; g < GIVEN; g++)
+		if (k->at[given[g]] >= 0)
+			memcpy(was + (size_t)g * k->n, quern_check_found(k, given[g], 0), k->n * sizeof *was);
+	k->pass = LOSSES_ONLY;
+	act(k);
+	k->pass = 0;
+	for (int g = 0; g < GIVEN; g++)
+		for (uint32_t i = 0; k->at[given[g]] >= 0 && i < k->n; i++) {
+			const quern_real is = quern_check_found(k, given[g], 0)[i], all = was[(size_t)g * k->n + i];
+			k->host->expect(t, is == all, "%u-D: %s is %.17g where losses alone are asked for, else %.17g",
+				k->dim, k->host->column(k, k->at[given[g]])->name, is, all);
+		}
+	free(was);
+}
+
+/* What springs held when a pair still touched is lost as it opens. */
+static void opening(quern_check_kernel *k, quern_check_tally *t) {
+	quern_real *held = k->host->memory(k->n, sizeof *held);
+	act(k);
+	memcpy(held, quern_check_found(k, SHEARED, 0), k->n * sizeof *held);
+	k->host->advance(k);
+	part(k);
 	next_step(k);
+	for (uint32_t i = 0; i < k->n; i++) {
+		const quern_real lost = quern_check_found(k, RUBBED, 0)[i];
+		k->host->measure(t, fabs(lost - held[i]) / (held[i] + 1e-30), 1e-9,
+			"%u-D: a pair that opens books %.9g J of the %.9g J that its springs held", k->dim, lost,
+			held[i]);
+	}
+	free(held);
+}
+
+/* After it has opened a pair is silent, and has forgotten all. */
+static void apart(quern_check_kernel *k, quern_check_tally *t) {
+	const quern_use *rows = k->check->uses;
 	act(k);
 	for (uint32_t i = 0; i < k->n; i++) {
 		const bool silent =
@@ -453,6 +505,8 @@ static void try_instance(const quern_check *c, const quern_check_instance *it, t
 	addition(k[0], &t->adds);
 	alone(k[0], &t->follows);
 	losses(k[0], &t->lost);
+	only_losses(k[0], &t->books);
+	opening(k[0], &t->books);
 	apart(k[0], &t->silent);
 	c->host->kernel_destroy(k[0]), c->host->kernel_destroy(k[1]);
 	impacts(c, it, &t->whole, &t->books);

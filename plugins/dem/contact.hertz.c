@@ -44,7 +44,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 QUERN_INLINE quern_real turning_of(uint32_t dim) { return dim == 2 ? 3 : 3.5; }
 
 QUERN_INLINE void kernel(
-	const int dim, const bool rough, const bool energy, const hertz *self, const quern_contact_batch *b) {
+	const int dim, const bool rough, const int energy, const hertz *self, const quern_contact_batch *b) {
 	const hertz law = *self;
 	const quern_real dt = b->dt, lag = b->lag, turning = turning_of((uint32_t)dim);
 	const quern_real normal = 4.0 / 3 * law.modulus,
@@ -74,7 +74,8 @@ QUERN_INLINE void kernel(
 		if (rough) {
 			/* k_t = 8 G* sqrt(r d); what is kept is the force, which an unloading contact gives up in proportion */
 			const quern_vec vt = quern_vec_axpy(-vn, n, v), mean_t = quern_vec_axpy(-mean_n, n, mean);
-			const quern_real before = d + mean_n * onset.time,
+			/* a pair that has opened gives up what its spring held when it still touched */
+			const quern_real before = overlap[i] + mean_n * (touching ? onset.time : dt),
 							 root_before = __builtin_sqrt(radius[i] * (before > 0 ? before : 0));
 			const quern_real kt_before = shear * root_before;
 			const quern_real one_over = kt > 0 ? 1 / (kt > 0 ? kt : 1) : 0;
@@ -98,7 +99,7 @@ QUERN_INLINE void kernel(
 			const quern_real held =
 				0.5 * quern_vec_dot(was, was, 3) * (kt_before > 0 ? 1 / (kt_before > 0 ? kt_before : 1) : 0);
 			const quern_real work = 0.5 * onset.time * quern_vec_dot(quern_vec_add(was, now), mean_t, 3);
-			rubbed = d > 0 ? work + held - sheared : 0;
+			rubbed = work + held - sheared;
 		}
 		b->force[0][i] += f.x;
 		b->force[1][i] += f.y;
@@ -107,20 +108,28 @@ QUERN_INLINE void kernel(
 			b->dashpot[0][i] += viscous.x;
 			b->dashpot[1][i] += viscous.y;
 			if (dim == 3) b->dashpot[2][i] += viscous.z;
+			b->rubbed[i] += rubbed;
+		}
+		if (energy == QUERN_ALL_ENERGY) {
 			b->stored[i] += 0.4 * elastic * d;
 			b->sheared[i] += sheared;
-			b->rubbed[i] += rubbed;
 		}
 	}
 }
 
+QUERN_INLINE void with(
+	const int dim, const bool rough, const int energy, const hertz *self, const quern_contact_batch *b) {
+	if (rough) kernel(dim, true, energy, self, b);
+	else kernel(dim, false, energy, self, b);
+}
+
 QUERN_INLINE void force(const int dim, const void *self, const quern_contact_batch *b) {
 	const bool rough = ((const hertz *)self)->friction > 0;
-	if (b->stored) {
-		if (rough) kernel(dim, true, true, self, b);
-		else kernel(dim, false, true, self, b);
-	} else if (rough) kernel(dim, true, false, self, b);
-	else kernel(dim, false, false, self, b);
+	switch (quern_energy_asked(b)) {
+	case QUERN_ALL_ENERGY: with(dim, rough, QUERN_ALL_ENERGY, self, b); break;
+	case QUERN_LOSSES: with(dim, rough, QUERN_LOSSES, self, b); break;
+	default: with(dim, rough, QUERN_NO_ENERGY, self, b);
+	}
 }
 static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }
 static void force_3d(const void *self, const quern_contact_batch *b) { force(3, self, b); }

@@ -48,7 +48,7 @@ QUERN_INLINE quern_real turning_of(uint32_t dim) { return dim == 2 ? 3 : 3.5; }
 
 /* `dim`, `rough` and `energy` are constants in every caller, so dead branches vanish and names stay in the debugger. */
 QUERN_INLINE void kernel(
-	const int dim, const bool rough, const bool energy, const linear *self, const quern_contact_batch *b) {
+	const int dim, const bool rough, const int energy, const linear *self, const quern_contact_batch *b) {
 	const linear law = *self;
 	const quern_real dt = b->dt, kn = law.stiffness, kt = law.tangential_stiffness * kn, one_over_kt = 1 / kt;
 	const quern_real lag = b->lag, tangential = law.tangential_damping, turning = turning_of((uint32_t)dim);
@@ -83,7 +83,7 @@ QUERN_INLINE void kernel(
 			viscous = quern_vec_sub(viscous, drag);
 			sheared = 0.5 * kt * quern_vec_dot(now, now, 3);
 			const quern_vec slid = quern_vec_sub(trial, now);
-			rubbed = touching ? 0.5 * kt * quern_vec_dot(quern_vec_add(was, now), slid, 3) : 0;
+			rubbed = 0.5 * kt * quern_vec_dot(quern_vec_add(was, now), slid, 3);
 		}
 		if (rough && dim == 2) { /* the same along the one tangent (-n_y, n_x) */
 			const quern_real vt = n.x * v.y - n.y * v.x, was = slip[0][i];
@@ -98,7 +98,7 @@ QUERN_INLINE void kernel(
 			viscous.x += (ft - kt * now) * n.y;
 			viscous.y -= (ft - kt * now) * n.x;
 			sheared = 0.5 * kt * now * now;
-			rubbed = touching ? 0.5 * kt * (was + now) * (trial - now) : 0;
+			rubbed = 0.5 * kt * (was + now) * (trial - now);
 		}
 		b->force[0][i] += f.x;
 		b->force[1][i] += f.y;
@@ -107,20 +107,28 @@ QUERN_INLINE void kernel(
 			b->dashpot[0][i] += viscous.x;
 			b->dashpot[1][i] += viscous.y;
 			if (dim == 3) b->dashpot[2][i] += viscous.z;
+			b->rubbed[i] += rubbed;
+		}
+		if (energy == QUERN_ALL_ENERGY) {
 			b->stored[i] += touching ? 0.5 * kn * d * d : 0;
 			b->sheared[i] += sheared;
-			b->rubbed[i] += rubbed;
 		}
 	}
 }
 
+QUERN_INLINE void with(
+	const int dim, const bool rough, const int energy, const linear *self, const quern_contact_batch *b) {
+	if (rough) kernel(dim, true, energy, self, b);
+	else kernel(dim, false, energy, self, b);
+}
+
 QUERN_INLINE void force(const int dim, const void *self, const quern_contact_batch *b) {
 	const bool rough = ((const linear *)self)->friction > 0;
-	if (b->stored) {
-		if (rough) kernel(dim, true, true, self, b);
-		else kernel(dim, false, true, self, b);
-	} else if (rough) kernel(dim, true, false, self, b);
-	else kernel(dim, false, false, self, b);
+	switch (quern_energy_asked(b)) {
+	case QUERN_ALL_ENERGY: with(dim, rough, QUERN_ALL_ENERGY, self, b); break;
+	case QUERN_LOSSES: with(dim, rough, QUERN_LOSSES, self, b); break;
+	default: with(dim, rough, QUERN_NO_ENERGY, self, b);
+	}
 }
 static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }
 static void force_3d(const void *self, const quern_contact_batch *b) { force(3, self, b); }

@@ -43,7 +43,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 
 /* `dim`, `rough` and `energy` are constants in every caller. */
 QUERN_INLINE void kernel(
-	const int dim, const bool rough, const bool energy, const plastic *self, const quern_contact_batch *b) {
+	const int dim, const bool rough, const int energy, const plastic *self, const quern_contact_batch *b) {
 	const plastic law = *self;
 	const quern_real dt = b->dt, k1 = law.stiffness, k2 = law.unloading;
 	const quern_real kt = law.tangential_stiffness * k1, one_over_kt = 1 / kt,
@@ -78,7 +78,7 @@ QUERN_INLINE void kernel(
 				f = quern_vec_axpy(-kt, now, f);
 				sheared = 0.5 * kt * quern_vec_dot(now, now, 3);
 				const quern_vec slid = quern_vec_sub(trial, now);
-				rubbed += touching ? 0.5 * kt * quern_vec_dot(quern_vec_add(was, now), slid, 3) : 0;
+				rubbed += 0.5 * kt * quern_vec_dot(quern_vec_add(was, now), slid, 3);
 			} else { /* the same along the one tangent (-n_y, n_x) */
 				const quern_real vt = n.x * v.y - n.y * v.x, was = slip[0][i], trial = was + onset.time * vt;
 				quern_real left;
@@ -88,27 +88,33 @@ QUERN_INLINE void kernel(
 				f.x += kt * now * n.y;
 				f.y -= kt * now * n.x;
 				sheared = 0.5 * kt * now * now;
-				rubbed += touching ? 0.5 * kt * (was + now) * (trial - now) : 0;
+				rubbed += 0.5 * kt * (was + now) * (trial - now);
 			}
 		}
 		b->force[0][i] += f.x;
 		b->force[1][i] += f.y;
 		if (dim == 3) b->force[2][i] += f.z;
-		if (energy) {
+		if (energy) { b->rubbed[i] += rubbed; }
+		if (energy == QUERN_ALL_ENERGY) {
 			b->stored[i] += 0.5 * k2 * spring * spring;
 			b->sheared[i] += sheared;
-			b->rubbed[i] += rubbed;
 		}
 	}
 }
 
+QUERN_INLINE void with(
+	const int dim, const bool rough, const int energy, const plastic *self, const quern_contact_batch *b) {
+	if (rough) kernel(dim, true, energy, self, b);
+	else kernel(dim, false, energy, self, b);
+}
+
 QUERN_INLINE void force(const int dim, const void *self, const quern_contact_batch *b) {
 	const bool rough = ((const plastic *)self)->friction > 0;
-	if (b->stored) {
-		if (rough) kernel(dim, true, true, self, b);
-		else kernel(dim, false, true, self, b);
-	} else if (rough) kernel(dim, true, false, self, b);
-	else kernel(dim, false, false, self, b);
+	switch (quern_energy_asked(b)) {
+	case QUERN_ALL_ENERGY: with(dim, rough, QUERN_ALL_ENERGY, self, b); break;
+	case QUERN_LOSSES: with(dim, rough, QUERN_LOSSES, self, b); break;
+	default: with(dim, rough, QUERN_NO_ENERGY, self, b);
+	}
 }
 static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }
 static void force_3d(const void *self, const quern_contact_batch *b) { force(3, self, b); }

@@ -69,7 +69,7 @@ QUERN_INLINE void kernel_2d(const bool energy, const rolling *self, const quern_
 		if (energy) {
 			b->drag_couple[0][i] -= radius[i] * (f - k * now);
 			b->sheared[i] += 0.5 * k * now * now;
-			b->rubbed[i] += touching ? 0.5 * k * (was + now) * (trial - now) : 0;
+			b->rubbed[i] += 0.5 * k * (was + now) * (trial - now);
 		}
 	}
 }
@@ -105,7 +105,7 @@ QUERN_INLINE void kernel_3d(const bool rolls, const bool twists, const bool ener
 			drag_couple = quern_vec_scale(-r, quern_vec_cross(n, drag));
 			const quern_vec slid = quern_vec_sub(trial, now);
 			sheared = 0.5 * k * quern_vec_dot(now, now, 3);
-			rubbed = touching ? 0.5 * k * quern_vec_dot(quern_vec_add(was, now), slid, 3) : 0;
+			rubbed = 0.5 * k * quern_vec_dot(quern_vec_add(was, now), slid, 3);
 		}
 		if (twists) { /* the same about the normal: v_o = r (w_i - w_j).n */
 			const quern_real v = r * quern_vec_dot(spin, n, 3), was = twist[0][i],
@@ -119,7 +119,7 @@ QUERN_INLINE void kernel_3d(const bool rolls, const bool twists, const bool ener
 			couple = quern_vec_axpy(-r * all, n, couple);
 			drag_couple = quern_vec_axpy(-r * (all - ko * now), n, drag_couple);
 			sheared += 0.5 * ko * now * now;
-			rubbed += touching ? 0.5 * ko * (was + now) * (trial - now) : 0;
+			rubbed += 0.5 * ko * (was + now) * (trial - now);
 		}
 		b->couple[0][i] += couple.x;
 		b->couple[1][i] += couple.y;

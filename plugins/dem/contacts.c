@@ -1,42 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* contacts - what a chunk of contacts does, between grains or on a body: laws, sums in list order, losses */
-#include "forces.h"
+#include "packed.h"
 #include <string.h>
-
-/* What sliding takes of n contacts, with their weights, and what springs give up that have opened since the last
- * step: no law sees that. The springs' energy is kept in `held`, by slot, which may be NULL. */
-static void book_sliding(const forces_work *w, const quern_real *weight, quern_real *held, uint32_t n) {
-	const quern_real *restrict overlap = w->overlap, *restrict sheared = w->sheared;
-	const int32_t *restrict slot = w->slot;
-	quern_real *restrict rubbed = w->rubbed, *restrict kept = held;
-	for (uint32_t q = 0; q < n && weight; q++) rubbed[q] *= weight[q];
-	if (!held) return;
-	QUERN_SIMD
-	for (uint32_t q = 0; q < n; q++) {
-		const quern_real before = kept[slot[q]], now = weight ? weight[q] * sheared[q] : sheared[q];
-		rubbed[q] += overlap[q] > 0 ? 0 : before;
-		kept[slot[q]] = overlap[q] > 0 ? now : 0;
-	}
-}
-
-/* Torque over lever: -(n x f), for the first and the second alike. */
-QUERN_INLINE void torques(
-	const forces_work *w, quern_real *const force[3], quern_real *const out[3], uint32_t n, const int dim) {
-	const quern_real *restrict nx = w->normal[0], *restrict ny = w->normal[1], *restrict nz = w->normal[2];
-	const quern_real *restrict fx = force[0], *restrict fy = force[1], *restrict fz = force[2];
-	quern_real *restrict tx = out[0], *restrict ty = out[1], *restrict tz = out[2];
-	if (dim == 2) {
-		QUERN_SIMD
-		for (uint32_t q = 0; q < n; q++) tx[q] = ny[q] * fx[q] - nx[q] * fy[q];
-	} else {
-		QUERN_SIMD
-		for (uint32_t q = 0; q < n; q++) {
-			tx[q] = nz[q] * fy[q] - ny[q] * fz[q];
-			ty[q] = nx[q] * fz[q] - nz[q] * fx[q];
-			tz[q] = ny[q] * fx[q] - nx[q] * fy[q];
-		}
-	}
-}
 
 /* ---- forces and torques to the rows of grains; a body has none, so that a contact on it is not `paired` ---- */
 
@@ -46,73 +11,92 @@ QUERN_INLINE uint32_t row_of(int32_t grain, uint32_t begin, uint32_t end) {
 	return i < end - begin ? i : end - begin;
 }
 
-/* Numbers of a contact, times a factor each, join half a row. A whole row is wider than what most processors hold in one
- * register: put together from single numbers, it would go through memory and wait there. */
-QUERN_INLINE void add_half(quern_real *row, const lanes4 *factor, const lanes4 *given) {
-	*(lanes4 *)(void *)row += *factor * *given;
+/* Four contacts at once: columns become rows in registers, four numbers at a time. A row of eight is wider than what most processors
+ * hold in one register, and put together from single numbers it would go through memory and wait there. */
+QUERN_INLINE lanes4 *half(quern_real *row) { return (lanes4 *)(void *)row; }
+
+/* What a contact gives to its first grain is `given` times `share` for a force and times `arm`, its lever with the share, for a torque;
+ * to the second the force comes with the other sign. */
+typedef struct contact_share {
+	quern_real share, arm_first, arm_second;
+} contact_share;
+QUERN_INLINE contact_share share_of(
+	const forces_work *w, uint32_t q, const bool weighted, const bool paired) {
+	const quern_real share = weighted ? w->weight[q] : 1, first = w->arm[0][q],
+					 second = paired ? w->arm[1][q] : 0;
+	return (contact_share) { share, weighted ? share * first : first, weighted ? share * second : second };
 }
 
-/* With books what dashpots give has the lanes behind, and what sliding takes, which has its weight already. */
+/* With books what dashpots give has the lanes behind, and what sliding takes. */
 QUERN_INLINE void add_2d(const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin,
 	const bool weighted, const bool paired, const bool books) {
-	static const lanes4 lever = { 0, 0, 1, 0 }, plain = { 1, 1, 0, 1 }, lever_on = { 0, 1, 0, 0 },
-						plain_on = { 1, 0, 0, 0 }, own = { 0, 0, 1, 0 };
-	for (uint32_t q = 0; q < n; q++) {
-		quern_real *i = w->row[row_of(w->first[q], begin, end)],
-				   *j = w->row[row_of(w->second[q], begin, end)];
-		const quern_real share = weighted ? w->weight[q] : 1;
-		const lanes4 f = share * (lanes4) { w->force[0][q], w->force[1][q], spin ? w->torque[0][q] : 0,
-			books ? w->dashpot[0][q] : 0 };
-		const lanes4 to_first = plain + w->arm[0][q] * lever;
-		add_half(i, &to_first, &f);
-		if (paired) {
-			const lanes4 to_second = w->arm[1][q] * lever - plain;
-			add_half(j, &to_second, &f);
+	const lanes4 none = { 0 };
+	for (uint32_t at = 0; at < n; at += 4) {
+		const lanes4 nx = *packed_at(w->normal[0] + at), ny = *packed_at(w->normal[1] + at),
+					 fx = *packed_at(w->force[0] + at), fy = *packed_at(w->force[1] + at),
+					 dx = books ? *packed_at(w->dashpot[0] + at) : none,
+					 dy = books ? *packed_at(w->dashpot[1] + at) : none,
+					 slid = books ? *packed_at(w->rubbed + at) : none;
+		lanes4 f[4], d[4];
+		packed_turn((const lanes4[4]) { fx, fy, spin ? ny * fx - nx * fy : none, dx }, f);
+		packed_turn((const lanes4[4]) { dy, spin ? ny * dx - nx * dy : none, slid, none }, d);
+		for (uint32_t k = 0; k < 4 && at + k < n; k++) {
+			const uint32_t q = at + k;
+			const contact_share c = share_of(w, q, weighted, paired);
+			const quern_real s = c.share, a = c.arm_first, b = c.arm_second;
+			quern_real *i = w->row[row_of(w->first[q], begin, end)],
+					   *j = w->row[row_of(w->second[q], begin, end)];
+			*half(i) += (lanes4) { s, s, a, s } * f[k];
+			if (books) *half(i + 4) += (lanes4) { s, a, s, 0 } * d[k];
+			if (paired) *half(j) += (lanes4) { -s, -s, b, -s } * f[k];
+			if (paired && books) *half(j + 4) += (lanes4) { -s, b, 0, 0 } * d[k];
 		}
-		if (!books) continue;
-		const lanes4 all = share * (plain_on + lever_on) + own;
-		const lanes4 d =
-			all * (lanes4) { w->dashpot[1][q], spin ? w->drag_torque[0][q] : 0, w->rubbed[q], 0 };
-		const lanes4 drag_first = plain_on + own + w->arm[0][q] * lever_on;
-		add_half(i + 4, &drag_first, &d);
-		if (!paired) continue;
-		const lanes4 drag_second = w->arm[1][q] * lever_on - plain_on;
-		add_half(j + 4, &drag_second, &d);
 	}
 }
 
+/* In three dimensions the dashpots' force begins in the lanes that a torque leaves free, and goes on in a row of its own. What
+ * sliding takes is added up along the list, whose order no chunk changes. */
 QUERN_INLINE void add_3d(const forces_work *w, uint32_t begin, uint32_t end, uint32_t n, const bool spin,
-	const bool weighted, const bool paired, const bool books) {
-	static const lanes4 lever = { 0, 0, 0, 1 }, plain = { 1, 1, 1, 0 }, lever_on = { 1, 1, 0, 0 },
-						own = { 0, 0, 1, 0 };
-	for (uint32_t q = 0; q < n; q++) {
-		const uint32_t i = row_of(w->first[q], begin, end), j = row_of(w->second[q], begin, end);
-		const quern_real share = weighted ? w->weight[q] : 1, arm_i = w->arm[0][q],
-						 arm_j = paired ? w->arm[1][q] : 0;
-		const lanes4 first = share * (plain + arm_i * lever), first_on = share * (arm_i * lever_on),
-					 second = share * (arm_j * lever - plain), second_on = share * (arm_j * lever_on);
-		const lanes4 f = { w->force[0][q], w->force[1][q], w->force[2][q], spin ? w->torque[0][q] : 0 };
-		const lanes4 f_on = { spin ? w->torque[1][q] : 0, spin ? w->torque[2][q] : 0, 0, 0 };
-		add_half(w->row[i], &first, &f);
-		if (spin) add_half(w->row[i] + 4, &first_on, &f_on);
-		if (paired) add_half(w->row[j], &second, &f);
-		if (paired && spin) add_half(w->row[j] + 4, &second_on, &f_on);
-		if (!books) continue;
-		const lanes4 d = { w->dashpot[0][q], w->dashpot[1][q], w->dashpot[2][q],
-			spin ? w->drag_torque[0][q] : 0 };
-		const lanes4 d_on = { spin ? w->drag_torque[1][q] : 0, spin ? w->drag_torque[2][q] : 0, w->rubbed[q],
-			0 };
-		const lanes4 first_own = first_on + own;
-		add_half(w->drag_row[i], &first, &d);
-		add_half(w->drag_row[i] + 4, &first_own, &d_on);
-		if (paired) add_half(w->drag_row[j], &second, &d);
-		if (paired && spin) add_half(w->drag_row[j] + 4, &second_on, &d_on);
+	const bool weighted, const bool paired, const bool books, quern_real *rubbed) {
+	const lanes4 none = { 0 };
+	quern_real slid = *rubbed;
+	for (uint32_t at = 0; at < n; at += 4) {
+		const lanes4 nx = *packed_at(w->normal[0] + at), ny = *packed_at(w->normal[1] + at),
+					 nz = *packed_at(w->normal[2] + at);
+		const lanes4 fx = *packed_at(w->force[0] + at), fy = *packed_at(w->force[1] + at),
+					 fz = *packed_at(w->force[2] + at);
+		const lanes4 dx = books ? *packed_at(w->dashpot[0] + at) : none,
+					 dy = books ? *packed_at(w->dashpot[1] + at) : none,
+					 dz = books ? *packed_at(w->dashpot[2] + at) : none;
+		lanes4 f[4], f_on[4], d[4];
+		packed_turn((const lanes4[4]) { fx, fy, fz, spin ? nz * fy - ny * fz : none }, f);
+		packed_turn(
+			(const lanes4[4]) { spin ? nx * fz - nz * fx : none, spin ? ny * fx - nx * fy : none, dx, dy },
+			f_on);
+		packed_turn((const lanes4[4]) { dz, spin ? nz * dy - ny * dz : none, spin ? nx * dz - nz * dx : none,
+						spin ? ny * dx - nx * dy : none },
+			d);
+		for (uint32_t k = 0; k < 4 && at + k < n; k++) {
+			const uint32_t q = at + k, i = row_of(w->first[q], begin, end),
+						   j = row_of(w->second[q], begin, end);
+			const contact_share c = share_of(w, q, weighted, paired);
+			const quern_real s = c.share, a = c.arm_first, b = c.arm_second;
+			*half(w->row[i]) += (lanes4) { s, s, s, a } * f[k];
+			if (spin || books) *half(w->row[i] + 4) += (lanes4) { a, a, s, s } * f_on[k];
+			if (books) *half(w->drag_row[i]) += (lanes4) { s, a, a, a } * d[k];
+			if (books) slid += i < end - begin ? s * w->rubbed[q] : 0;
+			if (!paired) continue;
+			*half(w->row[j]) += (lanes4) { -s, -s, -s, b } * f[k];
+			if (spin || books) *half(w->row[j] + 4) += (lanes4) { b, b, -s, -s } * f_on[k];
+			if (books) *half(w->drag_row[j]) += (lanes4) { -s, b, b, b } * d[k];
+		}
 	}
+	*rubbed = slid;
 }
 
 QUERN_INLINE void add_forces(const forces_work *w, uint32_t first, uint32_t last, uint32_t n, const int dim,
-	const bool spin, const bool weighted, const bool paired, const bool books) {
-	if (dim == 3) add_3d(w, first, last, n, spin, weighted, paired, books);
+	const bool spin, const bool weighted, const bool paired, const bool books, quern_real *rubbed) {
+	if (dim == 3) add_3d(w, first, last, n, spin, weighted, paired, books, rubbed);
 	else add_2d(w, first, last, n, spin, weighted, paired, books);
 }
 
@@ -133,25 +117,22 @@ static void add_couples(const forces_work *w, const quern_real *weight, uint32_t
 
 /* Forces and torques to the grains of a block, and with them, if they are booked, losses. */
 QUERN_INLINE void add_all(const forces_shared *sh, const forces_work *w, const contact_chunk *c,
-	const int dim, const bool spin, const bool paired) {
+	quern_real *sums, const int dim, const bool spin, const bool paired) {
 	const quern_real *weight = sh->use[FORCE_WEIGHT].real[0] ? w->weight : NULL;
 	const uint32_t first = sh->grain[c->block], last = sh->grain[c->block + 1], turns = dim == 3 ? 3 : 1;
-	if (spin) torques(w, w->force, w->torque, c->n, dim);
-	if (sh->books && spin) torques(w, w->dashpot, w->drag_torque, c->n, dim);
-	if (sh->books) book_sliding(w, weight, c->held, c->n);
-	if (sh->books && weight) add_forces(w, first, last, c->n, dim, spin, true, paired, true);
-	else if (sh->books) add_forces(w, first, last, c->n, dim, spin, false, paired, true);
-	else if (weight) add_forces(w, first, last, c->n, dim, spin, true, paired, false);
-	else add_forces(w, first, last, c->n, dim, spin, false, paired, false);
+	if (sh->books && weight) add_forces(w, first, last, c->n, dim, spin, true, paired, true, &sums[E_RUBBED]);
+	else if (sh->books) add_forces(w, first, last, c->n, dim, spin, false, paired, true, &sums[E_RUBBED]);
+	else if (weight) add_forces(w, first, last, c->n, dim, spin, true, paired, false, &sums[E_RUBBED]);
+	else add_forces(w, first, last, c->n, dim, spin, false, paired, false, &sums[E_RUBBED]);
 	if (!spin || !sh->couple) return;
 	add_couples(w, weight, 0, w->couple, first, last, c->n, turns, paired);
 	if (sh->books) add_couples(w, weight, 3, w->drag_couple, first, last, c->n, turns, paired);
 }
 
-QUERN_INLINE void add_both(
-	const forces_shared *sh, const forces_work *w, const contact_chunk *c, const int dim, const bool spin) {
-	if (c->body < 0) add_all(sh, w, c, dim, spin, true);
-	else add_all(sh, w, c, dim, spin, false);
+QUERN_INLINE void add_both(const forces_shared *sh, const forces_work *w, const contact_chunk *c,
+	quern_real *sums, const int dim, const bool spin) {
+	if (c->body < 0) add_all(sh, w, c, sums, dim, spin, true);
+	else add_all(sh, w, c, sums, dim, spin, false);
 }
 
 void quern_dem_fold_couples(const forces_shared *sh, const forces_work *w, uint32_t n) {
@@ -160,7 +141,7 @@ void quern_dem_fold_couples(const forces_shared *sh, const forces_work *w, uint3
 		for (uint32_t k = 0; k < turns; k++) {
 			w->row[i][dim + k] += w->couple_row[i][k];
 			if (sh->books && dim == 2) w->row[i][LANE_DRAG + 2] += w->couple_row[i][3];
-			if (sh->books && dim == 3) w->drag_row[i][3 + k] += w->couple_row[i][3 + k];
+			if (sh->books && dim == 3) w->drag_row[i][1 + k] += w->couple_row[i][3 + k];
 		}
 }
 
@@ -176,21 +157,16 @@ static void keep(const forces_work *w, const contact_chunk *c, quern_real *const
 	}
 }
 
-quern_real *quern_dem_held(const forces_shared *sh, int row, uint32_t begin) {
-	quern_real *held = sh->use[row].real[0];
-	return held && (sh->books || sh->starts) ? held + begin : NULL;
-}
-
 void quern_dem_act(const forces_shared *sh, forces_work *w, const contact_chunk *c, quern_real *sums) {
 	const uint32_t dim = sh->s->dim;
 	const bool paired = c->body < 0;
 	quern_dem_call_laws(sh, w, c);
 	if (sh->deep) quern_dem_check_contacts(sh, w, c);
 	if (sh->boxed && !sh->looks) quern_dem_box_book(sh, w, c, sums);
-	if (dim == 2 && sh->spin) add_both(sh, w, c, 2, true);
-	else if (dim == 2) add_both(sh, w, c, 2, false);
-	else if (sh->spin) add_both(sh, w, c, 3, true);
-	else add_both(sh, w, c, 3, false);
+	if (dim == 2 && sh->spin) add_both(sh, w, c, sums, 2, true);
+	else if (dim == 2) add_both(sh, w, c, sums, 2, false);
+	else if (sh->spin) add_both(sh, w, c, sums, 3, true);
+	else add_both(sh, w, c, sums, 3, false);
 	keep(w, c, w->force, sh->use[paired ? FORCE_CONTACT : FORCE_TOUCH], dim);
 	keep(w, c, w->couple, sh->use[paired ? FORCE_CONTACT_COUPLE : FORCE_TOUCH_COUPLE], dim == 3 ? 3 : 1);
 	if (sh->looks) quern_dem_look(sh, w, c, sums);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* energy - what dashpots and sliding take in every step, and what there is when somebody looks.
  * docs/theory/contacts.md, section 8. Forces of dashpots are added up beside all forces, since a dashpot's work is
- * its force times the mean velocity of the kick, which is known only after the sum. What sliding takes goes to the
- * first grain of a pair, in a lane of its row. */
-#include "forces.h"
+ * its force times the mean velocity of the kick, which is known only after the sum. What sliding takes of a pair
+ * is booked with its first grain. */
+#include "packed.h"
 
 /* ---- contacts ---- */
 
@@ -12,7 +12,6 @@ void quern_dem_look(const forces_shared *sh, const forces_work *w, const contact
 	for (uint32_t q = 0; q < c->n; q++) {
 		const uint32_t i = (uint32_t)w->first[q];
 		const quern_real share = sh->use[FORCE_WEIGHT].real[0] ? w->weight[q] : 1;
-		if (c->held) c->held[w->slot[q]] = w->overlap[q] > 0 ? share * w->sheared[q] : 0;
 		if (i < begin || i >= end) continue;
 		sums[E_STORED] += share * w->stored[q];
 		sums[E_SHEARED] += share * w->sheared[q];
@@ -25,43 +24,48 @@ static bool is_fixed(const forces_shared *sh, uint32_t i) {
 	return sh->use[FORCE_FIXED].index && sh->use[FORCE_FIXED].index[i];
 }
 
-/* -sum F.v of the dashpots in the lanes of forces and torques, and what sliding took in its own. Four sums go side by
- * side, so that none waits for the one before. */
+/* -F.v of the dashpots, and in 2-D what sliding took: the lanes of rows, times velocities or 1, of four grains each. Four sums go
+ * side by side, so that none waits for the one before. */
 QUERN_INLINE void lose(const forces_work *w, const int32_t *fixed, uint32_t row, uint32_t n, const int dim,
-	const bool spin, lanes8 *out) {
-	const quern_real(*restrict drag)[8] =
-		(const quern_real(*)[8])(const void *)((dim == 2 ? w->row : w->drag_row) + row);
-	const quern_real *restrict vx = w->grains[G_MEAN], *restrict vy = w->grains[G_MEAN + 1],
-							   *restrict vz = w->grains[G_MEAN + 2];
-	const quern_real *restrict sx = w->grains[G_MEAN_SPIN], *restrict sy = w->grains[G_MEAN_SPIN + 1],
-							   *restrict sz = w->grains[G_MEAN_SPIN + 2];
-	static const lanes8 slid = { 0, 0, 0, 0, 0, 0, 1, 0 };
-	lanes8 sum[4] = { { 0 } };
-	for (uint32_t i = 0; i < n; i++) {
-		lanes8 v = slid;
-		if (fixed && fixed[i]) v = slid;
-		else if (dim == 2) v = (lanes8) { 0, 0, 0, -vx[i], -vy[i], spin ? -sx[i] : 0, 1, 0 };
-		else
-			v = (lanes8) { -vx[i], -vy[i], -vz[i], spin ? -sx[i] : 0, spin ? -sy[i] : 0, spin ? -sz[i] : 0, 1,
-				0 };
-		sum[i % 4] += *(const lanes8 *)(const void *)drag[i] * v;
+	const bool spin, lanes4 *low_out, lanes4 *high_out) {
+	const lanes4 none = { 0 }, one = { 1, 1, 1, 1 }, slid = { 0, 0, dim == 2 ? 1 : 0, 0 };
+	lanes4 low[4] = { { 0 } }, high[4] = { { 0 } };
+	for (uint32_t i = 0; i < n; i += 4) {
+		lanes4 v[3], s[3], by_low[4], by_high[4];
+		for (int k = 0; k < 3; k++) {
+			v[k] = k < dim ? -*packed_at(w->grains[G_MEAN + k] + i) : none;
+			s[k] = spin && k < (dim == 3 ? 3 : 1) ? -*packed_at(w->grains[G_MEAN_SPIN + k] + i) : none;
+		}
+		packed_turn((const lanes4[4]) { dim == 2 ? none : v[2], dim == 2 ? none : s[0],
+						dim == 2 ? none : s[1], dim == 2 ? v[0] : s[2] },
+			by_low);
+		packed_turn((const lanes4[4]) { dim == 2 ? v[1] : none, dim == 2 ? s[0] : none, dim == 2 ? one : v[0],
+						dim == 2 ? none : v[1] },
+			by_high);
+		for (uint32_t k = 0; k < 4 && i + k < n; k++) {
+			const bool holds = fixed && fixed[i + k];
+			const quern_real *mine = w->row[row + i + k], *drag = dim == 2 ? mine : w->drag_row[row + i + k];
+			low[k] += *packed_at(drag) * (holds ? none : by_low[k]);
+			high[k] += *packed_at(mine + 4) * (holds ? slid : by_high[k]);
+		}
 	}
-	*out = (sum[0] + sum[2]) + (sum[1] + sum[3]);
+	*low_out = (low[0] + low[2]) + (low[1] + low[3]);
+	*high_out = (high[0] + high[2]) + (high[1] + high[3]);
 }
 
 void quern_dem_lose(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t row, uint32_t n,
 	quern_real *sums) {
 	const int32_t *fixed = sh->use[FORCE_FIXED].index ? sh->use[FORCE_FIXED].index + begin : NULL;
 	const bool flat = sh->s->dim == 2;
-	lanes8 of;
-	if (flat && sh->spin) lose(w, fixed, row, n, 2, true, &of);
-	else if (flat) lose(w, fixed, row, n, 2, false, &of);
-	else if (sh->spin) lose(w, fixed, row, n, 3, true, &of);
-	else lose(w, fixed, row, n, 3, false, &of);
+	lanes4 low, high;
+	if (flat && sh->spin) lose(w, fixed, row, n, 2, true, &low, &high);
+	else if (flat) lose(w, fixed, row, n, 2, false, &low, &high);
+	else if (sh->spin) lose(w, fixed, row, n, 3, true, &low, &high);
+	else lose(w, fixed, row, n, 3, false, &low, &high);
 	const quern_real damped =
-		flat ? (of[3] + of[4]) + of[5] : ((of[0] + of[1]) + of[2]) + ((of[3] + of[4]) + of[5]);
+		flat ? (low[3] + high[0]) + high[1] : ((high[2] + high[3]) + low[0]) + ((low[1] + low[2]) + low[3]);
 	sums[E_DAMPED] += damped * sh->s->dt;
-	sums[E_RUBBED] += of[LANE_RUBBED];
+	if (flat) sums[E_RUBBED] += high[LANE_RUBBED - 4];
 }
 
 void quern_dem_have(

@@ -70,7 +70,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 	carve_columns(&c, w->arm, 2, cap);
 	if (sh->spin) {
 		carve_columns(&c, w->spin, dim == 3 ? 3 : 1, cap);
-		carve_columns(&c, w->torque, dim == 3 ? 3 : 1, cap);
+		if (dim == 2) carve_columns(&c, &w->planar, 1, cap);
 		if (dim == 3) carve_columns(&c, w->turn, 3, cap);
 	}
 	carve_means(sh, w, &c);
@@ -81,7 +81,6 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 		carve_columns(&c, &w->stored, 1, cap);
 		carve_columns(&c, &w->sheared, 1, cap);
 		carve_columns(&c, &w->rubbed, 1, cap);
-		if (sh->spin) carve_columns(&c, w->drag_torque, dim == 3 ? 3 : 1, cap);
 	}
 	carve_rows(sh, w, &c);
 	w->first = carve(&c, cap * sizeof(int32_t));
@@ -95,7 +94,7 @@ static size_t lay_out(const forces_shared *sh, forces_work *w, char *base) {
 		carve_columns(&c, w->own[r], quern_shape_size(integrator->uses[r].shape, dim), GRAINS);
 	w->row = carve(&c, ((size_t)sh->most_grains + 4) * sizeof *w->row);
 	if (sh->couple) w->couple_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
-	if (sh->books && dim == 3) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->row);
+	if (sh->books && dim == 3) w->drag_row = carve(&c, ((size_t)sh->most_grains + 1) * sizeof *w->drag_row);
 	return c.used + 64;
 }
 
@@ -113,7 +112,7 @@ static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	quern_real *sums = sh->sums + (size_t)b * N_ENERGIES;
 	memset(w.row, 0, ((size_t)n + 1) * sizeof *w.row);
 	if (w.couple_row) memset(w.couple_row, 0, ((size_t)n + 1) * sizeof *w.row);
-	if (w.drag_row) memset(w.drag_row, 0, ((size_t)n + 1) * sizeof *w.row);
+	if (w.drag_row) memset(w.drag_row, 0, ((size_t)n + 1) * sizeof *w.drag_row);
 	if (sh->contact) quern_dem_pairs(sh, &w, b, sums);
 	if (sh->touch) quern_dem_touches(sh, &w, b, sums);
 	quern_dem_fold_couples(sh, &w, n);
@@ -191,7 +190,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->means = sh->predicts && asks_for_means(s);
 	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
 	sh->books = !sh->looks && !s->settling && (s->use[FORCE_DAMPED].real[0] || s->use[FORCE_RUBBED].real[0]);
-	sh->starts = sh->looks && s->step == 0;
+	if (sh->books && !quern_dem_find_history(sh)) return false;
 	sh->material = sh->d->pairs.n ? s->use[FORCE_MATERIAL].index : NULL;
 	sh->grain = grains.block;
 	sh->by_place = s->host->parts(s->run, "grain")->by_place;

@@ -29,8 +29,8 @@ enum {
 	G_OLD_SPIN = 36,
 	N_GRAIN_COLUMNS = 39
 };
-/* Lanes of a grain's row: force, torque; then in 2-D what dashpots give of both and what sliding has taken, which in
- * 3-D have a row of their own. */
+/* Lanes of a grain's row: force, torque; then what dashpots give of both. In 2-D what sliding has taken follows; in 3-D all of the
+ * dashpots but two numbers has a row of its own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { BOX_LOAD, BOX_WORK = 3, N_BOX_SUMS };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
@@ -52,6 +52,12 @@ typedef struct deep_contact {
 	const char *law;
 } deep_contact;
 
+/* What a law remembers of contacts, of all entries of the list, and what it is where there is nothing to remember. */
+typedef struct history_column {
+	const quern_real *column;
+	quern_real initial;
+} history_column;
+
 /* What all blocks share. */
 typedef struct forces_shared {
 	const dem *d;
@@ -64,11 +70,12 @@ typedef struct forces_shared {
 	bool predicts;      /* dashpots act on other velocities than those by which grains have moved */
 	bool means;         /* it does, and a law asks for the latter */
 	bool works, twists; /* what bodies do, and their torques, are booked */
-	const body_pose *pose; /* by body */
-	quern_real dt;         /* s, by which springs move */
-	bool books;            /* losses of this step are booked */
-	bool looks;            /* nothing moves: forces and energies of the state as it is */
-	bool starts;           /* losses will be booked from now on: what springs hold is noted */
+	const body_pose *pose;         /* by body */
+	quern_real dt;                 /* s, by which springs move */
+	bool books;                    /* losses of this step are booked */
+	bool looks;                    /* nothing moves: forces and energies of the state as it is */
+	const history_column *history; /* where losses are booked: what laws remember of contacts */
+	uint32_t n_history;
 	bool boxed;            /* the domain is strained */
 	dem_box box, box_then; /* where forces are looked at, and after the step */
 	quern_real *box_sums;  /* [block][N_BOX_SUMS] */
@@ -101,13 +108,13 @@ typedef struct forces_work {
 	quern_real *mean_velocity[3], *mean_spin[3]; /* those of `velocity` and `spin` where they are the same */
 	quern_real *wall[3];                         /* velocity of a body that moves, where it is touched */
 	quern_real *crossed[3]; /* of a box that is strained: how many of its lengths lie between both */
-	quern_real *force[3], *couple[3], *dashpot[3], *drag_couple[3], *stored, *sheared, *rubbed, *torque[3],
-		*drag_torque[3];
+	quern_real *force[3], *couple[3], *dashpot[3], *drag_couple[3], *stored, *sheared, *rubbed,
+		*planar;   /* spin of the second grain, in 2-D */
 	law_row *rows; /* of all laws, one after the other */
 	int32_t *first, *second, *slot, *feature;
 	compress_bits *near; /* who of a chunk's slots is looked at */
 	/* per grain of the block, one more for partners outside, and three that are read with the last; couples, and from lane 3 on what of them damps */
-	quern_real (*row)[8], (*drag_row)[8], (*couple_row)[8];
+	quern_real (*row)[8], (*drag_row)[4], (*couple_row)[8];
 	quern_real *grains[N_GRAIN_COLUMNS];
 	quern_real *own[QUERN_MOST_USES][9]; /* of the integrator, while nothing moves */
 } forces_work;
@@ -118,7 +125,6 @@ typedef struct contact_chunk {
 	int32_t body;               /* the one touched, or -1 */
 	int32_t item;               /* of the pairs of materials that have parameters of their own, or -1 */
 	uint32_t begin, n_slots, n; /* entries begin .. begin + n_slots of the list, of which n are looked at */
-	quern_real *held;           /* by slot: what springs held in the last step; NULL: nobody asks */
 	const compress_bits *near;  /* who of the entries is looked at; NULL: all are */
 } contact_chunk;
 
@@ -135,10 +141,10 @@ void quern_dem_integrate(const forces_shared *, forces_work *, uint32_t b, quern
 void quern_dem_act(const forces_shared *, forces_work *, const contact_chunk *, quern_real *sums);
 /* Couples of n grains join the torques in their rows. */
 void quern_dem_fold_couples(const forces_shared *, const forces_work *, uint32_t n);
-/* What springs hold, by entry of the list from `begin` on, if anybody asks. */
-quern_real *quern_dem_held(const forces_shared *, int row, uint32_t begin);
 /* ---- laws.c ---- */
 bool quern_dem_is_history(const quern_use *);
+/* Sets `history`: numbers, not indices. */
+bool quern_dem_find_history(forces_shared *);
 /* Calls all laws; contacts that were left out forget, those that were kept remember. */
 void quern_dem_call_laws(const forces_shared *, forces_work *, const contact_chunk *);
 /* ---- checks.c ---- */

@@ -8,6 +8,41 @@ bool quern_dem_is_history(const quern_use *row) { return !strncmp(row->field, "c
 /* The row says that there are couples; they are the solver's own column. */
 static bool is_couple(const quern_use *row) { return !strcmp(row->field, "contact.couple"); }
 
+/* Of a component of a new entry: `initial` is the diagonal's. */
+static quern_real initial_of(const quern_use *row, uint32_t component, uint32_t dim) {
+	const bool diagonal = row->shape == QUERN_TENSOR      ? component % (dim + 1) == 0
+						  : row->shape == QUERN_SYMMETRIC ? component < dim
+														  : true;
+	return diagonal ? row->initial : 0;
+}
+
+static bool is_known(const forces_shared *sh, const quern_real *column) {
+	for (uint32_t h = 0; h < sh->n_history; h++)
+		if (sh->history[h].column == column) return true;
+	return false;
+}
+
+bool quern_dem_find_history(forces_shared *sh) {
+	const quern_step *s = sh->s;
+	size_t most = 1;
+	for (uint32_t l = 0; l < sh->n_laws; l++) most += 9 * (size_t)s->slot[SLOT_CONTACT][l].n_uses;
+	history_column *found = s->host->memory(s->run, most * sizeof *found);
+	if (!found) return false;
+	sh->history = found;
+	for (uint32_t l = 0; l < sh->n_laws; l++)
+		for (uint32_t r = 0; r < s->slot[SLOT_CONTACT][l].n_uses; r++) {
+			const quern_use *row = &s->slot[SLOT_CONTACT][l].uses[r];
+			const quern_column *columns = &s->slot[SLOT_CONTACT][l].column[r];
+			const bool real = row->shape != QUERN_INDEX && row->shape != QUERN_ID;
+			if (!real || !quern_dem_is_history(row) || is_couple(row)) continue;
+			for (uint32_t k = 0; k < quern_shape_size(row->shape, s->dim); k++)
+				if (columns->real[k] && !is_known(sh, columns->real[k]))
+					found[sh->n_history++] =
+						(history_column) { columns->real[k], initial_of(row, k, s->dim) };
+		}
+	return true;
+}
+
 #ifdef __AVX512VL__
 /* Whether it is known bit by bit whose numbers these are, which is of use with AVX-512 alone. */
 static bool by_bits(const contact_chunk *c, uint8_t shape) {
@@ -15,14 +50,22 @@ static bool by_bits(const contact_chunk *c, uint8_t shape) {
 }
 #endif
 
-static void recall(const forces_work *w, const contact_chunk *c, uint8_t shape, void *to, const void *whole) {
+/* Where a chunk's own entries of a column of all contacts begin, in bytes. */
+static size_t at_chunk(const contact_chunk *c, uint8_t shape) {
+	return c->begin * (shape == QUERN_ID         ? sizeof(int64_t)
+						  : shape == QUERN_INDEX ? sizeof(int32_t)
+												 : sizeof(quern_real));
+}
+
+static void recall(
+	const forces_work *w, const contact_chunk *c, uint8_t shape, void *to, const void *entries) {
 #ifdef __AVX512VL__
 	if (by_bits(c, shape) && 3 * c->n > c->n_slots) { /* of a few one by one is faster */
-		quern_compress_real(c->n_slots, c->near, (const quern_real *)whole + c->begin, to);
+		quern_compress_real(c->n_slots, c->near, entries, to);
 		return;
 	}
 #endif
-	quern_gather(shape, to, whole, c->begin, w->slot, c->n);
+	quern_gather(shape, to, entries, 0, w->slot, c->n);
 }
 
 /* Own columns of the contacts, or of both grains; against a body both are the first's. */
@@ -37,7 +80,8 @@ static void gather_rows(const forces_shared *sh, const forces_work *w, const con
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim) && !is_couple(row); k++) {
 			const void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole) continue;
-			if (history) recall(w, c, row->shape, rows[r].mine[k], whole);
+			if (history)
+				recall(w, c, row->shape, rows[r].mine[k], (const char *)whole + at_chunk(c, row->shape));
 			else quern_gather(row->shape, rows[r].mine[k], whole, 0, w->first, c->n);
 			quern_set_component(&use[r], row->shape, k, rows[r].mine[k]);
 			if (history) continue;
@@ -47,26 +91,26 @@ static void gather_rows(const forces_shared *sh, const forces_work *w, const con
 	}
 }
 
-static void forget(uint8_t shape, void *column, uint32_t begin, uint32_t n, quern_real initial) {
+static void forget(uint8_t shape, void *column, uint32_t n, quern_real initial) {
 	if (shape == QUERN_INDEX) {
-		int32_t *restrict to = (int32_t *)column + begin;
+		int32_t *restrict to = column;
 		for (uint32_t q = 0; q < n; q++) to[q] = (int32_t)initial;
 	} else {
-		quern_real *restrict to = (quern_real *)column + begin;
+		quern_real *restrict to = column;
 		for (uint32_t q = 0; q < n; q++) to[q] = initial;
 	}
 }
 
-static void remember(
-	const forces_work *w, const contact_chunk *c, const quern_use *row, void *whole, const void *mine) {
+static void remember(const forces_work *w, const contact_chunk *c, uint8_t shape, quern_real initial,
+	void *entries, const void *mine) {
 #ifdef __AVX512VL__
-	if (by_bits(c, row->shape)) {
-		quern_expand_real(c->n_slots, c->near, mine, (quern_real *)whole + c->begin, row->initial);
+	if (by_bits(c, shape)) {
+		quern_expand_real(c->n_slots, c->near, mine, entries, initial);
 		return;
 	}
 #endif
-	if (c->n < c->n_slots) forget(row->shape, whole, c->begin, c->n_slots, row->initial);
-	quern_scatter(row->shape, whole, mine, c->begin, w->slot, c->n);
+	if (c->n < c->n_slots) forget(shape, entries, c->n_slots, initial);
+	quern_scatter(shape, entries, mine, 0, w->slot, c->n);
 }
 
 /* Contacts that were left out forget, contacts that were kept remember. */
@@ -79,7 +123,8 @@ static void scatter_rows(const forces_shared *sh, const forces_work *w, const co
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
 			void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole || row->shape == QUERN_ID) continue;
-			remember(w, c, row, whole, rows[r].mine[k]);
+			remember(w, c, row->shape, initial_of(row, k, sh->s->dim),
+				(char *)whole + at_chunk(c, row->shape), rows[r].mine[k]);
 		}
 	}
 }
@@ -88,14 +133,15 @@ static void scatter_rows(const forces_shared *sh, const forces_work *w, const co
 static void clear(quern_real *const *column, uint32_t count, uint32_t n) {
 	for (uint32_t k = 0; k < count && column[k]; k++) memset(column[k], 0, n * sizeof(quern_real));
 }
-static void clear_given(const forces_work *w, uint32_t n) {
+static void clear_given(const forces_work *w, uint32_t n, bool looks) {
 	clear(w->force, 3, n);
 	clear(w->couple, 3, n);
 	clear(w->dashpot, 3, n);
 	clear(w->drag_couple, 3, n);
+	clear(&w->rubbed, 1, n);
+	if (!looks) return;
 	clear(&w->stored, 1, n);
 	clear(&w->sheared, 1, n);
-	clear(&w->rubbed, 1, n);
 }
 
 static quern_contact_batch batch_of(const forces_shared *sh, const forces_work *w, uint32_t n) {
@@ -107,7 +153,8 @@ static quern_contact_batch batch_of(const forces_shared *sh, const forces_work *
 		.mass = w->mass,
 		.stored = w->stored,
 		.sheared = w->sheared,
-		.rubbed = w->rubbed };
+		.rubbed = w->rubbed,
+		.losses_only = !sh->looks };
 	for (uint32_t k = 0; k < 3; k++) {
 		b.normal[k] = w->normal[k];
 		b.velocity[k] = w->velocity[k];
@@ -136,7 +183,7 @@ void quern_dem_call_laws(const forces_shared *sh, forces_work *w, const contact_
 	law_row *rows = w->rows;
 	b.use = use;
 	b.use_second = use_second;
-	clear_given(w, c->n);
+	clear_given(w, c->n, sh->looks);
 	for (uint32_t l = 0; l < sh->n_laws; l++) {
 		const quern_bound *law = &sh->s->slot[SLOT_CONTACT][l];
 		const void *self = dem_law(law, c->item, c->body);

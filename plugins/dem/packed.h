@@ -28,4 +28,6 @@ QUERN_INLINE void packed_columns(const lanes4 *from, size_t stride, const int32_
 	packed_rows(from, stride, at, row);
 	packed_turn(row, column);
 }
+/* Four numbers of a column, or half of a row. */
+QUERN_INLINE const lanes4 *packed_at(const quern_real *from) { return (const lanes4 *)(const void *)from; }
 QUERN_INLINE void packed_put(quern_real *to, const lanes4 *column) { *(lanes4 *)(void *)to = *column; }

@@ -114,10 +114,10 @@ QUERN_INLINE uint32_t keep_near(forces_work *w, const int32_t *first, const int3
 	return kept;
 }
 
-/* Slots whose grains are within the laws' reach, in list order; and those whose spring was still loaded, so that what
- * it held is booked. */
-QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n,
-	const quern_real *held, const int dim) {
+/* Slots whose grains are within the laws' reach, in list order; and, where losses are booked, those of which a law still
+ * remembers something, so that it can say what a spring gives up. */
+QUERN_INLINE uint32_t compact(
+	const forces_shared *sh, forces_work *w, uint32_t begin, uint32_t n, const int dim) {
 	const int32_t *restrict first = sh->use[FORCE_FIRST].index + begin, *restrict second =
 																			sh->use[FORCE_SECOND].index +
 																			begin;
@@ -139,9 +139,11 @@ QUERN_INLINE uint32_t compact(const forces_shared *sh, forces_work *w, uint32_t 
 		const quern_real most = both[k] + reach;
 		near[k] = (quern_vec_dot(d, d, dim) < most * most);
 	}
-	if (held) {
+	for (uint32_t h = 0; h < sh->n_history; h++) {
+		const quern_real *restrict was = sh->history[h].column + begin, initial = sh->history[h].initial;
 		QUERN_SIMD
-		for (uint32_t k = 0; k < n; k++) near[k] |= held[k] > 0;
+		for (uint32_t k = 0; k < n; k++)
+			near[k] |= (was[k] != initial) & ((was[k] == was[k]) | (initial == initial));
 	}
 	const uint32_t kept = keep_near(w, first, second, n);
 	for (uint32_t q = kept; q < kept + 3; q++) w->first[q] = w->second[q] = (int32_t)sh->grain[0];
@@ -197,7 +199,7 @@ QUERN_INLINE void geometry(const forces_shared *sh, const forces_work *w, uint32
 	}
 }
 
-/* Of rows of motion: leaves v_i - v_j in `velocity`, w_i in `spin`; w_j in `turn`, in 2-D in `torque`; in 3-D the masses in `mass`
+/* Of rows of motion: leaves v_i - v_j in `velocity`, w_i in `spin`; w_j in `turn`, in 2-D in `planar`; in 3-D the masses in `mass`
  * and `force`. */
 QUERN_INLINE void load_motion(const lanes4 *rows, const forces_work *w, quern_real *const velocity[3],
 	quern_real *const turning[3], uint32_t n, const int dim, const bool spin) {
@@ -212,7 +214,7 @@ QUERN_INLINE void load_motion(const lanes4 *rows, const forces_work *w, quern_re
 		for (int k = 0; k < dim; k++) packed_put(velocity[k] + q, &d[k]);
 		if (dim == 2 && spin) {
 			packed_put(turning[0] + q, &mine[2]);
-			packed_put(w->torque[0] + q, &other[2]);
+			packed_put(w->planar + q, &other[2]);
 		}
 		if (dim == 2) continue;
 		packed_put(w->mass + q, &mine[3]);
@@ -235,7 +237,7 @@ QUERN_INLINE void motion(const lanes4 *rows, const forces_work *w, quern_real *c
 	quern_real *restrict vx = velocity[0], *restrict vy = velocity[1], *restrict vz = velocity[2];
 	quern_real *restrict sx = turning[0], *restrict sy = turning[1], *restrict sz = turning[2];
 	quern_real *restrict tx = w->turn[0], *restrict ty = w->turn[1], *restrict tz = w->turn[2];
-	const quern_real *restrict planar = w->torque[0];
+	const quern_real *restrict planar = w->planar;
 	load_motion(rows, w, velocity, turning, n, dim, spin);
 	if (spin && dim == 2) {
 		QUERN_SIMD
@@ -308,14 +310,10 @@ QUERN_INLINE void block(
 	foresee(sh, b);
 	for (uint32_t begin = sh->contact[b], end = sh->contact[b + 1], n; begin < end; begin += n) {
 		n = alike(sh, begin, end - begin < sh->cap ? end - begin : sh->cap);
-		contact_chunk c = { .block = b,
-			.body = -1,
-			.item = item_at(sh, begin),
-			.begin = begin,
-			.n_slots = n,
-			.held = quern_dem_held(sh, FORCE_CONTACT_SHEARED, begin),
-			.near = w->near };
-		c.n = compact(sh, w, begin, c.n_slots, c.held, dim);
+		contact_chunk c = {
+			.block = b, .body = -1, .item = item_at(sh, begin), .begin = begin, .n_slots = n, .near = w->near
+		};
+		c.n = compact(sh, w, begin, c.n_slots, dim);
 		geometry(sh, w, c.n, dim);
 		motion(sh->motion, w, w->velocity, w->spin, c.n, dim, spin);
 		if (sh->mean) motion(sh->mean, w, w->mean_velocity, w->mean_spin, c.n, dim, spin);

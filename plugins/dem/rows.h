@@ -195,10 +195,6 @@ QUERN_USE_ENUM(NEAR_USES);
 		.doc = "On the grain, unweighted.") \
 	X(FORCE_SUM, "grain.force", "N", gives, QUERN_VECTOR, .flags = QUERN_OPTIONAL, \
 		.doc = "Of all contacts, weighted; without gravity.") \
-	X(FORCE_CONTACT_SHEARED, "contact.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, \
-		.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step.") \
-	X(FORCE_TOUCH_SHEARED, "touch.sheared", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_RELEASED, \
-		.with = "total.rubbed", .doc = "In the tangential spring, weighted, at the last step.") \
 	X(FORCE_ID, "grain.id", "1", QUERN_READ, QUERN_ID) \
 	BOX_ROWS(X, FORCE_BOX, moves, QUERN_READ)
 #define LOOK_USES(X) STATE_USES(X, QUERN_READ, QUERN_UPDATE)

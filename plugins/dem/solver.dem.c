@@ -372,7 +372,9 @@ static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32
 	for (int32_t item = -1; item < (int32_t)law->n_refined; item++)
 		for (int32_t body = -1; body < (int32_t)bodies; body++) {
 			const quern_real reach = ops->reach(dem_law(law, item, body), body < 0 ? 0.5 * radius : radius);
-			d->reach = reach > d->reach ? reach : d->reach;
+			const quern_real more =
+				reach * (1 + 1e-12); /* of two roundings of one distance no law may see another one */
+			d->reach = more > d->reach ? more : d->reach;
 		}
 }
 

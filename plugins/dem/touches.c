@@ -225,8 +225,7 @@ void quern_dem_touches(const forces_shared *sh, forces_work *w, uint32_t b, quer
 		const int32_t item = item_at(sh, begin);
 		for (n = 1; begin + n < end && n < sh->cap && body[begin + n] == body[begin]; n++)
 			if (sh->material && item_at(sh, begin + n) != item) break;
-		const contact_chunk c = { b, body[begin], item, begin, n, n,
-			quern_dem_held(sh, FORCE_TOUCH_SHEARED, begin), NULL };
+		const contact_chunk c = { b, body[begin], item, begin, n, n, NULL };
 		load(sh, w, &c);
 		geometry(sh, w, &c);
 		move(sh, sh->predicts ? sh->motion : NULL, w, w->velocity, w->spin, &sh->pose[c.body], n);
