@@ -208,9 +208,7 @@ static void fill_row(check_kernel *k, const quern_use *row, int first, uint64_t 
 		quern_check_direction(dim, key, i, direction);
 		for (uint32_t c = 0; c < count; c++) {
 			const quern_check_column *to = &k->column[first + (int)c];
-			const bool diagonal = (row->shape == QUERN_TENSOR && c % (dim + 1) == 0) ||
-								  (row->shape == QUERN_SYMMETRIC && c < dim) || row->shape < QUERN_SYMMETRIC;
-			const double x = fresh  ? (diagonal ? row->initial : 0)
+			const double x = fresh  ? quern_shape_initial(row->shape, dim, c, row->initial)
 							 : unit ? direction[c]
 							 : row->shape == QUERN_SCALAR
 								 ? quern_check_uniform(key, (uint64_t)c << 32 | i, 0.5 * size, 1.5 * size)

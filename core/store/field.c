@@ -2,6 +2,7 @@
 #include "field.h"
 #include "platform.h"
 #include "text.h"
+#include <quern/columns.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -58,13 +59,10 @@ quern_column quern_field_column(const quern_store *store, const quern_field *fie
 	return column;
 }
 
-/* Diagonal components of a tensor take `initial`, the others start at zero. */
 static double initial_of(const quern_field *field, int component) {
-	const bool symmetric = field->shape == QUERN_SYMMETRIC, tensor = field->shape == QUERN_TENSOR;
-	const int dim = field->n_components == 3 || field->n_components == 4 ? 2 : 3;
-	if (symmetric) return component < dim ? field->initial : 0;
-	if (tensor) return component % (dim + 1) == 0 ? field->initial : 0;
-	return field->initial;
+	const uint32_t dim =
+		field->n_components == 3 || field->n_components == 4 ? 2 : 3; /* of a tensor of this many */
+	return quern_shape_initial(field->shape, dim, (uint32_t)component, field->initial);
 }
 
 /* Loops walk through dozens of columns side by side: their beginnings lie 17 lines apart in the sets of a cache, so that they do not

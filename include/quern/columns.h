@@ -22,6 +22,14 @@ QUERN_INLINE uint32_t quern_shape_size(uint8_t shape, uint32_t dim) {
 	return shape > QUERN_ID ? 0 : (dim == 2 ? planar : spatial)[shape];
 }
 
+/* What a component of a new entry is: a row's `initial` is the diagonal's of SYMMETRIC and TENSOR, beside which they are 0. */
+QUERN_INLINE quern_real quern_shape_initial(
+	uint8_t shape, uint32_t dim, uint32_t component, quern_real initial) {
+	const bool beside =
+		(shape == QUERN_TENSOR && component % (dim + 1)) || (shape == QUERN_SYMMETRIC && component >= dim);
+	return beside ? 0 : initial;
+}
+
 /* A column by its number, of whatever kind. */
 static inline void *quern_component(const quern_column *c, uint8_t shape, uint32_t k) {
 	if (shape == QUERN_INDEX) return c->index;

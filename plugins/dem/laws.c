@@ -8,14 +8,6 @@ bool quern_dem_is_history(const quern_use *row) { return !strncmp(row->field, "c
 /* The row says that there are couples; they are the solver's own column. */
 static bool is_couple(const quern_use *row) { return !strcmp(row->field, "contact.couple"); }
 
-/* Of a component of a new entry: `initial` is the diagonal's. */
-static quern_real initial_of(const quern_use *row, uint32_t component, uint32_t dim) {
-	const bool diagonal = row->shape == QUERN_TENSOR      ? component % (dim + 1) == 0
-						  : row->shape == QUERN_SYMMETRIC ? component < dim
-														  : true;
-	return diagonal ? row->initial : 0;
-}
-
 static bool is_known(const forces_shared *sh, const quern_real *column) {
 	for (uint32_t h = 0; h < sh->n_history; h++)
 		if (sh->history[h].column == column) return true;
@@ -37,8 +29,8 @@ bool quern_dem_find_history(forces_shared *sh) {
 			if (!real || !quern_dem_is_history(row) || is_couple(row)) continue;
 			for (uint32_t k = 0; k < quern_shape_size(row->shape, s->dim); k++)
 				if (columns->real[k] && !is_known(sh, columns->real[k]))
-					found[sh->n_history++] =
-						(history_column) { columns->real[k], initial_of(row, k, s->dim) };
+					found[sh->n_history++] = (history_column) { columns->real[k],
+						quern_shape_initial(row->shape, s->dim, k, row->initial) };
 		}
 	return true;
 }
@@ -50,22 +42,14 @@ static bool by_bits(const contact_chunk *c, uint8_t shape) {
 }
 #endif
 
-/* Where a chunk's own entries of a column of all contacts begin, in bytes. */
-static size_t at_chunk(const contact_chunk *c, uint8_t shape) {
-	return c->begin * (shape == QUERN_ID         ? sizeof(int64_t)
-						  : shape == QUERN_INDEX ? sizeof(int32_t)
-												 : sizeof(quern_real));
-}
-
-static void recall(
-	const forces_work *w, const contact_chunk *c, uint8_t shape, void *to, const void *entries) {
+static void recall(const forces_work *w, const contact_chunk *c, uint8_t shape, void *to, const void *whole) {
 #ifdef __AVX512VL__
 	if (by_bits(c, shape) && 3 * c->n > c->n_slots) { /* of a few one by one is faster */
-		quern_compress_real(c->n_slots, c->near, entries, to);
+		quern_compress_real(c->n_slots, c->near, (const quern_real *)whole + c->begin, to);
 		return;
 	}
 #endif
-	quern_gather(shape, to, entries, 0, w->slot, c->n);
+	quern_gather(shape, to, whole, c->begin, w->slot, c->n);
 }
 
 /* Own columns of the contacts, or of both grains; against a body both are the first's. */
@@ -80,8 +64,7 @@ static void gather_rows(const forces_shared *sh, const forces_work *w, const con
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim) && !is_couple(row); k++) {
 			const void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole) continue;
-			if (history)
-				recall(w, c, row->shape, rows[r].mine[k], (const char *)whole + at_chunk(c, row->shape));
+			if (history) recall(w, c, row->shape, rows[r].mine[k], whole);
 			else quern_gather(row->shape, rows[r].mine[k], whole, 0, w->first, c->n);
 			quern_set_component(&use[r], row->shape, k, rows[r].mine[k]);
 			if (history) continue;
@@ -91,26 +74,26 @@ static void gather_rows(const forces_shared *sh, const forces_work *w, const con
 	}
 }
 
-static void forget(uint8_t shape, void *column, uint32_t n, quern_real initial) {
+static void forget(uint8_t shape, void *column, uint32_t begin, uint32_t n, quern_real initial) {
 	if (shape == QUERN_INDEX) {
-		int32_t *restrict to = column;
+		int32_t *restrict to = (int32_t *)column + begin;
 		for (uint32_t q = 0; q < n; q++) to[q] = (int32_t)initial;
 	} else {
-		quern_real *restrict to = column;
+		quern_real *restrict to = (quern_real *)column + begin;
 		for (uint32_t q = 0; q < n; q++) to[q] = initial;
 	}
 }
 
 static void remember(const forces_work *w, const contact_chunk *c, uint8_t shape, quern_real initial,
-	void *entries, const void *mine) {
+	void *whole, const void *mine) {
 #ifdef __AVX512VL__
 	if (by_bits(c, shape)) {
-		quern_expand_real(c->n_slots, c->near, mine, entries, initial);
+		quern_expand_real(c->n_slots, c->near, mine, (quern_real *)whole + c->begin, initial);
 		return;
 	}
 #endif
-	if (c->n < c->n_slots) forget(shape, entries, c->n_slots, initial);
-	quern_scatter(shape, entries, mine, 0, w->slot, c->n);
+	if (c->n < c->n_slots) forget(shape, whole, c->begin, c->n_slots, initial);
+	quern_scatter(shape, whole, mine, c->begin, w->slot, c->n);
 }
 
 /* Contacts that were left out forget, contacts that were kept remember. */
@@ -123,8 +106,8 @@ static void scatter_rows(const forces_shared *sh, const forces_work *w, const co
 		for (uint32_t k = 0; k < quern_shape_size(row->shape, sh->s->dim); k++) {
 			void *whole = quern_component(&columns[r], row->shape, k);
 			if (!whole || row->shape == QUERN_ID) continue;
-			remember(w, c, row->shape, initial_of(row, k, sh->s->dim),
-				(char *)whole + at_chunk(c, row->shape), rows[r].mine[k]);
+			remember(w, c, row->shape, quern_shape_initial(row->shape, sh->s->dim, k, row->initial), whole,
+				rows[r].mine[k]);
 		}
 	}
 }
