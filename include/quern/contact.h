@@ -46,8 +46,8 @@ typedef struct quern_contact_batch {
 	/* s^2: `velocity` and `spin` are late by `lag` times their second derivatives in time (quern_dashpot_share), the means are not;
 	 * 0: neither is */
 	quern_real lag;
-	uint32_t losses_only,
-		pad; /* 1: `stored` and `sheared` are there, but what is added to them is not looked at */
+	/* 1: `stored` and `sheared` are there, but what is added to them is not looked at */
+	uint32_t losses_only, pad;
 } quern_contact_batch;
 
 typedef struct quern_contact_ops {
@@ -80,9 +80,21 @@ QUERN_KIND(contact, quern_contact_ops, "A force between two grains in contact.",
 
 /* What of energies a batch asks for. */
 enum { QUERN_NO_ENERGY, QUERN_LOSSES, QUERN_ALL_ENERGY };
-QUERN_INLINE int quern_energy_asked(const quern_contact_batch *b) {
-	return !b->stored ? QUERN_NO_ENERGY : b->losses_only ? QUERN_LOSSES : QUERN_ALL_ENERGY;
-}
+
+/* Calls kernel(dim, rough, energy, self, b) with constants for `rough` and `energy`, so that each case gets a loop of its own. */
+#define QUERN_CALL_LAW(kernel, dim, rough, self, b)                                                          \
+	do {                                                                                                     \
+		const quern_contact_batch *batch_ = (b);                                                             \
+		const bool rough_ = (rough);                                                                         \
+		if (batch_->stored && !batch_->losses_only) {                                                        \
+			if (rough_) kernel(dim, true, QUERN_ALL_ENERGY, self, batch_);                                   \
+			else kernel(dim, false, QUERN_ALL_ENERGY, self, batch_);                                         \
+		} else if (batch_->stored) {                                                                         \
+			if (rough_) kernel(dim, true, QUERN_LOSSES, self, batch_);                                       \
+			else kernel(dim, false, QUERN_LOSSES, self, batch_);                                             \
+		} else if (rough_) kernel(dim, true, QUERN_NO_ENERGY, self, batch_);                                 \
+		else kernel(dim, false, QUERN_NO_ENERGY, self, batch_);                                              \
+	} while (0)
 
 /* Damping ratio zeta of a linear contact m x'' + 2 zeta w m x' + w^2 m x = 0 whose force is never attractive and which
  * rebounds with restitution e in (0, 1]: -ln e = 2 zeta F(zeta), F(zeta) = R_C(zeta^2, 1) (Schwager & Poeschel 2007,

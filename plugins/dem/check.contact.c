@@ -138,16 +138,18 @@ static quern_check_kernel *create(
 	return k;
 }
 
+static uint32_t components_of(const quern_check_kernel *k, int name) {
+	return name == FORCE || name == DASHPOT        ? k->dim
+		   : name == COUPLE || name == DRAG_COUPLE ? quern_check_axial(k->dim)
+												   : 1;
+}
+
 /* Forces and energies are added to; between steps they begin at zero again, while histories go on. */
 static void clear_sums(const quern_check_kernel *k) {
 	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED, DRAG_COUPLE };
-	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++) {
-		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT        ? k->dim
-							   : sums[s] == COUPLE || sums[s] == DRAG_COUPLE ? quern_check_axial(k->dim)
-																			 : 1;
-		for (uint32_t c = 0; k->at[sums[s]] >= 0 && c < count; c++)
+	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++)
+		for (uint32_t c = 0; k->at[sums[s]] >= 0 && c < components_of(k, sums[s]); c++)
 			memset(quern_check_given(k, sums[s], c), 0, k->n * sizeof(quern_real));
-	}
 }
 
 /* A law that is bounded by the force of those before it, or that does not push by itself, finds such a force: that of a spring along the
@@ -297,22 +299,22 @@ static void part(quern_check_kernel *k) {
 /* Where nobody asks for what springs hold, all else is the same. */
 static void only_losses(quern_check_kernel *k, quern_check_tally *t) {
 	static const int given[] = { FORCE, COUPLE, DASHPOT, DRAG_COUPLE, RUBBED };
-	enum { GIVEN = sizeof given / sizeof *given };
-	quern_real *was = k->host->memory((size_t)GIVEN * k->n, sizeof *was);
-	act(k);
-	for (int g = 0; g < GIVEN; g++)
-		if (k->at[given[g]] >= 0)
-			memcpy(was + (size_t)g * k->n, quern_check_found(k, given[g], 0), k->n * sizeof *was);
-	k->pass = LOSSES_ONLY;
-	act(k);
-	k->pass = 0;
-	for (int g = 0; g < GIVEN; g++)
-		for (uint32_t i = 0; k->at[given[g]] >= 0 && i < k->n; i++) {
-			const quern_real is = quern_check_found(k, given[g], 0)[i], all = was[(size_t)g * k->n + i];
-			k->host->expect(t, is == all, "%u-D: %s is %.17g where losses alone are asked for, else %.17g",
-				k->dim, k->host->column(k, k->at[given[g]])->name, is, all);
+	for (size_t g = 0; g < sizeof given / sizeof *given; g++)
+		for (uint32_t c = 0; k->at[given[g]] >= 0 && c < components_of(k, given[g]); c++) {
+			act(k);
+			quern_real *all = k->host->memory(k->n, sizeof *all);
+			memcpy(all, quern_check_found(k, given[g], c), k->n * sizeof *all);
+			k->pass = LOSSES_ONLY;
+			act(k);
+			k->pass = 0;
+			for (uint32_t i = 0; i < k->n; i++) {
+				const quern_real is = quern_check_found(k, given[g], c)[i];
+				k->host->expect(t, is == all[i],
+					"%u-D: %s is %.17g where losses alone are asked for, else %.17g", k->dim,
+					k->host->column(k, k->at[given[g]])->name, is, all[i]);
+			}
+			free(all);
 		}
-	free(was);
 }
 
 /* What springs held when a pair still touched is lost as it opens. */
@@ -457,9 +459,7 @@ static void scale_masses(const quern_check_kernel *k) {
 static void compare_scaled(const quern_check_kernel *k, const quern_check_kernel *big, quern_check_tally *t) {
 	static const int sums[] = { FORCE, COUPLE, DASHPOT, STORED, SHEARED, RUBBED };
 	for (size_t s = 0; s < sizeof sums / sizeof *sums; s++) {
-		const uint32_t count = sums[s] == FORCE || sums[s] == DASHPOT ? k->dim
-							   : sums[s] == COUPLE                    ? quern_check_axial(k->dim)
-																	  : 1;
+		const uint32_t count = components_of(k, sums[s]);
 		for (uint32_t i = 0; k->at[sums[s]] >= 0 && i < k->n; i++) {
 			const double size = size_of(k, sums[s], count, i) + 1e-30;
 			for (uint32_t c = 0; c < count; c++) {

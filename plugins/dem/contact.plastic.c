@@ -102,19 +102,8 @@ QUERN_INLINE void kernel(
 	}
 }
 
-QUERN_INLINE void with(
-	const int dim, const bool rough, const int energy, const plastic *self, const quern_contact_batch *b) {
-	if (rough) kernel(dim, true, energy, self, b);
-	else kernel(dim, false, energy, self, b);
-}
-
 QUERN_INLINE void force(const int dim, const void *self, const quern_contact_batch *b) {
-	const bool rough = ((const plastic *)self)->friction > 0;
-	switch (quern_energy_asked(b)) {
-	case QUERN_ALL_ENERGY: with(dim, rough, QUERN_ALL_ENERGY, self, b); break;
-	case QUERN_LOSSES: with(dim, rough, QUERN_LOSSES, self, b); break;
-	default: with(dim, rough, QUERN_NO_ENERGY, self, b);
-	}
+	QUERN_CALL_LAW(kernel, dim, ((const plastic *)self)->friction > 0, self, b);
 }
 static void force_2d(const void *self, const quern_contact_batch *b) { force(2, self, b); }
 static void force_3d(const void *self, const quern_contact_batch *b) { force(3, self, b); }

@@ -24,7 +24,7 @@ static bool is_fixed(const forces_shared *sh, uint32_t i) {
 	return sh->use[FORCE_FIXED].index && sh->use[FORCE_FIXED].index[i];
 }
 
-/* -F.v of the dashpots, and in 2-D what sliding took: the lanes of rows, times velocities or 1, of four grains each. Four sums go
+/* -F.v of the dashpots, and in 2-D what sliding took: lanes of rows (forces.h) times velocities or 1, four grains at once. Four sums go
  * side by side, so that none waits for the one before. */
 QUERN_INLINE void lose(const forces_work *w, const int32_t *fixed, uint32_t row, uint32_t n, const int dim,
 	const bool spin, lanes4 *low_out, lanes4 *high_out) {
@@ -36,12 +36,13 @@ QUERN_INLINE void lose(const forces_work *w, const int32_t *fixed, uint32_t row,
 			v[k] = k < dim ? -*packed_at(w->grains[G_MEAN + k] + i) : none;
 			s[k] = spin && k < (dim == 3 ? 3 : 1) ? -*packed_at(w->grains[G_MEAN_SPIN + k] + i) : none;
 		}
-		packed_turn((const lanes4[4]) { dim == 2 ? none : v[2], dim == 2 ? none : s[0],
-						dim == 2 ? none : s[1], dim == 2 ? v[0] : s[2] },
-			by_low);
-		packed_turn((const lanes4[4]) { dim == 2 ? v[1] : none, dim == 2 ? s[0] : none, dim == 2 ? one : v[0],
-						dim == 2 ? none : v[1] },
-			by_high);
+		if (dim == 2) {
+			packed_turn((const lanes4[4]) { none, none, none, v[0] }, by_low);
+			packed_turn((const lanes4[4]) { v[1], s[0], one, none }, by_high);
+		} else {
+			packed_turn((const lanes4[4]) { v[2], s[0], s[1], s[2] }, by_low);
+			packed_turn((const lanes4[4]) { none, none, v[0], v[1] }, by_high);
+		}
 		for (uint32_t k = 0; k < 4 && i + k < n; k++) {
 			const bool holds = fixed && fixed[i + k];
 			const quern_real *mine = w->row[row + i + k], *drag = dim == 2 ? mine : w->drag_row[row + i + k];

@@ -29,15 +29,13 @@ enum {
 	G_OLD_SPIN = 36,
 	N_GRAIN_COLUMNS = 39
 };
-/* Lanes of a grain's row: force, torque; then what dashpots give of both. In 2-D what sliding has taken follows; in 3-D all of the
- * dashpots but two numbers has a row of its own. */
+/* Lanes of a grain's row: force, torque; then what dashpots give of both. In 2-D what sliding has taken follows; in 3-D two
+ * numbers of the dashpots do, and the other four have a row of their own. */
 enum { LANE_DRAG = 3, LANE_RUBBED = 6 };
 enum { BOX_LOAD, BOX_WORK = 3, N_BOX_SUMS };
 enum { E_KINETIC, E_POTENTIAL, E_STORED, E_SHEARED, E_DAMPED, E_RUBBED, N_ENERGIES };
 
-/* A row at once: the same bits for any instruction set. */
-typedef quern_real lanes8 __attribute__((vector_size(64)));
-/* Half a row, which most processors hold in one register. */
+/* Half a row, which most processors hold in one register: the same bits for any instruction set. */
 typedef quern_real lanes4 __attribute__((vector_size(32)));
 
 /* m, the least and the largest way of a block's grains since the last list, along each axis. */

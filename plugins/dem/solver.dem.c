@@ -373,7 +373,7 @@ static void find_reach(dem *d, const quern_bound *law, quern_real radius, uint32
 		for (int32_t body = -1; body < (int32_t)bodies; body++) {
 			const quern_real reach = ops->reach(dem_law(law, item, body), body < 0 ? 0.5 * radius : radius);
 			const quern_real more =
-				reach * (1 + 1e-12); /* of two roundings of one distance no law may see another one */
+				reach * (1 + 1e-12); /* whoever is near for the law is so here, however both round */
 			d->reach = more > d->reach ? more : d->reach;
 		}
 }

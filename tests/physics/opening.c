@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "harness.h"
+#include "scene_text.h"
 #include "table.h"
 
 static const double radius = 5e-3, stiffness = 1e5, rolling = 1e4, young = 1e7, poisson = 0.25;
@@ -19,21 +20,26 @@ typedef struct glance {
 	const char *name, *contact;
 } glance;
 
-/* Two grains meet, or a grain and a wall, glancing and without losses along the normal. */
+/* A grain meets another one, or a wall, glancing and without losses along the normal. */
 static quern_run *open_scene(const glance *g) {
-	const char *more = g->dim == 3 ? ", 0" : "", *aside = g->dim == 3 ? ", 0.4" : "";
-	return harness_open(1,
-		"{quern: 1, dimension: %u, gravity: [0, 0%s], domain: {lower: [-1, -1%s], upper: [1, 1%s]},\n"
-		"time: {end: 1, step: 1e-5}, output: {every: 0.1}, observe: [energy],\n"
-		"bodies: [%s%s%s%s%s],\n"
-		"grains: {material: {density: 2500, radius: {mean: %g}}, integrator: %s, overlap: {most: 0},\n"
-		"  contact: [%s],\n"
-		"  place: [{position: [-0.0052, 0%s], velocity: [1, 0.7%s]}%s%s%s%s%s]}}\n",
-		g->dim, more, g->dim == 3 ? ", -1" : "", g->dim == 3 ? ", 1" : "",
-		g->wall ? "{plane: {point: [0, 0" : "", g->wall ? more : "", g->wall ? "], normal: [-1, 0" : "",
-		g->wall ? more : "", g->wall ? "]}}" : "", radius, g->verlet ? "position_verlet" : "symplectic_euler",
-		g->contact, more, aside, g->wall ? "" : ", {position: [0.0052, 0", g->wall ? "" : more,
-		g->wall ? "" : "], velocity: [-1, 0", g->wall ? "" : more, g->wall ? "" : "]}");
+	static text t;
+	const bool deep = g->dim == 3;
+	const char *zero = deep ? ", 0" : "";
+	t.length = 0;
+	text_add(&t,
+		"{quern: 1, dimension: %u, gravity: [0, 0%s], time: {end: 1, step: 1e-5}, output: {every: 0.1},\n",
+		g->dim, zero);
+	text_add(&t, "domain: {lower: [-1, -1%s], upper: [1, 1%s]}, observe: [energy],\n", deep ? ", -1" : "",
+		deep ? ", 1" : "");
+	if (g->wall) text_add(&t, "bodies: [{plane: {point: [0, 0%s], normal: [-1, 0%s]}}],\n", zero, zero);
+	text_add(&t,
+		"grains: {material: {density: 2500, radius: {mean: %g}}, integrator: %s, overlap: {most: 0},\n",
+		radius, g->verlet ? "position_verlet" : "symplectic_euler");
+	text_add(&t, "  contact: [%s], place: [{position: [-0.0052, 0%s], velocity: [1, 0.7%s]}", g->contact,
+		zero, deep ? ", 0.4" : "");
+	if (!g->wall) text_add(&t, ", {position: [0.0052, 0%s], velocity: [-1, 0%s]}", zero, zero);
+	text_add(&t, "]}}\n");
+	return harness_open(1, "%s", t.data);
 }
 
 typedef struct state {
@@ -104,15 +110,12 @@ static bool opens(const glance *g, double tolerance) {
 }
 
 static void what_opens_loses_its_spring(void **unused) {
-	static const char linear
-		[] =
-			"{linear: {stiffness: 1e5, restitution: 1, friction: 2, tangential_stiffness: 0.33333333333333333}}",
-  plastic[] =
-		"{plastic: {stiffness: 1e5, restitution: 1, friction: 2, tangential_stiffness: 0.33333333333333333}}",
-  hertz[] = "{hertz: {young: 1e7, poisson: 0.25, restitution: 1, friction: 2, impact_speed: 1}}";
-	static const char rolls[] =
-		"{linear: {stiffness: 1e5, restitution: 1, friction: 2, tangential_stiffness: 0.33333333333333333}}, "
-		"{rolling: {stiffness: 1e4, friction: 2}}";
+#define LINEAR "stiffness: 1e5, restitution: 1, friction: 2, tangential_stiffness: 0.33333333333333333"
+	static const char
+		linear[] = "{linear: {" LINEAR "}}",
+		plastic[] = "{plastic: {" LINEAR "}}",
+		rolls[] = "{linear: {" LINEAR "}}, {rolling: {stiffness: 1e4, friction: 2}}",
+		hertz[] = "{hertz: {young: 1e7, poisson: 0.25, restitution: 1, friction: 2, impact_speed: 1}}";
 	bool good = true;
 	(void)unused;
 	table_head("lost as a pair opens, over what its springs held");
