@@ -11,9 +11,9 @@ typedef struct {
 	quern_real shear;                                                           /* G */
 } mu_i;
 
-/* Of flow that goes to a density of its own: by what share of it that falls at most; pressure over K for each unit of shear, and of what the
- * density is off by as a share; how far off counts; by what share the pressure changes in a step at most. */
-static const quern_real widest = 0.2, steepness = 20, off_most = 0.1, step_most = 0.5;
+/* Of flow that goes to a density of its own: by what share of it that falls at most; pressure over K for each unit of slow shear, and of what the
+ * density is off by as a share; by what share the pressure changes in a step at most. */
+static const quern_real widest = 0.2, steepness = 20, step_most = 0.5;
 
 static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
 										  "Bulk modulus K; in 2-D lambda + G.", .from = "grain.bulk_modulus",
@@ -97,7 +97,8 @@ QUERN_INLINE quern_real loosest_of(const mu_i *law) {
 
 /* By which factor the pressure p of a point changes that shears by `strain`, and the density from which on such a flow bears. Its inertial number is
  * that of the pressure around it, to first order that of the point's own, and at the end of the step: if a mean alone counted, which follows late,
- * waves of pressure and density would grow; if the root of the point's own did, what scatters would be too loose in the mean. */
+ * waves of pressure and density would grow; if the root of the point's own did, what scatters would be too loose in the mean. What stretches along
+ * the flow's own axis shears faster: were the pressure to gain more by that than the stretching takes, the flow would not resist being squeezed. */
 typedef struct {
 	quern_real grown, least;
 } dilatancy;
@@ -108,8 +109,10 @@ QUERN_INLINE dilatancy dilate(
 	/* e^share to second order: where flow is no looser for being fast, waves are not to grow */
 	const quern_real share = p / law->bulk_modulus,
 					 flow = law->flow_density * (1 - wide) * (1 + share * (1 + 0.5 * share));
-	const quern_real gain = steepness * law->bulk_modulus * strain,
-					 more = gain * within(rho / flow - 1, off_most) / (p + gain * (answers + share));
+	const quern_real off = rho / flow - 1,
+					 pace = steepness / (1 + steepness * (wide / (1 - wide) + quern_abs(off))),
+					 gain = pace * law->bulk_modulus * strain,
+					 more = gain * off / (p + gain * (answers + share));
 	const quern_real least = law->flow_density * (1 - (loose < widest ? loose : widest));
 	return (dilatancy) { 1 + within(more, step_most),
 		least < law->critical_density ? least : law->critical_density };
@@ -244,7 +247,7 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.friction = friction,
 	.loosest = loosest };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 3,
+	.revision = 4,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.mu_i",
 	.brief = "Grains as a fluid whose friction grows with the rate of flow: mu(I).",

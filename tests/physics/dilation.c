@@ -32,6 +32,9 @@ static wide pressed(wide p) { return 1 + p / bulk * (1 + p / bulk / 2); }
 /* Of flow at this inertial number; what is looser than the loosest bears nothing. */
 static wide loosest(wide number) { return slow * (1 - fminl(loosened * number, 0.2L)); }
 
+/* Of density for each unit of shear, where flow is looser by this share, and the density off by that one. */
+static wide pace_of(wide by, wide off) { return steepness / (1 + steepness * (by / (1 - by) + fabsl(off))); }
+
 /* A step from any state is the one of the page: what shears bears more or less than it would by the factor of the page, pressure and shear stress
  * alike; what does not is elastic; what bore nothing and is looser than the flow around it would be stays open. */
 static void steps(void **unused) {
@@ -94,9 +97,9 @@ static void steps(void **unused) {
 			wide grown = 1;
 			if (slides) {
 				const wide looser = loosened * strain / dt * diameter * sqrtl(grain / around),
-						   of = slow * (1 - fminl(0.2L, looser * fmaxl(0, (3 - p / around) / 2))),
-						   gain = steepness * bulk * strain;
-				const wide off = fmaxl(-0.1L, fminl(was.density[i] / (of * pressed(p)) - 1, 0.1L));
+						   by = fminl(0.2L, looser * fmaxl(0, (3 - p / around) / 2)), of = slow * (1 - by),
+						   off = was.density[i] / (of * pressed(p)) - 1,
+						   gain = pace_of(by, off) * bulk * strain;
 				grown = 1 + fmaxl(-0.5L,
 								fminl(gain * off / (p + gain * (looser * p / around / 2 + p / bulk)), 0.5L));
 				flowing++;
@@ -181,10 +184,10 @@ static void around_is_held(void **unused) {
 	free_law(&m);
 }
 
-/* Slow flow comes there as exp(-20 (shear)). */
+/* Slow flow that is off by little comes there as exp(-20 (shear)). */
 static void approach(void **unused) {
 	(void)unused;
-	const double rate = 1e-3, density = slow * 1.01, end = 0.01 * bulk, shear = 0.1,
+	const double rate = 1e-3, density = slow * 1.001, end = 0.001 * bulk, shear = 0.1,
 				 left = exp(-steepness * shear);
 	double gap[2];
 	for (uint32_t dim = 2; dim <= 3; dim++) {
@@ -201,16 +204,16 @@ static void approach(void **unused) {
 			put(dim, c.stress, 0, s);
 			c.density[0] = c.grid_density[0] = density;
 			for (int step = 0; step < steps_of; step++) update(&m, &c, dt);
-			/* dp/d(shear) = 20 K (rho/rho_I - 1), by small steps of second order */
+			/* dp/d(shear) = (pace) K (rho/rho_I - 1), by small steps of second order */
 			double p = first;
 			for (int step = 0; step < 100000; step++) {
 				const double h = shear / 100000;
 				double mid = p;
-				for (int stage = 0; stage < 2; stage++)
-					mid = p + (stage + 1) * 0.5 * h * steepness * bulk *
-								  (density / (slow * (1 - loosened * rate * diameter * sqrt(grain / mid)) *
-												 (double)pressed(mid)) -
-									  1);
+				for (int stage = 0; stage < 2; stage++) {
+					const wide by = loosened * rate * diameter * sqrt(grain / mid),
+							   off = density / (slow * (1 - by) * pressed(mid)) - 1;
+					mid = p + (stage + 1) * 0.5 * h * bulk * (double)(pace_of(by, off) * off);
+				}
 				p = mid;
 			}
 			gap[k] = fabs((double)pressure_of(dim, &c, 0) / p - 1);
