@@ -193,8 +193,8 @@ static double energy_gained(const char *step) {
 	return kinetic / potential;
 }
 
-/* What flows makes no motion out of nothing: were pressure to grow where flow stretches, waves would, the more the smaller cells are and the less a long step damps
- * them (a quarter of the step made five times the energy there is). */
+/* What flows makes no motion out of nothing: were pressure to grow where flow stretches, waves would, the more the smaller cells are and the less a
+ * long step damps them (with a quarter of it, 21 times what weight gave). */
 static void flow_makes_no_energy(void **unused) {
 	(void)unused;
 	table_head("a column in cells as wide as a grain: kinetic energy over what weight gave");
