@@ -14,8 +14,9 @@ typedef struct body_item {
 	quern_real friction; /* of the boundary; NaN: the choice above holds */
 	const char *name;    /* NULL: it has none */
 	body_motion motion;
-	const char *material;    /* a word; NULL: it has none */
-	quern_real slip;         /* grain diameters, of a rough boundary; NaN: it is none */
+	const char *material;          /* a word; NULL: it has none */
+	quern_real slip;               /* grain diameters, of a rough boundary; NaN: it is none */
+	quern_real slow, fast, number; /* of a rough boundary's own mu(I): mu_s, mu_2, I_0; NaN: the material's */
 	quern_real displacement; /* m, by which the continuum's surface lies before its own; 0 if it has none */
 } body_item;
 

@@ -33,6 +33,14 @@ static const quern_param rows[] = {
 		"Slip length in grain diameters, in place of slip or sticky: friction that grows with the speed as the "
 		"material's own does with its rate, so that the speed along the body is that over so many diameters inside.",
 		.flags = QUERN_MAYBE, .unless = "boundary.frictional", .min = 0, .max = 1e6),
+	QUERN_PARAM_AS(body_item, slow, "boundary.static_friction", "1",
+		"Beside rough: mu_s of slow sliding; left out, all three are the material's own.",
+		.flags = QUERN_MAYBE, .unless = "boundary.frictional", .min = 0, .max = 10),
+	QUERN_PARAM_AS(body_item, fast, "boundary.limit_friction", "1", "Beside rough: mu_2 of fast sliding.",
+		.flags = QUERN_MAYBE, .unless = "boundary.frictional", .min = 0, .max = 10),
+	QUERN_PARAM_AS(body_item, number, "boundary.inertial_number", "1",
+		"Beside rough: I_0 of sliding, at which friction is half-way between the two.", .flags = QUERN_MAYBE,
+		.unless = "boundary.frictional", .min = 0, .max = 100),
 	QUERN_PARAM(body_item, displacement, "m",
 		"How far before the body the continuum ends, since grains lie looser there: what they lack of its "
 		"density, added up from the body on, over that density. Less than a cell.",
@@ -137,8 +145,6 @@ static quern_status name_body(const quern_setup *setup, const quern_bound *body,
 	return QUERN_OK;
 }
 
-/* ---- motion ---- */
-
 typedef struct {
 	const quern_setup *setup;
 	const quern_bound *body;
@@ -146,11 +152,36 @@ typedef struct {
 	quern_err *err;
 } naming;
 
-static quern_status refuse(const naming *n, const char *key, const char *why) {
+static quern_status refuse_key(const naming *n, const char *group, const char *key, const char *why) {
 	const char *dot = strchr(n->body->id, '.');
-	char where[120];
-	snprintf(where, sizeof where, "%u.%.60s.motion.%s", n->i, dot ? dot + 1 : n->body->id, key);
+	char where[140];
+	snprintf(where, sizeof where, "%u.%.60s.%s.%s", n->i, dot ? dot + 1 : n->body->id, group, key);
 	return n->setup->host->fail(n->err, QUERN_E_PARAM, where, "%s", why);
+}
+
+/* A rough boundary's own friction is a law of three numbers. */
+static quern_status check_friction(const naming *n, const body_item *item) {
+	static const char *const keys[] = { "static_friction", "limit_friction", "inertial_number" };
+	const quern_real value[] = { item->slow, item->fast, item->number };
+	const char *given = NULL, *missing = NULL;
+	for (int k = 0; k < 3; k++)
+		if (isnan(value[k])) missing = keys[k];
+		else given = given ? given : keys[k];
+	if (!given) return QUERN_OK;
+	if (isnan(item->slip)) return refuse_key(n, "boundary", given, "is of a rough boundary: give rough too");
+	if (missing)
+		return refuse_key(n, "boundary", missing,
+			"is needed beside the others of static_friction, limit_friction and inertial_number");
+	if (item->fast < item->slow)
+		return refuse_key(n, "boundary", "limit_friction",
+			"is below static_friction; friction must not fall with the speed");
+	return QUERN_OK;
+}
+
+/* ---- motion ---- */
+
+static quern_status refuse(const naming *n, const char *key, const char *why) {
+	return refuse_key(n, "motion", key, why);
 }
 
 static bool turns(const body_motion *m) {
@@ -190,8 +221,9 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	for (uint32_t i = 0; i < n_slot[0]; i++) {
 		const naming n = { setup, &slot[0][i], i, err };
 		if (name_body(setup, slot[0], i, err) != QUERN_OK) status = QUERN_E_PARAM;
-		if (check_motion(&n, &((const body_item *)slot[0][i].item)->motion) != QUERN_OK)
-			status = QUERN_E_PARAM;
+		const body_item *item = slot[0][i].item;
+		if (check_motion(&n, &item->motion) != QUERN_OK) status = QUERN_E_PARAM;
+		if (check_friction(&n, item) != QUERN_OK) status = QUERN_E_PARAM;
 	}
 	p->moving = quern_bodies_move(slot[0], n_slot[0]);
 	return status;

@@ -298,7 +298,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	return QUERN_OK;
 }
 
-/* A rough body rubs as the material does, which must have a friction for that; and none may end the continuum farther before itself than nodes see. */
+/* A rough body rubs as the material does, or by a friction of its own that is of the same form; and none may end the continuum farther before itself than nodes see. */
 static quern_status find_rough(mpm *p, const quern_setup *setup, const quern_bound *material,
 	const quern_bound *body, uint32_t n, quern_err *err) {
 	const quern_material_ops *ops = material->ops;

@@ -102,6 +102,13 @@ def slip_length(found: Found) -> tuple[float, float]:
     return mean([np.mean([slip_of(rows[k]).length for rows in found.chutes.values()]) / found.grains.diameter for k in range(len(found.beds))])
 
 
+def rough_floor(found: Found) -> str:
+    """The floor of the chutes as a body's boundary. Where the block has another law than the chutes', the floor has theirs, which its slip goes with."""
+    own = found.sides["chutes"][0]
+    law = f", static_friction: {plain(own.mu_s)}, limit_friction: {plain(own.mu_2)}, inertial_number: {plain(own.i_0)}" if found.kind() != "chutes" else ""
+    return f"boundary: {{rough: {plain(slip_length(found)[0])}{law}}}"
+
+
 def displacements(found: Found) -> tuple[tuple[float, float], tuple[float, float]]:
     """In m, of the chutes, mean over the angles, and of the settled beds; with standard errors over seeds."""
     seeds = range(len(found.beds))
@@ -149,7 +156,7 @@ def block(found: Found, command: str) -> str:
     others = [f"# friction of {kind}: {told_law(found, kind)}" for kind in found.sides]
     lines = [f"# {command}",
              f"# chutes at {listed(found.chutes)} degrees, I from {plain(low, 2)} to {plain(high, 2)}, {len(found.beds)} seeds; ± standard error",
-             *others, f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate",
+             *others, f"# slip over the rough floor: {with_spread(length, off)} diameters of shear rate: {rough_floor(found)}",
              f"# displacement of the rough floor: {with_spread(*flowing)} m in flow, {with_spread(*settled)} m in a settled bed",
              f"# {about_walls(found)}", "continuum:", "  material:", "    mu_i:"]
     return "\n".join(lines + [f"      {key}: {value}".ljust(40) + f"# {note}" for key, (value, note) in rows.items()]) + "\n"

@@ -45,6 +45,7 @@ typedef struct couette {
 	uint32_t dim, workers;
 	int cells, along, across; /* over the gap; axes of the motion and of the gap */
 	double slip, drift;       /* diameters; m/s, of both plates */
+	const char *own;          /* friction of the plates; NULL: the material's */
 } couette;
 static const double gap = 0.032, speed = 1, load = 1e3, bulk = 2e5, packed = 1975;
 
@@ -64,8 +65,8 @@ static quern_run *open_couette(const couette *c) {
 	quern_run *run = harness_open(c->workers,
 		"{quern: 1, dimension: %u, gravity: %s, domain: {lower: %s, upper: %s, periodic: %s},\n"
 		"time: {end: 10}, output: {every: 0.1}, \n"
-		"bodies: [{plane: {point: %s, normal: %s, boundary: {rough: %g}, motion: {velocity: %s}}},\n"
-		"  {plane: {point: %s, normal: %s, boundary: {rough: %g}, motion: {velocity: %s}}}],\n"
+		"bodies: [{plane: {point: %s, normal: %s, boundary: {rough: %g%s}, motion: {velocity: %s}}},\n"
+		"  {plane: {point: %s, normal: %s, boundary: {rough: %g%s}, motion: {velocity: %s}}}],\n"
 		"continuum: {cell: %.17g, fill: [{region: {box: {lower: %s, upper: %s}}}],\n"
 		"  material: {mu_i: {bulk_modulus: %g, diameter: %g, grain_density: 2500, critical_density: %g,\n"
 		"    static_friction: 0.26, limit_friction: 0.6, inertial_number: 0.36}}}}\n",
@@ -74,9 +75,9 @@ static quern_run *open_couette(const couette *c) {
 		: c->across == 0 ? "[false, true, true]"
 		: c->across == 1 ? "[true, false, true]"
 						 : "[true, true, false]",
-		triple(t[3], c, 0, 0, 0), triple(t[4], c, 0, 1, 0), c->slip, triple(t[5], c, c->drift, 0, 0),
-		triple(t[6], c, 0, gap, 0), triple(t[7], c, 0, -1, 0), c->slip,
-		triple(t[8], c, speed + c->drift, 0, 0), h, triple(t[9], c, 0, 0, 0),
+		triple(t[3], c, 0, 0, 0), triple(t[4], c, 0, 1, 0), c->slip, c->own ? c->own : "",
+		triple(t[5], c, c->drift, 0, 0), triple(t[6], c, 0, gap, 0), triple(t[7], c, 0, -1, 0), c->slip,
+		c->own ? c->own : "", triple(t[8], c, speed + c->drift, 0, 0), h, triple(t[9], c, 0, 0, 0),
 		triple(t[10], c, 4 * h, gap, 4 * h), bulk, diameter, packed);
 	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
 	const quern_column s = harness_field(run, "point.stress"), m = harness_field(run, "point.mass");
@@ -136,10 +137,37 @@ static void slip_is_its_length(void **unused) {
 	table_head("mu(I) between rough plates: speed at the wall over rate, diameters");
 	for (int k = 0; k < 4; k++)
 		for (int cells = 8; cells <= 32; cells *= 2) {
-			const couette c = { 2, 1, cells, 0, 1, lengths[k], 0 };
+			const couette c = { 2, 1, cells, 0, 1, lengths[k], 0, NULL };
 			snprintf(what, sizeof what, "slip length %g, %d cells", lengths[k], cells);
 			good &= table_row(what, shown(&c), lengths[k], 0.03 * lengths[k] + 0.12 * gap / cells / diameter);
 		}
+	assert_true(good);
+}
+
+/* Plates with a friction of their own: what both bear is one stress, so that mu_w(v) = mu(I). */
+static void plates_have_their_own(void **unused) {
+	(void)unused;
+	static const struct {
+		const char *what, *own;
+		double slow, fast, number;
+	} rows[] = { { "slower friction", ", static_friction: 0.2, limit_friction: 0.6, inertial_number: 0.36",
+					 0.2, 0.6, 0.36 },
+		{ "all three", ", static_friction: 0.15, limit_friction: 0.8, inertial_number: 0.5", 0.15, 0.8,
+			0.5 } };
+	bool good = true;
+	table_head("plates whose friction is their own: speed at the wall, m/s");
+	for (int k = 0; k < 2; k++) {
+		const couette c = {
+			.dim = 2, .workers = 1, .cells = 16, .across = 1, .slip = 2.5, .own = rows[k].own
+		};
+		const line f = steady(&c);
+		const double time = sqrt(2500 / load), inside = f.slope * diameter * time;
+		const double friction = 0.26 + (0.6 - 0.26) / (1 + 0.36 / inside);
+		const double number = rows[k].number * (friction - rows[k].slow) / (rows[k].fast - friction);
+		good &= table_row(rows[k].what, f.at_wall, c.slip * number / time, 0.12 * gap / 16 * f.slope);
+		assert_true(fabs(c.slip * number / time - c.slip * inside / time) >
+					0.2 * f.at_wall); /* it makes a difference */
+	}
 	assert_true(good);
 }
 
@@ -149,12 +177,12 @@ static void everywhere_the_same(void **unused) {
 	static const struct {
 		const char *what;
 		couette c;
-	} rows[] = { { "axes exchanged", { 2, 1, 16, 1, 0, 2.5, 0 } },
-		{ "plates that move both ways", { 2, 1, 16, 0, 1, 2.5, -0.5 } },
-		{ "3-D, along x between y", { 3, 1, 16, 0, 1, 2.5, 0 } },
-		{ "3-D, along z between x", { 3, 1, 16, 2, 0, 2.5, 0 } },
-		{ "3-D, along y between z", { 3, 1, 16, 1, 2, 2.5, 0 } } };
-	const couette plane = { 2, 1, 16, 0, 1, 2.5, 0 };
+	} rows[] = { { "axes exchanged", { 2, 1, 16, 1, 0, 2.5, 0, NULL } },
+		{ "plates that move both ways", { 2, 1, 16, 0, 1, 2.5, -0.5, NULL } },
+		{ "3-D, along x between y", { 3, 1, 16, 0, 1, 2.5, 0, NULL } },
+		{ "3-D, along z between x", { 3, 1, 16, 2, 0, 2.5, 0, NULL } },
+		{ "3-D, along y between z", { 3, 1, 16, 1, 2, 2.5, 0, NULL } } };
+	const couette plane = { 2, 1, 16, 0, 1, 2.5, 0, NULL };
 	const double wanted = shown(&plane);
 	bool good = true;
 	table_head("the same in other ways: diameters");
@@ -167,7 +195,7 @@ static void workers_do_not_matter(void **unused) {
 	(void)unused;
 	quern_run *run[2];
 	for (int k = 0; k < 2; k++) {
-		const couette c = { 3, k ? 4 : 1, 8, 0, 1, 2.5, 0 };
+		const couette c = { 3, k ? 4 : 1, 8, 0, 1, 2.5, 0, NULL };
 		run[k] = open_couette(&c);
 		harness_until(run[k], 0.02);
 	}
@@ -182,16 +210,16 @@ static void workers_do_not_matter(void **unused) {
 /* ==== a layer on an incline ==== */
 
 /* Gravity is turned; what the layer does is said by its floor alone where the layer itself would hold. */
-static quern_run *open_layer(double angle, double slip, const char *material) {
+static quern_run *open_layer(double angle, double slip, const char *own, const char *material) {
 	const double c = cos(angle * degree), s = sin(angle * degree);
 	return harness_open(1,
 		"{quern: 1, dimension: 2, gravity: [%.17g, %.17g], domain: {lower: [0, 0], upper: [0.016, 0.048], periodic: "
 		"[true, false]},\n"
 		"time: {end: 10}, output: {every: 0.1, fields: [body.impulse]},\n"
-		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: %g}}}],\n"
+		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: %g%s}}}],\n"
 		"continuum: {cell: 0.004, fill: [{region: {box: {lower: [0, 0], upper: [0.016, 0.04]}}, stress: at_rest,\n"
 		"  lateral: 1}], material: {%s}}}\n",
-		gravity * s, -gravity * c, slip, material);
+		gravity * s, -gravity * c, slip, own, material);
 }
 
 static double mean_speed(quern_run *run) {
@@ -211,7 +239,7 @@ static const char plain[] = "drucker_prager: {bulk_modulus: 2e5, density: 1975, 
 
 /* Below the angle of its slow friction (16.7 degrees) the layer stays, and its floor takes all of its weight. */
 static bool stays(const char *what, const char *material) {
-	quern_run *run = open_layer(15, 4, material);
+	quern_run *run = open_layer(15, 4, "", material);
 	harness_until(run, 0.3);
 	const double creep = mean_speed(run);
 	const double x = harness_field(run, "body.impulse").real[0][0],
@@ -223,8 +251,8 @@ static bool stays(const char *what, const char *material) {
 	return good;
 }
 
-static double acceleration(double angle, double slip, const char *material) {
-	quern_run *run = open_layer(angle, slip, material);
+static double acceleration(double angle, double slip, const char *own, const char *material) {
+	quern_run *run = open_layer(angle, slip, own, material);
 	harness_until(run, 0.1);
 	const double before = mean_speed(run), begin = quern_run_time(run);
 	harness_until(run, 0.2);
@@ -243,11 +271,18 @@ static void layers_on_inclines(void **unused) {
 		char what[80];
 		snprintf(what, sizeof what, "one friction for all speeds, %d degrees: acceleration, m/s^2", angle);
 		const double wanted = gravity * (sin(angle * degree) - 0.3 * cos(angle * degree));
-		good &= table_row(what, acceleration(angle, 4, plain), wanted, 0.02 * wanted);
+		good &= table_row(what, acceleration(angle, 4, "", plain), wanted, 0.02 * wanted);
 	}
 	/* with a slip length beyond all speeds the floor has slow friction alone */
-	good &= table_row("slow friction alone, 25 degrees: acceleration, m/s^2", acceleration(25, 1e6, soft),
+	good &= table_row("slow friction alone, 25 degrees: acceleration, m/s^2", acceleration(25, 1e6, "", soft),
 		gravity * (sin(25 * degree) - 0.3 * cos(25 * degree)), 0.02);
+	/* a floor with less friction than the layer, which goes as one piece */
+	const char *own = ", static_friction: 0.2, limit_friction: 0.2, inertial_number: 0.3";
+	const double wanted = gravity * (sin(15 * degree) - 0.2 * cos(15 * degree));
+	good &= table_row("friction of the floor's own, mu_i, 15 degrees: acceleration, m/s^2",
+		acceleration(15, 4, own, soft), wanted, 0.02 * wanted);
+	good &= table_row("friction of the floor's own, drucker_prager, the same",
+		acceleration(15, 4, own, plain), wanted, 0.02 * wanted);
 	assert_true(good);
 }
 
@@ -281,7 +316,8 @@ static void floor_holds_grains_too(void **unused) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(law_holds), cmocka_unit_test(slip_is_its_length),
-		cmocka_unit_test(everywhere_the_same), cmocka_unit_test(workers_do_not_matter),
-		cmocka_unit_test(layers_on_inclines), cmocka_unit_test(floor_holds_grains_too) };
+		cmocka_unit_test(plates_have_their_own), cmocka_unit_test(everywhere_the_same),
+		cmocka_unit_test(workers_do_not_matter), cmocka_unit_test(layers_on_inclines),
+		cmocka_unit_test(floor_holds_grains_too) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
