@@ -35,7 +35,8 @@ typedef struct quern_material_ops {
 	/* [setup] moduli for step limits (Pa) and the density without stress (kg/m^3) */
 	void (*moduli)(const void *self, uint32_t dim, quern_real *bulk, quern_real *shear, quern_real *density);
 	/* since 2.1; NULL: none. [setup] shear stress over pressure in steady flow, slow + (fast - slow)/(1 + number/I) with the
-	 * inertial number I = rate x diameter x sqrt(density/pressure); density, kg/m^3, is that of a grain */
+	 * inertial number I = rate x diameter x sqrt(density/pressure); density, kg/m^3, is that of a grain, or the
+	 * material's own where it knows no grains */
 	void (*friction)(const void *self, uint32_t dim, quern_real *slow, quern_real *fast, quern_real *number,
 		quern_real *density);
 	/* since 2.1; NULL: the density without stress. [setup] kg/m^3, at most that density: what is looser

@@ -152,8 +152,9 @@ def check_command(here):
     command(*words)
     print("ok  a small layer is measured, and not made again")
     block = (here / "sand/calibration.yaml").read_text()
+    floor = re.search(r"shear rate: (boundary: {rough: .*, inertial_number: .*})", block)[1]
     scene = "quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [0.08, 0.08]}\ntime: {end: 1 ms}\n" \
-        "bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: sticky}}]\n" + block + \
+        f"bodies: [{{plane: {{point: [0, 0], normal: [0, 1], {floor}}}}}]\n" + block + \
         "  cell: 4 mm\n  fill: {region: {box: {lower: [0, 0], upper: [0.04, 0.04]}}, stress: at_rest}\n"
     (here / "taken.yaml").write_text(scene)
     lab.run(here / "taken.yaml", here / "taken")
