@@ -68,11 +68,10 @@ static quern_real node_area(const grid_work *w, const near_nodes *n, uint32_t b,
 }
 
 static rough_law law_of(const rough_law *material, const body_item *item) {
-	const bool own = !isnan(item->slow);
-	return (rough_law) { .slow = own ? item->slow : material->slow,
-		.fast = own ? item->fast : material->fast,
-		.number = own ? item->number : material->number,
-		.density = material->density };
+	if (isnan(item->slow)) return *material;
+	return (rough_law) {
+		.slow = item->slow, .fast = item->fast, .number = item->number, .density = material->density
+	};
 }
 
 /* Between slip and sticky: what presses the node on the body lets it rub. After a coupling that is what has come since;
@@ -88,11 +87,11 @@ static void rub_node(const grid_work *w, const body_item *item, const near_nodes
 		along[k] = (*motion)[k] - n->velocity[k][i] - into * n->normal[k][i];
 		along2 += along[k] * along[k];
 	}
-	const rough_law rubbing = law_of(&w->p->rubbing, item), *law = &rubbing;
+	const rough_law law = law_of(&w->p->rubbing, item);
 	const quern_real speed = sqrt(along2), moving = speed > grip ? speed - grip : 0;
 	const quern_real pressure = mass * pressed / (node_area(w, n, b, i) * w->s->dt);
-	const quern_real left = rough_slide(law, rough_half(law, item->slip, pressure), moving, pressed);
-	const quern_real kept = speed > 0 ? left / speed : 0, unused = pressed * law->slow + grip - speed;
+	const quern_real left = rough_slide(&law, rough_half(&law, item->slip, pressure), moving, pressed);
+	const quern_real kept = speed > 0 ? left / speed : 0, unused = pressed * law.slow + grip - speed;
 	for (uint32_t k = 0; k < dim; k++)
 		change_velocity(motion, k, dim,
 			n->velocity[k][i] + kept * along[k] + (into + pressed) * n->normal[k][i], mass, impulse);
