@@ -139,19 +139,20 @@ def cost(place):
     """What a run has cost is what the system says, of all threads, over a stop while it settles and one after; what it took up to the
     release stands apart, and of a state that was kept that is little."""
     scene, sums, short = place / "bed.yaml", [], "--set=time.end=0.5"
-    for k, how in enumerate([{"stop": 0.3, "status": 130}, {"options": ["--until=0.2", "--resume"]}, {"options": ["--resume"]}]):
+    cache = str(place / "cache")
+    first, second = (measured(scene, place / name, short, QUERN_CACHE=cache)[1] for name in ("keeps", "takes"))
+    costs = [found[name] for found in (first, second) for name in ("settle_processor_seconds", "processor_seconds")]
+    print("settled here: {:.3f} of {:.3f} s, taken: {:.3f} of {:.3f} s".format(*costs))
+    assert costs[2] < costs[0] / 5 and costs[2] < costs[3] < costs[1]
+    settling = first["settle_seconds"]  # a third of it is well inside it on any machine
+    for k, how in enumerate([{"stop": settling / 3, "status": 130}, {"options": ["--until=0.2", "--resume"]}, {"options": ["--resume"]}]):
         used, found = measured(scene, place / "parts", short, *how.pop("options", []), **how)
         sums.append((used, found["processor_seconds"], found["settle_processor_seconds"], found["settle_seconds"]))
         print("of the system {:.3f} s; in all {:.3f} s, settling {:.3f} s, on the clock {:.3f} s".format(*sums[-1]))
         whole = sum(one[0] for one in sums)
         assert found["processor_seconds"] <= whole <= found["processor_seconds"] + 0.05 * (k + 1), (k, sums)
     assert 0.8 * sums[0][1] < sums[0][2] <= sums[0][1] < sums[1][2] == sums[2][2] < sums[1][1] < sums[2][1], sums
-    assert sums[0][3] + 0.2 < sums[1][3] == sums[2][3], "what had settled before the stop is forgotten"
-    cache = str(place / "cache")
-    first, second = (measured(scene, place / name, short, QUERN_CACHE=cache)[1] for name in ("keeps", "takes"))
-    costs = [found[name] for found in (first, second) for name in ("settle_processor_seconds", "processor_seconds")]
-    print("settled here: {:.3f} of {:.3f} s, taken: {:.3f} of {:.3f} s".format(*costs))
-    assert costs[2] < costs[0] / 5 and costs[2] < costs[3] < costs[1]
+    assert sums[0][3] + settling / 3 < sums[1][3] == sums[2][3], "what had settled before the stop is forgotten"
 
 
 def is_held(folder):
