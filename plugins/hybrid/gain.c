@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* gain - motion that nobody has given: docs/theory/hybrid.md, section 5 */
-#include "../common/symmetric.h"
+#include "../common/held.h"
 #include "contacts.h"
-#include <math.h>
 
 /* A spring that stiffens holds less than half of force times overlap, and the tangential one about as much again. */
 static quern_real in_contacts(const quern_step *s) {
@@ -37,7 +36,6 @@ static quern_real in_spins(const quern_step *s) {
 	return sum;
 }
 
-/* p^2/2K + s:s/4G */
 static quern_real in_points(const quern_step *s) {
 	const quern_column *u = s->use;
 	const quern_bound *material = &s->slot[SLOT_MATERIAL][0];
@@ -46,13 +44,8 @@ static quern_real in_points(const quern_step *s) {
 	const quern_parts *points = s->host->parts(s->run, "point");
 	for (uint32_t q = 0; q < points->n; q++) {
 		const uint32_t i = quern_nth(points->entry, q);
-		const symmetric t = SYMMETRIC_AT(u[A_POINT_STRESS].real, i, s->dim);
-		const quern_real p = -(t.xx + t.yy + t.zz) / s->dim;
-		const quern_real all =
-			t.xx * t.xx + t.yy * t.yy + t.zz * t.zz + 2 * (t.xy * t.xy + t.yz * t.yz + t.xz * t.xz);
-		const quern_real deviator = fmax(all - s->dim * p * p, 0);
 		sum += u[A_POINT_WEIGHT].real[0][i] * u[A_POINT_VOLUME].real[0][i] *
-			   (0.5 * p * p / bulk + (shear > 0 ? 0.25 * deviator / shear : 0));
+			   held_by_stress(SYMMETRIC_AT(u[A_POINT_STRESS].real, i, s->dim), s->dim, bulk, shear);
 	}
 	return sum;
 }

@@ -33,7 +33,9 @@ typedef struct mpm {
 	quern_real loosest; /* kg/m^3, of what bears */
 	quern_real damping; /* s, of elastic waves */
 	bool damped;
-	bool rough, still; /* whether a body is */
+	bool rough, still;    /* whether a body is */
+	quern_real gain;      /* of motion that ends the run, over what lifts all by a cell */
+	bool watches, moving; /* a continuum alone is watched; whether a body moves beside it */
 	rough_law rubbing;
 } mpm;
 
@@ -73,3 +75,4 @@ quern_status quern_mpm_nodes(const void *self, const quern_step *);
 quern_status quern_mpm_walls(const void *self, const quern_step *);
 quern_status quern_mpm_gather(const void *self, const quern_step *);
 quern_status quern_mpm_hold(const void *self, const quern_step *);
+quern_status quern_mpm_watch(const void *self, const quern_step *);

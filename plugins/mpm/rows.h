@@ -69,6 +69,27 @@ QUERN_USE_ENUM(RESAMPLE_USES);
 	BOOK_ROWS(X, LEFT, "point_face", "outlets")
 QUERN_USE_ENUM(OUTLET_USES);
 
+#define WATCH_USES(X) \
+	X(WATCH_POSITION, "point.position", "m", QUERN_READ, QUERN_VECTOR) \
+	X(WATCH_VELOCITY, "point.velocity", "m/s", QUERN_READ, QUERN_VECTOR) \
+	X(WATCH_MASS, "point.mass", "kg", QUERN_READ, QUERN_SCALAR) \
+	X(WATCH_VOLUME, "point.volume", "m^3", QUERN_READ, QUERN_SCALAR) \
+	X(WATCH_STRESS, "point.stress", "Pa", QUERN_READ, QUERN_SYMMETRIC) \
+	X(WATCH_WEIGHT, "point.weight", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \
+	X(WATCH_BODY_WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .when = "moving") \
+	X(WATCH_POURED, "point_source.energy", "J", QUERN_READ, QUERN_SCALAR, .when = "sources") \
+	X(WATCH_POURED_HEIGHT, "point_source.potential", "J", QUERN_READ, QUERN_SCALAR, .when = "sources") \
+	X(WATCH_LEFT, "point_face.energy", "J", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
+	X(WATCH_LEFT_HEIGHT, "point_face.potential", "J", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
+	X(WATCH_BEGUN, "total.watch_begun", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: the first look has been.") \
+	X(WATCH_LEAST, "total.watch_least", "J", QUERN_UPDATE, QUERN_SCALAR, \
+		.doc = "Of all energy, less what was given: the least since a stage has begun.") \
+	X(WATCH_WORK, "total.watch_work", "J", QUERN_UPDATE, QUERN_SCALAR, .doc = "By gravity along periodic axes since.") \
+	X(WATCH_GIVEN, "total.watch_given", "J", QUERN_UPDATE, QUERN_SCALAR, .doc = "Otherwise, until then.") \
+	X(WATCH_POWER, "total.watch_power", "W", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of gravity along periodic axes at the last look.") \
+	X(WATCH_TIME, "total.watch_time", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of the last look.")
+QUERN_USE_ENUM(WATCH_USES);
+
 #define HOLD_USES(X) \
 	X(HOLD_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
 	X(HOLD_UNSORTED, UNSORTED_USE)

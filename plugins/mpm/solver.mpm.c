@@ -80,6 +80,16 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, cut, "1", "Share of a full cell's mass below which a node's force is limited.",
 		.def = 1e-3, .min = 1e-12, .max = 0.1, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, gain, "1",
+		"In a continuum alone: energy that nobody has given, beyond as much again as there is, that ends the run, over what lifts all "
+		"by a cell; 0: none does. A hybrid has its own.",
+		.def = 0.1, .max = 1e6, .flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, watches, NULL,
+		"Look for energy that nobody has given; set by itself in a continuum alone.",
+		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, moving, NULL,
+		"Ask for the work of bodies; set by itself where one moves and nobody else looks.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rough, NULL,
 		"Remember what rough bodies could still hold; set by itself where there is one.",
 		.flags = QUERN_ADVANCED),
@@ -156,6 +166,7 @@ static const quern_use scatter_uses[] = QUERN_USE_ROWS(SCATTER_USES);
 static const quern_use nodes_uses[] = QUERN_USE_ROWS(NODES_USES);
 static const quern_use walls_uses[] = QUERN_USE_ROWS(WALLS_USES);
 static const quern_use gather_uses[] = QUERN_USE_ROWS(GATHER_USES);
+static const quern_use watch_uses[] = QUERN_USE_ROWS(WATCH_USES);
 
 static const quern_stage stages[] = { { .name = "mpm.fill",
 										  .doc = "Places the first points.",
@@ -214,6 +225,13 @@ static const quern_stage stages[] = { { .name = "mpm.fill",
 		.uses = outlet_uses,
 		.run = quern_mpm_outlets,
 		.when = "outlets" },
+	{ .name = "mpm.watch",
+		.doc = "Ends a run that has energy which nobody has given.",
+		.phase = QUERN_END,
+		.flags = QUERN_SOMETIMES,
+		.uses = watch_uses,
+		.run = quern_mpm_watch,
+		.when = "watches" },
 	{ .name = NULL } };
 
 static quern_status place_sources(
@@ -283,6 +301,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 			"is for a continuum alone: a hybrid fills holes and joins points at its updates, as hybrid.update says");
 	p->resamples = p->resamples || p->resample > 0;
 	p->outlets = p->outlets || outlets_any(setup->open);
+	p->watches = !setup->host->keeps(setup, "hybrid");
 	/* in a hybrid there is none */
 	const bool hybrid =
 		setup->host->keeps(setup, "hybrid"); /* without one no mass comes to points but by flow */
@@ -368,6 +387,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 			"grains and continuum do not feel each other without a section hybrid; add it, or keep one of "
 			"them "
 			"with 'model: grains' or 'model: continuum'");
+	p->moving = p->watches && quern_bodies_move(slot[SLOT_BODIES], n_slot[SLOT_BODIES]);
 	const quern_strain_ops *strain = slot[SLOT_STRAIN]->ops;
 	if (strain->means > QUERN_STRAIN_MOST || (strain->means > 0 && !strain->measure[setup->dim - 2]))
 		return setup->host->fail(err, QUERN_E_PARAM, "strain",

@@ -74,7 +74,7 @@ static double manufactured(const char *shape, int cells) {
 	quern_run *run = harness_open(1,
 		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [1, 1], periodic: [true, true]},\n"
 		"time: {end: 10, step: %.17g, force: true}, output: {every: 10},\n"
-		"continuum: {cell: %.17g, material: {elastic: {bulk_modulus: %.17g, poisson: %.17g, density: 1}},\n"
+		"continuum: {cell: %.17g, gain: 0, material: {elastic: {bulk_modulus: %.17g, poisson: %.17g, density: 1}},\n" /* forces of the test's own */
 		"  shape: %s, transfer: {picflip: {rate: 0}}, fill: [{region: {box: {lower: [0, 0], upper: [1, 1]}}}]}}\n",
 		dt, h, bulk, poisson, shape);
 	const uint32_t n = harness_count(run, "point");

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: MIT */
+/* watch - energy that nobody has given, of a continuum alone: docs/theory/mpm.md, section 5 */
+#include "../common/held.h"
+#include "../common/outlets.h"
+#include "mpm.h"
+
+/* Steps from one look to the next: what explodes grows over many, and looks cost next to nothing. */
+enum { WATCH_EVERY = 20 };
+
+typedef struct looked {
+	quern_real mass, kinetic, held; /* kg, J, J */
+	quern_real height,
+		power; /* J and W of gravity: along axes that end, and along periodic ones, where no height is known */
+} looked;
+
+/* Gravity along the axes that are periodic, or along those that are not. */
+static quern_vec gravity_along(const quern_step *s, bool periodic) {
+	const quern_real *g = s->gravity;
+	return (quern_vec) { s->periodic[0] == periodic ? g[0] : 0, s->periodic[1] == periodic ? g[1] : 0,
+		s->dim == 3 && s->periodic[2] == periodic ? g[2] : 0 };
+}
+
+static bool look(const mpm *p, const quern_step *s, looked *out) {
+	const quern_column *u = s->use, *velocity = &u[WATCH_VELOCITY];
+	const cloud points = { u[WATCH_MASS].real[0], u[WATCH_WEIGHT].real[0], NULL,
+		s->host->set(s->run, "point").n, "point" };
+	const int dim = (int)s->dim;
+	const quern_vec down = gravity_along(s, false), along = gravity_along(s, true);
+	cloud_sums c;
+	if (!cloud_open(&c, s->host, s->run, &points)) return false;
+	out->mass = cloud_total(&c);
+	CLOUD_ADD(&c, i, 0.5 * cloud_square(velocity, i, s->dim), out->kinetic);
+	CLOUD_ADD(&c, i, -quern_vec_dot(down, QUERN_VEC_AT(u[WATCH_POSITION].real, i, dim), dim), out->height);
+	if (quern_vec_dot(along, along, dim) > 0)
+		CLOUD_ADD(&c, i, quern_vec_dot(along, QUERN_VEC_AT(velocity->real, i, dim), dim), out->power);
+	CLOUD_ADD(&c, i,
+		u[WATCH_VOLUME].real[0][i] / u[WATCH_MASS].real[0][i] *
+			held_by_stress(SYMMETRIC_AT(u[WATCH_STRESS].real, i, s->dim), s->dim, p->bulk, p->shear),
+		out->held);
+	return true;
+}
+
+/* J that bodies have done, and that came with what was poured and went with what left, so far. */
+static quern_real given(const quern_step *s) {
+	const quern_column *u = s->use;
+	const uint32_t sources = s->host->set(s->run, "point_source").n;
+	return book_total(u[WATCH_BODY_WORK].real[0], s->n_slot[SLOT_BODIES]) +
+		   book_total(u[WATCH_POURED].real[0], sources) +
+		   book_total(u[WATCH_POURED_HEIGHT].real[0], sources) -
+		   book_total(u[WATCH_LEFT].real[0], outlet_faces(s)) -
+		   book_total(u[WATCH_LEFT_HEIGHT].real[0], outlet_faces(s));
+}
+
+/* Once more from here: what was held before may be worth more by the values of a new stage. */
+static void begin(const quern_step *s, quern_real all) {
+	const quern_column *u = s->use;
+	u[WATCH_BEGUN].index[0] = 1;
+	u[WATCH_LEAST].real[0][0] = all;
+	u[WATCH_WORK].real[0][0] = 0;
+	u[WATCH_GIVEN].real[0][0] = given(s);
+}
+
+/* Flow and friction take energy and nobody makes any: what there is, less what was given, never rises. As much again as moves and is held is
+ * allowed: a law in rates gains where it is squeezed to a third, and apic hides some of what points do in their gradients for a while. So is
+ * what lifts all by a part of a cell and, where nothing pulls, what round-off moves; and the round-off of these sums. */
+static quern_real allowed(const mpm *p, const quern_step *s, const looked *now, quern_real work) {
+	const quern_real still = 1e-6 * p->cell / s->dt,
+					 lift = p->gain * quern_gravity_size(s->dim, s->gravity) * p->cell;
+	return now->mass * (lift + 0.5 * still * still) +
+		   1e-9 * (fabs(work) + fabs(now->height) + now->kinetic + now->held);
+}
+
+static quern_status judge(const mpm *p, const quern_step *s, const looked *now) {
+	const quern_column *u = s->use;
+	const quern_real work = u[WATCH_WORK].real[0][0] + given(s) - u[WATCH_GIVEN].real[0][0];
+	const quern_real there = now->kinetic + now->held, own = there + now->height - work;
+	quern_real *least = u[WATCH_LEAST].real[0];
+	*least = own < *least ? own : *least;
+	const quern_real made = own - *least;
+	if (made <= there - made + allowed(p, s, now, work)) return QUERN_OK;
+	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
+		"the continuum makes energy: its motion and stress hold %.3g J, and there are %.3g J more in all than there were and than came "
+		"since; take a shorter step, or another shape or transfer; continuum.gain says how much is allowed",
+		there, made);
+}
+
+quern_status quern_mpm_watch(const void *self, const quern_step *s) {
+	const mpm *p = self;
+	const quern_column *u = s->use;
+	const bool anew = !u[WATCH_BEGUN].index[0] || s->step == s->stage_step;
+	if (!(p->gain > 0) || (!anew && s->step % WATCH_EVERY)) return QUERN_OK;
+	looked now = { .mass = 0 };
+	if (!look(p, s, &now)) return QUERN_E_MEMORY;
+	quern_real *power = u[WATCH_POWER].real[0], *time = u[WATCH_TIME].real[0];
+	if (anew) begin(s, now.kinetic + now.held + now.height);
+	else u[WATCH_WORK].real[0][0] += 0.5 * (*power + now.power) * (s->time - *time);
+	*power = now.power;
+	*time = s->time;
+	return judge(p, s, &now);
+}
