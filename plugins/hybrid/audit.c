@@ -202,6 +202,8 @@ quern_status quern_hybrid_audit(const void *self, const quern_step *s) {
 		}
 	/* what was held before may be worth more by the values of a new stage */
 	if (s->step == s->stage_step && s->step) quern_hybrid_begin_gain(s, now.kinetic);
-	const quern_status status = judge(s, &now);
-	return status == QUERN_OK ? quern_hybrid_judge_gain(self, s, now.kinetic, now.carried) : status;
+	quern_status status = judge(s, &now);
+	if (status == QUERN_OK) status = quern_hybrid_judge_gain(self, s, now.kinetic, now.carried);
+	if (zones_are_due(self, s)) quern_hybrid_lower_gain(s, now.kinetic);
+	return status;
 }

@@ -69,6 +69,15 @@ void quern_hybrid_begin_gain(const quern_step *s, quern_real kinetic) {
 	s->use[A_WORK].real[0][0] = -by_bodies(s);
 }
 
+/* What there can be: at first or when it was poured, and what gravity and bodies have given. */
+static quern_real there_can_be(const quern_step *s) {
+	return s->use[A_ENERGY].real[0][0] + poured(s) + fmax(s->use[A_WORK].real[0][0] + by_bodies(s), 0);
+}
+
+void quern_hybrid_lower_gain(const quern_step *s, quern_real kinetic) {
+	if (kinetic + quern_hybrid_held(s) < there_can_be(s)) quern_hybrid_begin_gain(s, kinetic);
+}
+
 /* Bodies that stand still do no work, contacts and the coupling take energy. Twice what there can be, since a
  * conversion may make some; what lifts all by a diameter, since steps within their limits keep energy about as well
  * as that; and, where nothing pulls, what round-off moves: a millionth of a diameter in a step. */
@@ -79,9 +88,9 @@ quern_status quern_hybrid_judge_gain(
 	const quern_real still = 1e-6 * h->diameter / s->dt;
 	const quern_real lift = h->gain * quern_gravity_size(s->dim, s->gravity) * h->diameter;
 	const quern_real slack = carried * (lift + 0.5 * still * still);
-	if (!(h->gain > 0) || kinetic <= 2 * (had + fmax(work, 0)) + slack) return QUERN_OK;
+	if (!(h->gain > 0) || kinetic <= 2 * there_can_be(s) + slack) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
-		"grains and points move with %.3g J, though they had %.3g J at first or when they were poured, and "
+		"grains and points move with %.3g J, though they had %.3g J when last looked at or when they were poured, and "
 		"gravity and bodies have given %.3g J since: steps of %.3g s make energy, they are too long, or "
 		"grains grow too fast in a jam (hybrid.growth); hybrid.gain says what is allowed",
 		kinetic, had, work, s->dt);

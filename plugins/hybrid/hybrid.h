@@ -70,6 +70,8 @@ quern_real quern_hybrid_work(const void *self, const quern_step *, quern_real wi
 quern_real quern_hybrid_held(const quern_step *);
 /* Rows of the audit: from now on motion is judged by what there is now. */
 void quern_hybrid_begin_gain(const quern_step *, quern_real kinetic);
+/* The same where there is less by now than there could be: what friction has taken does not pay for what a step makes. */
+void quern_hybrid_lower_gain(const quern_step *, quern_real kinetic);
 /* Rows of the audit: ends the run if grains and points, which carry so much mass, move with more energy than there was,
  * gravity has given and `gain` allows. */
 quern_status quern_hybrid_judge_gain(
@@ -83,6 +85,11 @@ QUERN_INLINE cloud moving_grains(const quern_step *s) {
 QUERN_INLINE cloud all_points(const quern_step *s) {
 	return (cloud) { s->use[U_POINT_MASS].real[0], s->use[U_POINT_WEIGHT].real[0], NULL,
 		s->host->set(s->run, "point").n, "point" };
+}
+
+/* Whether zones are looked at in this step; not in the very first, which gathers contact stresses. */
+QUERN_INLINE bool zones_are_due(const hybrid *h, const quern_step *s) {
+	return s->step > 0 && (s->step - 1) % h->every == 0;
 }
 
 /* Narrower cells say too little of how full they are. */

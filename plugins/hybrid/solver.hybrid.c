@@ -22,8 +22,8 @@ static const quern_param params[] = {
 		"radius; 0: none is put there.",
 		.def = 2800, .max = 1e9),
 	QUERN_PARAM(hybrid, gain, "1",
-		"Motion beyond twice what there was and gravity gave that ends the run, over what lifts all by a "
-		"diameter; 0: none does.",
+		"Motion beyond twice what there was at the last update and gravity gave since that ends the run, over what lifts all "
+		"by a diameter; 0: none does.",
 		.def = 1, .max = 1e6, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(hybrid, most_density, "1",
 		"Density of a place, both clouds together, that ends the run, over that of what grains consist of; 0: "

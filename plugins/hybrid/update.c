@@ -166,7 +166,7 @@ quern_status quern_hybrid_update(const void *self, const quern_step *s) {
 		warn_of_narrow(h, s);
 		return quern_hybrid_sort(&d); /* so that there are cells to gather stress in */
 	}
-	if ((s->step - 1) % h->every) return QUERN_OK;
+	if (!zones_are_due(h, s)) return QUERN_OK;
 	quern_status status = once(h, s, &n);
 	if (status == QUERN_OK && s->step == 1) status = once(h, s, &n);
 	if (status != QUERN_OK) return status;
