@@ -79,11 +79,11 @@ QUERN_USE_ENUM(OUTLET_USES);
 	X(WATCH_BODY_WORK, "body.work", "J", QUERN_READ, QUERN_SCALAR, .when = "moving") \
 	X(WATCH_POURED, "point_source.energy", "J", QUERN_READ, QUERN_SCALAR, .when = "sources") \
 	X(WATCH_POURED_HEIGHT, "point_source.potential", "J", QUERN_READ, QUERN_SCALAR, .when = "sources") \
-	X(WATCH_LEFT, "point_face.energy", "J", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
 	X(WATCH_LEFT_HEIGHT, "point_face.potential", "J", QUERN_READ, QUERN_SCALAR, .when = "outlets") \
 	X(WATCH_BEGUN, "total.watch_begun", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: the first look has been.") \
 	X(WATCH_LEAST, "total.watch_least", "J", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "Of all energy, less what was given: the least since a stage has begun.") \
+	X(WATCH_MOST, "total.watch_held", "J", QUERN_UPDATE, QUERN_SCALAR, .doc = "The most that stress has held since then.") \
 	X(WATCH_WORK, "total.watch_work", "J", QUERN_UPDATE, QUERN_SCALAR, .doc = "By gravity along periodic axes since.") \
 	X(WATCH_GIVEN, "total.watch_given", "J", QUERN_UPDATE, QUERN_SCALAR, .doc = "Otherwise, until then.") \
 	X(WATCH_POWER, "total.watch_power", "W", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of gravity along periodic axes at the last look.") \

@@ -40,15 +40,25 @@ static bool look(const mpm *p, const quern_step *s, looked *out) {
 	return true;
 }
 
-/* J that bodies have done, and that came with what was poured and went with what left, so far. */
+/* J that bodies have done so far. */
+static quern_real by_bodies(const quern_step *s) {
+	return book_total(s->use[WATCH_BODY_WORK].real[0], s->n_slot[SLOT_BODIES]);
+}
+
+/* The same, with what was poured, motion and height, less the height of what left: that its motion is gone only lowers the sum. */
 static quern_real given(const quern_step *s) {
 	const quern_column *u = s->use;
 	const uint32_t sources = s->host->set(s->run, "point_source").n;
-	return book_total(u[WATCH_BODY_WORK].real[0], s->n_slot[SLOT_BODIES]) +
-		   book_total(u[WATCH_POURED].real[0], sources) +
+	return by_bodies(s) + book_total(u[WATCH_POURED].real[0], sources) +
 		   book_total(u[WATCH_POURED_HEIGHT].real[0], sources) -
-		   book_total(u[WATCH_LEFT].real[0], outlet_faces(s)) -
 		   book_total(u[WATCH_LEFT_HEIGHT].real[0], outlet_faces(s));
+}
+
+/* Heights of what came and went are booked along all axes, and those along a periodic one have no meaning. */
+static bool cannot_tell(const quern_step *s) {
+	const quern_vec along = gravity_along(s, true);
+	const bool passes = s->use[WATCH_POURED].real[0] || s->use[WATCH_LEFT_HEIGHT].real[0];
+	return passes && quern_vec_dot(along, along, (int)s->dim) > 0;
 }
 
 /* Once more from here: what was held before may be worth more by the values of a new stage. */
@@ -57,16 +67,19 @@ static void begin(const quern_step *s, quern_real all) {
 	u[WATCH_BEGUN].index[0] = 1;
 	u[WATCH_LEAST].real[0][0] = all;
 	u[WATCH_WORK].real[0][0] = 0;
+	u[WATCH_MOST].real[0][0] = 0;
 	u[WATCH_GIVEN].real[0][0] = given(s);
 }
 
-/* Flow and friction take energy and nobody makes any: what there is, less what was given, never rises. As much again as moves and is held is
- * allowed: a law in rates gains where it is squeezed to a third, and apic hides some of what points do in their gradients for a while. So is
- * what lifts all by a part of a cell and, where nothing pulls, what round-off moves; and the round-off of these sums. */
+/* Flow and friction take energy and nobody makes any: what there is, less what was given, does not rise but by what a step is off. As much
+ * again as moves and is held is allowed, since apic hides some of what points do in their gradients for a while; a quarter of the most that was
+ * ever held, whose sum is that of small strains; a tenth of what bodies have done; what lifts all by a part of a cell and, where nothing
+ * pulls, what round-off moves; and the round-off of these sums. */
 static quern_real allowed(const mpm *p, const quern_step *s, const looked *now, quern_real work) {
 	const quern_real still = 1e-6 * p->cell / s->dt,
 					 lift = p->gain * quern_gravity_size(s->dim, s->gravity) * p->cell;
-	return now->mass * (lift + 0.5 * still * still) +
+	return 0.25 * s->use[WATCH_MOST].real[0][0] + 0.1 * fabs(by_bodies(s)) +
+		   now->mass * (lift + 0.5 * still * still) +
 		   1e-9 * (fabs(work) + fabs(now->height) + now->kinetic + now->held);
 }
 
@@ -74,8 +87,9 @@ static quern_status judge(const mpm *p, const quern_step *s, const looked *now) 
 	const quern_column *u = s->use;
 	const quern_real work = u[WATCH_WORK].real[0][0] + given(s) - u[WATCH_GIVEN].real[0][0];
 	const quern_real there = now->kinetic + now->held, own = there + now->height - work;
-	quern_real *least = u[WATCH_LEAST].real[0];
+	quern_real *least = u[WATCH_LEAST].real[0], *most = u[WATCH_MOST].real[0];
 	*least = own < *least ? own : *least;
+	*most = now->held > *most ? now->held : *most;
 	const quern_real made = own - *least;
 	if (made <= there - made + allowed(p, s, now, work)) return QUERN_OK;
 	return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
@@ -88,7 +102,7 @@ quern_status quern_mpm_watch(const void *self, const quern_step *s) {
 	const mpm *p = self;
 	const quern_column *u = s->use;
 	const bool anew = !u[WATCH_BEGUN].index[0] || s->step == s->stage_step;
-	if (!(p->gain > 0) || (!anew && s->step % WATCH_EVERY)) return QUERN_OK;
+	if (!(p->gain > 0) || (!anew && s->step % WATCH_EVERY) || cannot_tell(s)) return QUERN_OK;
 	looked now = { .mass = 0 };
 	if (!look(p, s, &now)) return QUERN_E_MEMORY;
 	quern_real *power = u[WATCH_POWER].real[0], *time = u[WATCH_TIME].real[0];

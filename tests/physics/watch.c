@@ -68,7 +68,11 @@ static void what_comes_and_goes(void **unused) {
 		"continuum: {cell: 0.1, gain: 1e-3, transfer: {picflip: {rate: 0}}, material: {elastic: {bulk_modulus: 1e5, poisson: 0.3, density: 1500}},\n"
 		"  fill: [{region: {box: {lower: [0.3, 0.3], upper: [0.7, 0.7]}}}]}}\n");
 	harness_steps(run, 2000);
-	assert_true(quern_run_carries(run, "kinetic") > 0.4 * 0.5 * 240);
+	const double motion = quern_run_carries(run, "kinetic"), lost = number(run, "total.watch_least");
+	table_note("J, of a block that a plate has pushed", motion);
+	table_note("J, of all that the plate has given, at the least", lost);
+	assert_true(motion > 0.4 * 0.5 * 240 && lost < 1e-6 &&
+				lost > -1.5 * motion); /* a block that sticks has half of it */
 	harness_close(run);
 	for (int k = 0; k < 2; k++) {
 		const double below = k ? -1000 : 1000;
@@ -93,13 +97,47 @@ static void gravity_turns(void **unused) {
 	harness_close(run);
 }
 
+/* Runs in which the sum seems to rise, and nothing is made: elastic layers that fall and bounce, since energy of stress is that of small
+ * strains; a wall that presses one and lets go; sand poured on a slope around a periodic axis, whose heights have no meaning. */
+static void what_seems_to_be_made(void **unused) {
+	(void)unused;
+	static const char *const layer =
+		"quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [1, 4]}\ntime: {end: %g}\noutput: {every: %g}\n"
+		"continuum: {cell: 0.05, transfer: {%s}, material: {elastic: {bulk_modulus: %g, poisson: 0.3, density: 1500}},\n"
+		"  fill: [{region: {box: {lower: [0, %g], upper: [1, %g]}}}]}\n";
+	static const struct {
+		double bulk, height;
+	} falls[] = { { 1e5, 0.3 }, { 1e6, 1 }, { 3e4, 0.3 }, { 1e6, 2.5 } };
+	for (int k = 0; k < 4; k++)
+		for (int t = 0; t < 2; t++) {
+			quern_run *run = harness_open(1, layer, 1.5, 1.5, t ? "picflip: {rate: 0}" : "picflip: {}",
+				falls[k].bulk, falls[k].height, falls[k].height + 0.4);
+			harness_until(run, 1.4);
+			harness_close(run);
+		}
+	quern_run *run = harness_open(1,
+		"quern: 1\ndimension: 2\ngravity: [0, -9.81]\ndomain: {lower: [0, 0], upper: [1, 0.4]}\ntime: {end: 2.4}\noutput: {every: 2.4}\n"
+		"bodies: [{box: {lower: [-0.5, -0.1], upper: [0.1, 0.5], boundary: slip, motion: {sinus: {amplitude: [0.05, 0], frequency: 0.5}}}}]\n"
+		"continuum: {cell: 0.05, transfer: {picflip: {rate: 0}}, material: {elastic: {bulk_modulus: 1e6, poisson: 0.3, density: 1500}},\n"
+		"  fill: [{region: {box: {lower: [0.1, 0], upper: [1, 0.4]}}}]}\n");
+	harness_until(run, 2.3);
+	harness_close(run);
+	run = harness_open(1,
+		"quern: 1\ndimension: 2\ngravity: [3.3552, -9.2184]\ndomain: {lower: [0, 0], upper: [2, 0.4], periodic: [true, false]}\n"
+		"time: {end: 0.5}\noutput: {every: 0.5}\nbodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {frictional: 0.5}}}]\n"
+		"continuum: {cell: 20 mm, material: {drucker_prager: {bulk_modulus: 1e6, density: 1500, friction: 0.4}},\n"
+		"  source: [{region: {box: {lower: [1.6, 0.2], upper: [1.8, 0.3]}}, rate: 50, velocity: [0, -1]}]}\n");
+	harness_until(run, 0.4);
+	harness_close(run);
+}
+
 static void make_faster(quern_run *run, double factor) {
 	const quern_column v = harness_field(run, "point.velocity");
 	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
 		for (int k = 0; k < 2; k++) v.real[k][i] *= factor;
 }
 
-/* Three fifths more are allowed, three times as much are not; and nobody looks where the scene says so. */
+/* Three fifths more are allowed, three times as much as there was are not; and nobody looks where the scene says so. */
 static void what_is_made(void **unused) {
 	(void)unused;
 	quern_run *run = open_far("", "0, 0", 0, block_at(0.8, ", velocity: [0, 1]"));
@@ -193,7 +231,7 @@ static void what_a_hybrid_makes(void **unused) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(what_falls), cmocka_unit_test(what_comes_and_goes),
-		cmocka_unit_test(gravity_turns), cmocka_unit_test(what_is_made),
-		cmocka_unit_test(what_a_hybrid_makes) };
+		cmocka_unit_test(gravity_turns), cmocka_unit_test(what_seems_to_be_made),
+		cmocka_unit_test(what_is_made), cmocka_unit_test(what_a_hybrid_makes) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
