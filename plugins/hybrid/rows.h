@@ -200,9 +200,9 @@ QUERN_USE_ENUM(GROW_USES);
 	X(A_MOMENTUM_DEFECT, "total.momentum_defect", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "Of the momentum invariant, relative: the worst so far.") \
 	X(A_ENERGY, "total.audit_energy", "J", QUERN_UPDATE, QUERN_SCALAR, \
-		.doc = "Of motion and in springs at the first audit: no less than that.") \
+		.doc = "Of motion and in springs when it was last set down: no less than that.") \
 	X(A_WORK, "total.gravity_work", "J", QUERN_UPDATE, QUERN_SCALAR, \
-		.doc = "Done by gravity since the first audit.") \
+		.doc = "Done by gravity since then.") \
 	X(A_FORCE, "contact.force", "N", QUERN_READ, QUERN_VECTOR) \
 	X(A_FIRST, "contact.first", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \
 	X(A_SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .target = "grain") \

@@ -34,7 +34,7 @@ typedef struct mpm {
 	quern_real damping; /* s, of elastic waves */
 	bool damped;
 	bool rough, still;    /* whether a body is */
-	quern_real gain;      /* of motion that ends the run, over what lifts all by a cell */
+	quern_real gain;      /* of energy from nowhere that is allowed, over what lifts all by a cell */
 	bool watches, moving; /* a continuum alone is watched; whether a body moves beside it */
 	rough_law rubbing;
 } mpm;
