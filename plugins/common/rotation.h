@@ -110,7 +110,13 @@ QUERN_INLINE void put_wave_speeds(
 		speed[i] = __builtin_sqrt(modulus / (density[i] > least ? density[i] : least));
 }
 
-/* What a hypoelastic stress stores: (p^2/K + tau^2/G)/(2 rho) */
+/* J/m^3 that a stress holds, of small strains: p^2/2K + tau^2/2G; `softness` 1/2K, `shear_softness` 1/2G */
+QUERN_INLINE quern_real symmetric_held(int dim, quern_real softness, quern_real shear_softness, symmetric s) {
+	const quern_real mean = symmetric_mean(dim, s);
+	return softness * mean * mean + shear_softness * symmetric_half_square(dim, symmetric_deviator(dim, s));
+}
+
+/* What a hypoelastic stress stores */
 QUERN_INLINE void put_hypoelastic_energies(
 	int dim, quern_real bulk, quern_real shear, const quern_material_batch *b) {
 	const quern_real softness = 0.5 / bulk, shear_softness = 0.5 / shear;
@@ -118,10 +124,7 @@ QUERN_INLINE void put_hypoelastic_energies(
 	quern_real *restrict energy = b->energy;
 	if (!energy) return;
 	QUERN_SIMD
-	for (uint32_t i = 0; i < b->n; i++) {
-		const symmetric s = SYMMETRIC_AT(b->stress, i, dim);
-		const quern_real mean = symmetric_mean(dim, s);
-		const quern_real square = symmetric_half_square(dim, symmetric_deviator(dim, s));
-		energy[i] = (softness * mean * mean + shear_softness * square) / density[i];
-	}
+	for (uint32_t i = 0; i < b->n; i++)
+		energy[i] =
+			symmetric_held(dim, softness, shear_softness, SYMMETRIC_AT(b->stress, i, dim)) / density[i];
 }

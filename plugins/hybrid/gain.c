@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* gain - motion that nobody has given: docs/theory/hybrid.md, section 5 */
-#include "../common/held.h"
+#include "../common/rotation.h"
 #include "contacts.h"
 
 /* A spring that stiffens holds less than half of force times overlap, and the tangential one about as much again. */
@@ -41,11 +41,13 @@ static quern_real in_points(const quern_step *s) {
 	const quern_bound *material = &s->slot[SLOT_MATERIAL][0];
 	quern_real bulk, shear, density, sum = 0;
 	((const quern_material_ops *)material->ops)->moduli(material->self, s->dim, &bulk, &shear, &density);
+	const quern_real softness = 0.5 / bulk, shear_softness = shear > 0 ? 0.5 / shear : 0;
+	const int dim = (int)s->dim;
 	const quern_parts *points = s->host->parts(s->run, "point");
 	for (uint32_t q = 0; q < points->n; q++) {
 		const uint32_t i = quern_nth(points->entry, q);
 		sum += u[A_POINT_WEIGHT].real[0][i] * u[A_POINT_VOLUME].real[0][i] *
-			   held_by_stress(SYMMETRIC_AT(u[A_POINT_STRESS].real, i, s->dim), s->dim, bulk, shear);
+			   symmetric_held(dim, softness, shear_softness, SYMMETRIC_AT(u[A_POINT_STRESS].real, i, dim));
 	}
 	return sum;
 }
@@ -83,8 +85,6 @@ void quern_hybrid_lower_gain(const quern_step *s, quern_real kinetic) {
  * as that; and, where nothing pulls, what round-off moves: a millionth of a diameter in a step. */
 quern_status quern_hybrid_judge_gain(
 	const hybrid *h, const quern_step *s, quern_real kinetic, quern_real carried) {
-	const quern_real had = s->use[A_ENERGY].real[0][0] + poured(s),
-					 work = s->use[A_WORK].real[0][0] + by_bodies(s);
 	const quern_real still = 1e-6 * h->diameter / s->dt;
 	const quern_real lift = h->gain * quern_gravity_size(s->dim, s->gravity) * h->diameter;
 	const quern_real slack = carried * (lift + 0.5 * still * still);
@@ -93,5 +93,5 @@ quern_status quern_hybrid_judge_gain(
 		"grains and points move with %.3g J, though they had %.3g J when last looked at or when they were poured, and "
 		"gravity and bodies have given %.3g J since: steps of %.3g s make energy, they are too long, or "
 		"grains grow too fast in a jam (hybrid.growth); hybrid.gain says what is allowed",
-		kinetic, had, work, s->dt);
+		kinetic, s->use[A_ENERGY].real[0][0] + poured(s), s->use[A_WORK].real[0][0] + by_bodies(s), s->dt);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* watch - energy that nobody has given, of a continuum alone: docs/theory/mpm.md, section 5 */
-#include "../common/held.h"
 #include "../common/outlets.h"
+#include "../common/rotation.h"
 #include "mpm.h"
 
 /* Steps from one look to the next: what explodes grows over many, and looks cost next to nothing. */
@@ -25,6 +25,7 @@ static bool look(const mpm *p, const quern_step *s, looked *out) {
 	const cloud points = { u[WATCH_MASS].real[0], u[WATCH_WEIGHT].real[0], NULL,
 		s->host->set(s->run, "point").n, "point" };
 	const int dim = (int)s->dim;
+	const quern_real softness = 0.5 / p->bulk, shear_softness = p->shear > 0 ? 0.5 / p->shear : 0;
 	const quern_vec down = gravity_along(s, false), along = gravity_along(s, true);
 	cloud_sums c;
 	if (!cloud_open(&c, s->host, s->run, &points)) return false;
@@ -35,7 +36,7 @@ static bool look(const mpm *p, const quern_step *s, looked *out) {
 		CLOUD_ADD(&c, i, quern_vec_dot(along, QUERN_VEC_AT(velocity->real, i, dim), dim), out->power);
 	CLOUD_ADD(&c, i,
 		u[WATCH_VOLUME].real[0][i] / u[WATCH_MASS].real[0][i] *
-			held_by_stress(SYMMETRIC_AT(u[WATCH_STRESS].real, i, s->dim), s->dim, p->bulk, p->shear),
+			symmetric_held(dim, softness, shear_softness, SYMMETRIC_AT(u[WATCH_STRESS].real, i, dim)),
 		out->held);
 	return true;
 }
