@@ -245,6 +245,7 @@ QUERN_INLINE void gather_block(
 	quern_real *const *x = w->s->use[GATHER_POSITION].real;
 	const uint32_t begin = w->point[b], end = w->point[b + 1];
 	if (begin == end) return;
+	ahead_ask(&w->ahead, begin, end, STENCIL);
 	quern_tile_load(w->g, w->motion, b, m->tile);
 	if (last) speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
@@ -252,12 +253,14 @@ QUERN_INLINE void gather_block(
 	if (last && w->strain->means) strain_block(w, m, b, dim);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
+		ahead_ask(&w->ahead, i + n, end, STENCIL);
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
 		collect_chunk(w, m, n, dim, last);
 		if (last && w->p->matrix) fit_chunk(w, m, n, dim);
 		call_transfer(w, m, i, n, last);
-		for (uint32_t k = 0; k < n && !last; k++)
+		for (uint32_t k = 0; k < n && !last; k++) {
 			trips_send(&w->trips, &m->trip, k, cloud_mass(&w->points, i + k), dim);
+		}
 		if (!last) continue;
 		for (uint32_t k = 0; k < n && w->calm.part; k++)
 			calm_note(
@@ -328,6 +331,18 @@ static quern_status lost(const gather_work *w, int32_t i) {
 		x, y, sqrt(v2), s->dt, material);
 }
 
+/* What is read of each of n points. */
+static void note_columns(gather_work *w, uint32_t n) {
+	static const uint32_t read[] = { GATHER_POSITION, GATHER_VELOCITY, GATHER_MASS, GATHER_VOLUME,
+		GATHER_STRESS, GATHER_DASHPOT, GATHER_WEIGHT, GATHER_FOLLOWING, GATHER_AROUND };
+	const quern_bound *material = &w->s->slot[SLOT_MATERIAL][0];
+	for (uint32_t k = 0; k < sizeof read / sizeof *read; k++) ahead_add(&w->ahead, &w->s->use[read[k]]);
+	for (uint32_t r = 0; r < material->n_uses; r++)
+		if (material->uses[r].shape != QUERN_INDEX && material->uses[r].shape != QUERN_ID)
+			ahead_add(&w->ahead, &material->column[r]);
+	ahead_end(&w->ahead, n);
+}
+
 quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	const quern_set_view points = s->host->set(s->run, "point");
 	const mpm *p = self;
@@ -352,6 +367,7 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };
 	if (!w.bad || !w.moved || calm_init(&w.calm, s, points.n) != QUERN_OK) return QUERN_E_MEMORY;
+	note_columns(&w, points.n);
 	for (uint32_t b = 0; b < w.g->n_blocks; b++) w.bad[b] = -1;
 	if (trips_run(&w.trips, send_one, &w) != QUERN_OK) return QUERN_E_MEMORY;
 	s->host->parallel(s->run, w.g->n_blocks, gather_one, &w);

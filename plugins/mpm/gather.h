@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* gather - what the parts of the way from nodes to points share */
 #pragma once
+#include "../common/ahead.h"
 #include "../common/calm.h"
 #include "../common/cloud.h"
 #include "../common/trips.h"
@@ -20,6 +21,7 @@ typedef struct gather_work {
 	const quern_strain_ops *strain;
 	quern_real full;      /* from there on a cell is crowded */
 	quern_real still;     /* 1/s: sheared much faster, material flows */
+	ahead ahead;          /* columns of points */
 	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
 } gather_work;
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* scatter - points to nodes: mass, momentum and internal force in one row, block by block in coloured order */
+#include "../common/ahead.h"
 #include "../common/stencil.h"
 #include "../common/symmetric.h"
 #include "mpm.h"
@@ -11,6 +12,7 @@ typedef struct {
 	const uint32_t *point; /* partition by block */
 	quern_row *node;
 	bool counts; /* what cells hold */
+	ahead ahead; /* columns of points */
 } scatter_work;
 
 /* Of a chunk: mass and momentum, volume times stress, mass times velocity gradient. */
@@ -101,9 +103,11 @@ QUERN_INLINE void scatter_block(
 	const quern_column *u = w->s->use;
 	const uint32_t begin = w->point[b], end = w->point[b + 1];
 	if (begin == end) return;
+	ahead_ask(&w->ahead, begin, end, STENCIL);
 	memset(m->tile, 0, w->g->tile_size * sizeof(quern_row));
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
+		ahead_ask(&w->ahead, i + n, end, STENCIL);
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[SCATTER_POSITION].real, i, NULL, n, &m->stencil);
 		load_chunk(u, m, i, n, dim, affine);
 		for (uint32_t k = 0; k < n; k++) {
@@ -134,6 +138,8 @@ quern_status quern_mpm_scatter(const void *self, const quern_step *s) {
 		.g = s->host->grid(s->run),
 		.point = points.block,
 		.node = (quern_row *)(void *)s->use[SCATTER_NODE_MASS].real[0] };
+	for (uint32_t k = SCATTER_POSITION; k <= SCATTER_AFFINE; k++) ahead_add(&w.ahead, &s->use[k]);
+	ahead_end(&w.ahead, points.n);
 	if (((const mpm *)self)->alone) {
 		int32_t *uncounted = s->use[SCATTER_UNCOUNTED].index;
 		/* a stage of the scene begins as a scene that starts from the state before it would */
