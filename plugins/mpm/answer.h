@@ -3,40 +3,20 @@
  * own. docs/theory/hybrid.md, section 5; docs/theory/mpm.md, section 8 */
 #pragma once
 #include "gather.h"
+#include "spread.h"
 #include <math.h>
 
 /* Of the shear rate of what is at rest: where material flows for certain. What is alone has no noise of grains and conversions. */
 static const quern_real flowing = 30, flowing_alone = 3;
-/* What is shaken changes volume as much as shape, what flows hardly: weight of the former. */
-static const quern_real shaken = 30;
 /* Of densities within a cell: a rate over that at which they go to what the cell holds. */
 static const quern_real evening = 10;
 /* What is counted in one cell is noise of some percent, the mean of those around of less: what that one has beyond `noise_around` is followed faster
- * by a factor, up to `most_around`. Where pressure is more than `waves` of the bulk modulus it presses by as much itself: those are waves, not lost room. */
-static const quern_real noise_around = 0.02, most_around = 0.03, faster_around = 10, waves = 0.03;
+ * by a factor, up to `most_around`. */
+static const quern_real noise_around = 0.02, most_around = 0.03, faster_around = 10;
 /* Of a cell's excess: below, there is a surface; above, no more counts. */
 static const quern_real most_excess = 0.1;
 /* What is full, over what was full at first: that varies by so much. */
 static const quern_real dead_band = 1.01;
-
-/* Of the block's cells, those that points (m from the grid's lower corner) are in, or the nearest to them: between sorts a point may be
- * beyond. */
-QUERN_INLINE void cells_of(const gather_work *w, uint32_t b, quern_real position[3][STENCIL], uint32_t n,
-	const int dim, int32_t *restrict cell) {
-	const quern_real width = w->g->cell;
-	const int32_t edge = (int32_t)w->g->edge;
-	memset(cell, 0, n * sizeof *cell);
-	for (int k = dim; k-- > 0;) {
-		const int32_t begin = w->g->at[b][k] * edge, inside = w->g->cells[k] - begin;
-		const quern_real most = (w->p->alone && inside < edge ? inside : edge) - 1;
-		const quern_real *restrict at = position[k];
-		QUERN_SIMD
-		for (uint32_t i = 0; i < n; i++) {
-			const quern_real x = at[i] / width - begin;
-			cell[i] = cell[i] * edge + (int32_t)(x > 0 ? (x < most ? x : most) : 0);
-		}
-	}
-}
 
 static quern_real pressure_of(const gather_work *w, uint32_t i) {
 	quern_real pressure = 0;
@@ -169,12 +149,6 @@ QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b
 	if (w->p->alone) find_excess(w, m, dim);
 }
 
-/* 0 at rest, 1 in flow, by the square of the shear rate. */
-QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
-	const quern_real fast = rate2 / (still * still), share = fast * fast / (1 + fast * fast);
-	return still > 0 ? share : 1;
-}
-
 /* Points do not feel that they lie one upon the other: as material is sheared, their densities go to the mean of their cell's points, and that goes
  * to the cell's, a part for each unit of shear; if each went to the grid's at its own place it would take over that one's noise. A cell that
  * bears nothing has no friction to lose, and one whose points are far denser than it is at a surface. Returned: by what share a point's density
@@ -193,13 +167,11 @@ QUERN_INLINE quern_real follow_cell(
 /* A continuum alone: densities of points go to the mean of their cell's, which keeps the volume of all, much faster
  * than that goes to what the cell holds. Each by itself would take over the noise of its own gradient. */
 static quern_real follow_alone(const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i,
-	quern_real pressure, quern_real rate) {
-	quern_real trace = 0;
-	for (uint32_t k = 0; k < w->s->dim; k++) trace += m->gradient[(w->s->dim + 1) * k][i];
-	if (!(rate > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) || m->density[i] < closed_from(w->p, pressure))
+	quern_real pressure, quern_real rate2) {
+	if (!(rate2 > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) ||
+		m->density[i] < closed_from(w->p, pressure))
 		return 0;
-	const quern_real sheared = rate * rate / (rate * rate + shaken * trace * trace),
-					 time = w->s->dt * COUNT_EVERY, shear = rate * sheared * time;
+	const quern_real time = w->s->dt * COUNT_EVERY, shear = sheared_rate(m, i, rate2, (int)w->s->dim) * time;
 	const quern_real evened = evening * w->p->follow * shear, part = w->p->follow * shear,
 					 soon = faster_around * part,
 					 excess = m->excess[c] < -most_excess ? 0 : fmin(m->excess[c], most_excess);
@@ -268,7 +240,7 @@ QUERN_INLINE void measure_chunk(
 		const uint32_t c = (uint32_t)m->cell[i];
 		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim);
 		u[GATHER_FOLLOWING].real[0][begin + i] =
-			flowing_share(w->still, rate2) * follow_alone(w, m, c, i, pressure_of(w, begin + i), sqrt(rate2));
+			flowing_share(w->still, rate2) * follow_alone(w, m, c, i, pressure_of(w, begin + i), rate2);
 		u[GATHER_AROUND].real[0][begin + i] = m->level[c];
 	}
 }

@@ -258,14 +258,14 @@ QUERN_INLINE void gather_block(
 		collect_chunk(w, m, n, dim, last);
 		if (last && w->p->matrix) fit_chunk(w, m, n, dim);
 		call_transfer(w, m, i, n, last);
-		for (uint32_t k = 0; k < n && !last; k++) {
+		for (uint32_t k = 0; k < n && !last; k++)
 			trips_send(&w->trips, &m->trip, k, cloud_mass(&w->points, i + k), dim);
-		}
 		if (!last) continue;
 		for (uint32_t k = 0; k < n && w->calm.part; k++)
 			calm_note(
 				&w->calm, k, i + k, m->gradient, m->trip.pic, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
 		if (w->strain->apply[dim - 2]) strain_chunk(w, m, b, i, n, dim);
+		if (w->spreads) spread_chunk(w, m, b, i, n, dim);
 		move_chunk(w, m, b, i, n, dim);
 		if (w->answers) answer_chunk(w, m, b, i, n, dim);
 		if (w->counts) measure_chunk(w, m, b, i, n, dim);
@@ -364,6 +364,8 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	w.answers = p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
 	w.counts = p->alone && s->use[GATHER_UNCOUNTED].index[0] == 1;
 	w.still = p->alone ? flowing_alone * p->rest_alone : flowing * p->rest_rate;
+	w.spreads = w.counts && p->spread > 0 && w.still > 0;
+	if (w.spreads && !spread_measure(&w)) return QUERN_E_MEMORY;
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };
 	if (!w.bad || !w.moved || calm_init(&w.calm, s, points.n) != QUERN_OK) return QUERN_E_MEMORY;

@@ -16,8 +16,10 @@ typedef struct gather_work {
 	const quern_row *motion;
 	trips trips;
 	calm calm;
-	bool answers; /* volume does, to how full cells are */
-	bool counts;  /* the same of a continuum alone, in this step */
+	bool answers;      /* volume does, to how full cells are */
+	bool counts;       /* the same of a continuum alone, in this step */
+	bool spreads;      /* points are, in this step */
+	quern_row *moment; /* by cell, where they are: spread.h */
 	const quern_strain_ops *strain;
 	quern_real full;      /* from there on a cell is crowded */
 	quern_real still;     /* 1/s: sheared much faster, material flows */

@@ -26,6 +26,7 @@ typedef struct mpm {
 	quern_real relief, answer; /* of the pressure to cells that are too full: over the bulk modulus, 1/s */
 	quern_real follow;         /* of density, to the cell's: a rate over the shear rate */
 	bool alone;                /* density follows without a hybrid: cells are counted here */
+	quern_real spread;         /* of points over their cells: a rate over the shear rate */
 	quern_real rest, diameter, rest_rate; /* shear rate of what is at rest: over sqrt(g/D), 1/s */
 	quern_real rest_alone;                /* 1/s: the same of a continuum alone, from sqrt(g/h) */
 	quern_real share_wall, share_next;    /* of a wall's nodes */
@@ -60,7 +61,7 @@ QUERN_INLINE uint32_t motion_change(uint32_t dim) { return dim; }
 QUERN_INLINE uint32_t motion_density(uint32_t dim) { return 2 * dim; }
 QUERN_INLINE uint32_t motion_grip(uint32_t dim) { return 2 * dim + 1; }
 
-/* Density follows slowly, by the shear, so that a continuum alone is counted in every so many steps. */
+/* Density follows slowly, by the shear, and so are points spread: a continuum alone is counted in every so many steps. */
 enum { COUNT_EVERY = 20 };
 
 quern_status quern_mpm_fill(const void *self, const quern_step *);

@@ -65,6 +65,10 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, alone, NULL,
 		"Count what cells hold; set by itself where density follows without a hybrid.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, spread, "1",
+		"In a continuum alone, where density follows: rate over the shear rate at which points are spread over their cells; 0: they are "
+		"not.",
+		.def = 3, .max = 1e3, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rest, "1",
 		"In a hybrid, shear rate over sqrt(g/D) below which material is at rest and motion below the grid is stopped, of "
 		"points and of the grains that meet them, and far above which volume answers; 0: neither is done. In a "
@@ -475,7 +479,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum"
 	.limit = limit, .account = account, .cell = cell, .accept = accept, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 5,
+	.revision = 6,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.mpm",
 	.brief = "The continuum: material points on a sparse grid.",

@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: MIT */
+/* spread - points of a cell that is sheared are spread over its width. A flow gathers them in layers a cell apart, which no node sees, and where
+ * they lie pressure and friction are off. docs/theory/mpm.md, section 8 */
+#pragma once
+#include "gather.h"
+#include <math.h>
+#include <quern/math.h>
+
+/* Of the block's cells, those that points (m from the grid's lower corner) are in, or the nearest to them: between sorts a point may be
+ * beyond. */
+QUERN_INLINE void cells_of(const gather_work *w, uint32_t b, quern_real position[3][STENCIL], uint32_t n,
+	const int dim, int32_t *restrict cell) {
+	const quern_real width = w->g->cell;
+	const int32_t edge = (int32_t)w->g->edge;
+	memset(cell, 0, n * sizeof *cell);
+	for (int k = dim; k-- > 0;) {
+		const int32_t begin = w->g->at[b][k] * edge, inside = w->g->cells[k] - begin;
+		const quern_real most = (w->p->alone && inside < edge ? inside : edge) - 1;
+		const quern_real *restrict at = position[k];
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			const quern_real x = at[i] / width - begin;
+			cell[i] = cell[i] * edge + (int32_t)(x > 0 ? (x < most ? x : most) : 0);
+		}
+	}
+}
+
+/* 0 at rest, 1 in flow, by the square of the shear rate. */
+QUERN_INLINE quern_real flowing_share(quern_real still, quern_real rate2) {
+	const quern_real fast = rate2 / (still * still), share = fast * fast / (1 + fast * fast);
+	return still > 0 ? share : 1;
+}
+
+/* Where pressure is more than this part of the bulk modulus it presses by as much itself: those are waves, and not lost room. */
+static const quern_real waves = 0.03;
+/* What is shaken changes volume as much as shape, what flows hardly: weight of the former. */
+static const quern_real shaken = 30;
+
+/* 1/s: the shear rate of point i, as far as its shape changes and not its volume alone. */
+QUERN_INLINE quern_real sheared_rate(const gather_memory *m, uint32_t i, quern_real rate2, const int dim) {
+	quern_real trace = 0;
+	for (int k = 0; k < dim; k++) trace += m->gradient[(dim + 1) * k][i];
+	return rate2 > 0 ? sqrt(rate2) * (rate2 / (rate2 + shaken * trace * trace)) : 0;
+}
+
+/* Rows that their weight has pressed lie off the middle by some hundredths of a cell, and are spread all the same. */
+static const quern_real pressed_off = 0.02;
+/* Of a move: from wherever in a cell, a fifth of the way to its face is left. */
+static const quern_real most_pull = 0.2;
+
+/* How far along an axis a point (m from the grid's lower corner) is from the middle of its cell, in cells. Between sorts one may be beyond its
+ * block's cells, and is in none of them: more than half. Beyond the end of a period narrower than a block the last cell stands for the first. */
+QUERN_INLINE quern_real spread_offset(const gather_work *w, uint32_t b, int axis, quern_real position) {
+	const int32_t begin = w->g->at[b][axis] * (int32_t)w->g->edge;
+	const quern_real t = position / w->g->cell - begin, most = (quern_real)w->g->edge;
+	return (t >= 0) & (t < most) ? t - quern_floor(t) - 0.5 : 1;
+}
+
+QUERN_INLINE bool spread_within(
+	const gather_work *w, uint32_t b, quern_real position[3][STENCIL], uint32_t i, const int dim) {
+	bool within = true;
+	for (int k = 0; k < dim; k++) within = within && spread_offset(w, b, k, position[k][i]) < 1;
+	return within;
+}
+
+/* Mean square of the way from the middle, over that of what is everywhere alike (1/12): of points in the middles of equal parts, as at first. */
+QUERN_INLINE quern_real spread_even(const gather_work *w) {
+	const quern_real one = 1.0 / w->p->points;
+	return 1 - one * one;
+}
+
+/* One point's moments along each axis to the cells around it: sharp along that axis, and by hats around the middles of cells across, so that none
+ * comes and goes where points pass from cell to cell. */
+QUERN_INLINE void spread_send(const gather_work *w, quern_row *tile, uint32_t b, const quern_real place[3],
+	quern_real mass, const int dim) {
+	const quern_grid_view *g = w->g;
+	const quern_real even = spread_even(w);
+	uint32_t own[3] = { 0 }, to[3][2];
+	quern_real off[3], part[3][2];
+	for (int k = 0; k < dim; k++) {
+		const int32_t begins = g->at[b][k] * (int32_t)g->edge;
+		/* the tile begins a cell before the block */
+		const quern_real t = place[k] / g->cell - begins + 1, x = t - 0.5;
+		const int32_t here = t > 0 ? (int32_t)t : 0, below = x > 0 ? (int32_t)x : 0,
+					  cell = begins + below - 1;
+		own[k] = (uint32_t)here;
+		off[k] = t - here - 0.5;
+		to[k][0] = (uint32_t)(!g->periodic[k] && cell < 0 ? below + 1 : below);
+		to[k][1] = (uint32_t)(!g->periodic[k] && cell + 1 >= g->cells[k] ? below : below + 1);
+		part[k][1] = x - below;
+		part[k][0] = 1 - part[k][1];
+	}
+	for (int k = 0; k < dim; k++)
+		for (int corner = 0; corner < 1 << (dim - 1); corner++) {
+			uint32_t node = 0;
+			quern_real share = mass;
+			for (int a = dim, across = dim - 1; a-- > 0;) {
+				const int side = a == k ? 0 : corner >> --across & 1;
+				node = node * g->span + (a == k ? own[k] : to[a][side]);
+				share *= a == k ? 1 : part[a][side];
+			}
+			tile[node][2 * k] += share * off[k];
+			tile[node][2 * k + 1] += share * (12 * off[k] * off[k] - even);
+		}
+}
+
+static void spread_scatter(void *arg, uint32_t b, uint32_t worker) {
+	const gather_work *w = arg;
+	gather_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
+	if (!m || w->point[b] == w->point[b + 1]) return;
+	memset(m->tile, 0, w->g->tile_size * sizeof(quern_row));
+	for (uint32_t i = w->point[b]; i < w->point[b + 1]; i++) {
+		quern_real place[3];
+		for (uint32_t k = 0; k < w->s->dim; k++)
+			place[k] = w->s->use[GATHER_POSITION].real[k][i] - w->g->lower[k];
+		if (w->s->dim == 2) spread_send(w, m->tile, b, place, w->s->use[GATHER_MASS].real[0][i], 2);
+		else spread_send(w, m->tile, b, place, w->s->use[GATHER_MASS].real[0][i], 3);
+	}
+	quern_tile_add(w->g, w->moment, b, m->tile);
+}
+
+QUERN_INLINE quern_real spread_beyond(quern_real mean) {
+	return mean > pressed_off ? mean - pressed_off : mean < -pressed_off ? mean + pressed_off : 0;
+}
+
+static bool spread_measure(gather_work *w) {
+	const size_t size = (size_t)w->g->n_blocks * QUERN_BLOCK_CELLS * sizeof(quern_row);
+	w->moment = w->s->host->memory(w->s->run, size);
+	if (!w->moment) return false;
+	memset(w->moment, 0, size);
+	stencil_by_colour(w->s, w->g, spread_scatter, w);
+	return true;
+}
+
+/* Means go to the middle of the cell and mean squares to those of the start, by a part for each unit of shear. Nothing is moved across a face, and
+ * little along an axis along which the flow takes points through cells anyway. */
+QUERN_INLINE void spread_chunk(
+	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
+	const quern_real time = w->s->dt * COUNT_EVERY, volume = quern_grid_cell_volume(w->g);
+	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t c = (uint32_t)m->cell[i];
+		const quern_row *row = w->moment + (size_t)b * QUERN_BLOCK_CELLS + c;
+		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim), full = m->held[c] * volume;
+		const quern_real part =
+			w->p->spread * time * flowing_share(w->still, rate2) * sheared_rate(m, i, rate2, dim);
+		if (!m->inside[c] || !(m->level[c] > 0) || !(m->level[c] < waves * w->p->bulk) || !(full > 0) ||
+			!(part > 0) || !spread_within(w, b, m->trip.stencil.position, i, dim))
+			continue;
+		for (int k = 0; k < dim; k++) {
+			const quern_real off = spread_offset(w, b, k, m->trip.stencil.position[k][i]),
+							 mean = (*row)[2 * k] / full, wide = (*row)[2 * k + 1] / full,
+							 passes = m->trip.pic[k][i] / w->g->cell,
+							 share = part / (1 + part) * (rate2 / (rate2 + passes * passes)),
+							 pull = share * (spread_beyond(mean) + wide * off);
+			w->s->use[GATHER_POSITION].real[k][begin + i] -=
+				fmin(fmax(pull, -most_pull), most_pull) * (1 - 4 * off * off) * w->g->cell;
+		}
+	}
+}
