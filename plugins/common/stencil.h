@@ -16,16 +16,6 @@ typedef struct stencil {
 	int32_t reach[STENCIL]; /* in 3-D; bit a: there is a third node along axis a */
 } stencil;
 
-/* A row as the processor takes it in one go: a compiler that has to cut rows by itself passes each factor through memory, and waits for it. */
-#if defined __AVX512F__
-enum { PARTS = 1 };
-#elif defined __AVX__
-enum { PARTS = 2 };
-#else
-enum { PARTS = 4 };
-#endif
-enum { PART_LANES = QUERN_LANES / PARTS };
-typedef quern_real row_part __attribute__((vector_size(PART_LANES * sizeof(quern_real)), may_alias));
 /* Grains come back through a periodic face when their list is made, not before: here each is taken as the image that
  * lies in its block, wherever round-off puts the block's faces. */
 QUERN_INLINE void stencil_place(const quern_grid_view *g, uint32_t block, uint32_t axis, const quern_real *x,
@@ -129,6 +119,16 @@ QUERN_INLINE bool stencil_holds(const quern_grid_view *g, uint32_t block, uint32
 
 /* ---- rows in parts ---- */
 
+/* A row as the processor takes it in one go: a compiler that has to cut rows by itself passes each factor through memory, and waits for it. */
+#if defined __AVX512F__
+enum { PARTS = 1 };
+#elif defined __AVX__
+enum { PARTS = 2 };
+#else
+enum { PARTS = 4 };
+#endif
+enum { PART_LANES = QUERN_LANES / PARTS };
+typedef quern_real row_part __attribute__((vector_size(PART_LANES * sizeof(quern_real)), may_alias));
 typedef struct parted_row {
 	row_part part[PARTS];
 } parted_row;

@@ -2,7 +2,7 @@
 /* answer - volume that answers to how full cells are: what a cell holds, the pressure that it lacks, and densities of points that follow its
  * own. docs/theory/hybrid.md, section 5; docs/theory/mpm.md, section 8 */
 #pragma once
-#include "gather.h"
+#include "flow.h"
 #include "spread.h"
 #include <math.h>
 
