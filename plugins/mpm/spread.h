@@ -16,7 +16,7 @@ static const quern_real most_pull = 0.2;
 QUERN_INLINE quern_real spread_offset(const gather_work *w, uint32_t b, int axis, quern_real position) {
 	const int32_t begin = w->g->at[b][axis] * (int32_t)w->g->edge;
 	const quern_real t = position / w->g->cell - begin, most = (quern_real)w->g->edge;
-	return (t >= 0) & (t < most) ? t - quern_floor(t) - 0.5 : 1;
+	return ((t >= 0) & (t < most)) ? t - quern_floor(t) - 0.5 : 1;
 }
 
 QUERN_INLINE bool spread_within(
