@@ -117,6 +117,20 @@ QUERN_INLINE bool stencil_holds(const quern_grid_view *g, uint32_t block, uint32
 	return t >= -0.5 && t <= (quern_real)g->edge + 0.5;
 }
 
+/* The cells around whose middles a hat at `position` (m from the grid's lower corner) is something along an axis, in the block's tile, whose nodes are
+ * the lower corners of cells, and its parts there. What a face of the domain leaves without a cell goes to the one beside it. */
+QUERN_INLINE void stencil_cells(const quern_grid_view *g, uint32_t block, int axis, quern_real position,
+	uint32_t to[2], quern_real part[2]) {
+	const int32_t begins = g->at[block][axis] * (int32_t)g->edge;
+	/* the tile begins a cell before the block, and middles lie half a cell above nodes */
+	const quern_real x = position / g->cell - begins + 0.5;
+	const int32_t below = x > 0 ? (int32_t)x : 0, cell = begins + below - 1;
+	to[0] = (uint32_t)(!g->periodic[axis] && cell < 0 ? below + 1 : below);
+	to[1] = (uint32_t)(!g->periodic[axis] && cell + 1 >= g->cells[axis] ? below : below + 1);
+	part[1] = x - below;
+	part[0] = 1 - part[1];
+}
+
 /* ---- rows in parts ---- */
 
 /* A row as the processor takes it in one go: a compiler that has to cut rows by itself passes each factor through memory, and waits for it. */

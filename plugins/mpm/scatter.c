@@ -70,23 +70,13 @@ QUERN_INLINE sent send_point(scatter_memory *m, uint32_t i, const int dim, const
 	return p;
 }
 
-/* Each point in parts to the cells whose centres are around it; their rows are those of the nodes at their lower corners. What a face of the
- * domain leaves without a cell goes to the one beside it. */
+/* Each point in parts to the cells whose middles are around it. */
 QUERN_INLINE void count_point(
 	const scatter_work *w, scatter_memory *m, uint32_t b, uint32_t i, quern_real mass, const int dim) {
 	const quern_grid_view *g = w->g;
 	uint32_t to[3][2];
 	quern_real part[3][2];
-	for (int k = 0; k < dim; k++) {
-		const int32_t begins = g->at[b][k] * (int32_t)g->edge;
-		/* the tile begins a cell before the block, and centres lie half a cell above nodes */
-		const quern_real x = m->stencil.position[k][i] / g->cell - begins + 0.5;
-		const int32_t below = x > 0 ? (int32_t)x : 0, cell = begins + below - 1;
-		to[k][0] = (uint32_t)(!g->periodic[k] && cell < 0 ? below + 1 : below);
-		to[k][1] = (uint32_t)(!g->periodic[k] && cell + 1 >= g->cells[k] ? below : below + 1);
-		part[k][1] = x - below;
-		part[k][0] = 1 - part[k][1];
-	}
+	for (int k = 0; k < dim; k++) stencil_cells(g, b, k, m->stencil.position[k][i], to[k], part[k]);
 	for (int corner = 0; corner < 1 << dim; corner++) {
 		uint32_t node = 0;
 		quern_real share = mass;

@@ -41,17 +41,12 @@ QUERN_INLINE void spread_send(const gather_work *w, quern_row *tile, uint32_t b,
 	uint32_t own[3] = { 0 }, to[3][2];
 	quern_real off[3], part[3][2];
 	for (int k = 0; k < dim; k++) {
-		const int32_t begins = g->at[b][k] * (int32_t)g->edge;
 		/* the tile begins a cell before the block */
-		const quern_real t = place[k] / g->cell - begins + 1, x = t - 0.5;
-		const int32_t here = t > 0 ? (int32_t)t : 0, below = x > 0 ? (int32_t)x : 0,
-					  cell = begins + below - 1;
+		const quern_real t = place[k] / g->cell - g->at[b][k] * (int32_t)g->edge + 1;
+		const int32_t here = t > 0 ? (int32_t)t : 0;
 		own[k] = (uint32_t)here;
 		off[k] = t - here - 0.5;
-		to[k][0] = (uint32_t)(!g->periodic[k] && cell < 0 ? below + 1 : below);
-		to[k][1] = (uint32_t)(!g->periodic[k] && cell + 1 >= g->cells[k] ? below : below + 1);
-		part[k][1] = x - below;
-		part[k][0] = 1 - part[k][1];
+		stencil_cells(g, b, k, place[k], to[k], part[k]);
 	}
 	for (int k = 0; k < dim; k++)
 		for (int corner = 0; corner < 1 << (dim - 1); corner++) {

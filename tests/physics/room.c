@@ -323,18 +323,24 @@ static double rows_off(quern_run *run, const chute *c, double from, double until
 	return sqrt(wrong / whole);
 }
 
+/* With points that are spread and with those that are not. */
+static void look_at_both(const chute *c, double (*look)(quern_run *, const chute *, double, double),
+	double from, double until, double found[2]) {
+	for (int k = 0; k < 2; k++) {
+		quern_run *run = open_chute_with(c, k ? ", spread: 0" : "");
+		jitter(run);
+		found[k] = look(run, c, from, until);
+		harness_close(run);
+	}
+}
+
 /* A flow gathers points in layers a cell apart, where pressure and friction are off. */
 static void bagnold_lasts(void **unused) {
 	(void)unused;
 	const chute c = { 20, 4, 20, mu_i, "sticky", "{picflip: {rate: 0}}" };
 	double found[2];
 	table_head("from rest, 20 cells deep, FLIP, ten seconds later: velocity by row, off");
-	for (int k = 0; k < 2; k++) {
-		quern_run *run = open_chute_with(&c, k ? ", spread: 0" : "");
-		jitter(run);
-		found[k] = rows_off(run, &c, 10, 14);
-		harness_close(run);
-	}
+	look_at_both(&c, rows_off, 10, 14, found);
 	const bool good = table_row("spread", found[0], 0, 0.02);
 	table_note("not spread", found[1]);
 	assert_true(good && found[1] > 0.03);
@@ -350,12 +356,7 @@ static void flow_does_not_swell(void **unused) {
 	const double pressed = 1 - 2.0 / 3 * packed * gravity * cos(c.angle * degree) * c.cells * cell / 3e5;
 	double found[2];
 	table_head("from rest, 20 cells deep, stiffer, apic: height of its middle after 4 to 6 s");
-	for (int k = 0; k < 2; k++) {
-		quern_run *run = open_chute_with(&c, k ? ", spread: 0" : "");
-		jitter(run);
-		found[k] = height(run, &c, 4, 6);
-		harness_close(run);
-	}
+	look_at_both(&c, height, 4, 6, found);
 	const bool good = table_row("spread", found[0], pressed, 0.003);
 	table_note("not spread", found[1]);
 	assert_true(good && found[1] > pressed + 0.01);
