@@ -343,6 +343,17 @@ static quern_scene *scene_of(const char *folder) {
 	return NULL;
 }
 
+/* Between sorts points may be beyond a periodic face, where a picture has no place. */
+static void come_back(const quern_general *g, render_cloud *cloud) {
+	for (int k = 0; k < g->dimension; k++) {
+		const double length = g->upper[k] - g->lower[k];
+		for (size_t i = 0; i < cloud->n && g->periodic[k]; i++) {
+			double *at = &cloud->position[i][k];
+			*at -= length * floor((*at - g->lower[k]) / length);
+		}
+	}
+}
+
 int quern_render_frame_read_file(
 	render_frame *f, const char *path, int64_t number, const render_wish *wish, quern_text *why) {
 	*f = (render_frame) { .number = number };
@@ -410,6 +421,7 @@ int quern_render_frame_read(
 	const int status = is_readable(path, wish, why) ? quern_render_frame_read_file(f, path, number, wish, why)
 													: QUERN_EXIT_SCENE;
 	if (status == QUERN_EXIT_DONE) f->scene = scene_of(folder);
+	if (f->scene) come_back(&f->scene->general, &f->points);
 	if (status == QUERN_EXIT_DONE) quern_render_links_mend(f);
 	free(path);
 	return status;

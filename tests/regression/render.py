@@ -89,6 +89,19 @@ def pictures(folder):
     assert bytes_of[0] == bytes_of[1], "two pictures of one frame differ"
     picture_of(folder / "h2", folder / "large.png", width=1000)
     lightness_rises(folder / "row")
+    comes_back(folder / "periodic")
+
+
+def comes_back(folder):
+    """A point beyond a periodic face is drawn where it comes in again: as in the picture of one that is there."""
+    pictures_of = []
+    for name, beyond in (("within", 0), ("beyond", 0.08)):
+        x = lattice(2, 12, 4e-3)
+        x[5, 0] += beyond  # the period of configs/chute.yaml
+        write_frame(folder / name, 2, "a point", {"points": {"position": ("m", x), "volume": ("m^2", np.full(len(x), 9e-6))}})
+        shutil.copy(SOURCE / "configs/chute.yaml", folder / name / "scene.yaml")
+        pictures_of.append(picture_of(folder / name, folder / f"{name}.png"))
+    assert (pictures_of[0] == pictures_of[1]).all(), "a point beyond a periodic face is drawn there"
 
 
 def cloud(n, value, far=None):
