@@ -52,8 +52,15 @@ static inline bool fit_has_moments(const quern_bound *shape, uint32_t dim) {
 	return fit_moment(s.first[0][0] - 2, s.value[0][0][0], s.value[0][1][0], s.value[0][2][0]) >= fit_least;
 }
 
-/* D here over D there. */
-QUERN_INLINE void fit_shift(uint32_t n, const int dim, quern_real inverse_cell, fit_memory *f) {
+/* Whether a place, in cells from the grid's lower corner, is in the cell beside a wall of the domain. */
+QUERN_INLINE bool fit_beside(const quern_grid_view *g, int axis, quern_real place) {
+	return !g->periodic[axis] && ((place < 1) | (place > (quern_real)g->cells[axis] - 1));
+}
+
+/* D here over D there. Beside a wall, whose node turns with nobody, D vanishes towards it: a slope that grew by as much would take the point there ever
+ * faster, and one that stayed would take another away from there ever faster. */
+QUERN_INLINE void fit_shift(const quern_grid_view *g, uint32_t n, const int dim, fit_memory *f) {
+	const quern_real inverse_cell = 1 / g->cell;
 	for (int a = 0; a < dim; a++) {
 		const stencil *s = &f->there;
 		const int32_t *restrict first = s->first[a];
@@ -63,9 +70,26 @@ QUERN_INLINE void fit_shift(uint32_t n, const int dim, quern_real inverse_cell, 
 		quern_real *restrict shift = f->shift[a];
 		QUERN_SIMD
 		for (uint32_t i = 0; i < n; i++) {
-			const quern_real way = first[i] - x[i] * inverse_cell,
-							 there = fit_moment(way, w0[i], w1[i], w2[i]);
-			shift[i] = here[i] / (there > fit_least ? there : fit_least);
+			const quern_real place = x[i] * inverse_cell,
+							 there = fit_moment(first[i] - place, w0[i], w1[i], w2[i]);
+			const quern_real ratio = here[i] / (there > fit_least ? there : fit_least);
+			shift[i] = (fit_beside(g, a, place) & (ratio > 1)) ? 1 : ratio;
 		}
 	}
+}
+
+/* Of a point that was to go to `there` along an axis and stays at `here` (m from the grid's lower corner): by what its slope changes. */
+static inline quern_real fit_held(const quern_grid_view *g, const quern_bound *shape, int axis,
+	quern_real there, quern_real here, stencil *s) {
+	quern_real moment[2] = { 0 };
+	if (fit_beside(g, axis, there / g->cell)) return 1;
+	for (uint32_t a = 0; a < g->dim; a++) s->position[a][0] = s->position[a][1] = here;
+	s->position[axis][0] = there;
+	stencil_weigh(g, shape, EVERYWHERE, 2, s);
+	for (int i = 0; i < 2; i++) {
+		const quern_real way = s->first[axis][i] - s->position[axis][i] / g->cell;
+		moment[i] = fmax(
+			fit_least, fit_moment(way, s->value[axis][0][i], s->value[axis][1][i], s->value[axis][2][i]));
+	}
+	return fmin(1, moment[0] / moment[1]);
 }

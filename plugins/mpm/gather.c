@@ -72,7 +72,7 @@ QUERN_INLINE void fit_chunk(const gather_work *w, gather_memory *m, uint32_t n, 
 	}
 	if (w->p->moments) {
 		look_ahead(w, m, n);
-		fit_shift(n, dim, inverse, &m->fit);
+		fit_shift(w->g, n, dim, &m->fit);
 	} else
 		for (int a = 0; a < dim; a++)
 			for (uint32_t i = 0; i < n; i++) m->fit.shift[a][i] = 1;

@@ -2,7 +2,7 @@
 /* hold - points do not go into bodies. Shape functions are folded at faces of the domain alone: near a body the nodes that
  * are free carry points on, by a part of a cell into a floor whose nodes stand still, farther where an edge lies between
  * nodes. docs/theory/mpm.md, section 3 */
-#include "../common/stencil.h"
+#include "../common/fit.h"
 #include "mpm.h"
 #include <math.h>
 
@@ -11,6 +11,7 @@ typedef struct {
 	const quern_grid_view *g;
 	const uint32_t *point;
 	const body_pose *pose; /* by body */
+	bool slopes;           /* points send one that keeps its moment on the way that they were to go */
 	bool *holds;
 	int32_t *left; /* by block: whether a point has left the tile */
 } hold_work;
@@ -18,6 +19,7 @@ typedef struct {
 typedef struct {
 	_Alignas(64) quern_real position[3][STENCIL], own[3][STENCIL], radius[STENCIL], gap[STENCIL],
 		normal[3][STENCIL], velocity[3][STENCIL];
+	stencil stencil;
 } held_points;
 
 /* Bodies that stand still, within the domain. One that moves meets points with its nodes, and may pass some. */
@@ -64,6 +66,13 @@ static void find_gaps(const hold_work *w, uint32_t j, uint32_t begin, uint32_t n
 	((const quern_body_ops *)body->ops)->closest(body->self, &batch);
 }
 
+static void keep_slope(const hold_work *w, uint32_t k, uint32_t i, quern_real there, held_points *m) {
+	const quern_real lower = w->g->lower[k];
+	const quern_real by = fit_held(w->g, &w->s->slot[SLOT_SHAPE][0], (int)k, there - lower,
+		w->s->use[HOLD_POSITION].real[k][i] - lower, &m->stencil);
+	for (uint32_t a = 0; a < w->s->dim; a++) w->s->use[HOLD_AFFINE].real[w->s->dim * a + k][i] *= by;
+}
+
 /* Back to the surface, if that is across an axis. On others, which the grid sees in steps, points may well lie behind; and
  * what is deeper than a cell is there because the body was set upon it. */
 static void hold_chunk(
@@ -75,6 +84,7 @@ static void hold_chunk(
 		for (uint32_t k = 0; k < w->s->dim; k++) {
 			if (fabs(m->normal[k][i]) < 1) continue;
 			x[k][begin + i] += m->normal[k][i] * (1e-9 * w->g->cell - m->gap[i]);
+			if (w->slopes) keep_slope(w, k, begin + i, m->position[k][i], m);
 			if (!stencil_holds(w->g, b, k, x[k][begin + i])) w->left[b] = 1;
 		}
 	}
@@ -95,8 +105,8 @@ static void hold_block(void *arg, uint32_t b, uint32_t worker) {
 quern_status quern_mpm_hold(const void *self, const quern_step *s) {
 	const quern_set_view points = s->host->set(s->run, "point");
 	hold_work w = { .s = s, .g = s->host->grid(s->run), .point = points.block };
-	(void)self;
 	if (!points.n) return QUERN_OK;
+	w.slopes = ((const mpm *)self)->moments && s->use[HOLD_AFFINE].real[0];
 	w.pose = quern_body_poses_now(s, SLOT_BODIES);
 	w.left = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.holds = s->host->memory(s->run, (s->n_slot[SLOT_BODIES] + (size_t)1) * sizeof(bool));
