@@ -364,7 +364,9 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	w.answers = p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
 	w.counts = p->alone && s->use[GATHER_UNCOUNTED].index[0] == 1;
 	w.still = p->alone ? flowing_alone * p->rest_alone : flowing * p->rest_rate;
-	w.spreads = w.counts && p->spread > 0 && w.still > 0;
+	/* a hybrid counts its cells itself, in every update */
+	w.spreads = (w.counts || (w.answers && (s->step - s->stage_step) % COUNT_EVERY == 0)) && p->spread > 0 &&
+				w.still > 0;
 	if (w.spreads && !spread_measure(&w)) return QUERN_E_MEMORY;
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };

@@ -27,6 +27,7 @@ typedef struct mpm {
 	quern_real follow;         /* of density, to the cell's: a rate over the shear rate */
 	bool alone;                /* density follows without a hybrid: cells are counted here */
 	quern_real spread;         /* of points over their cells: a rate over the shear rate */
+	quern_real bears;          /* Pa, from where on they are: the weight of half a cell */
 	quern_real rest, diameter, rest_rate; /* shear rate of what is at rest: over sqrt(g/D), 1/s */
 	quern_real rest_alone;                /* 1/s: the same of a continuum alone, from sqrt(g/h) */
 	quern_real share_wall, share_next;    /* of a wall's nodes */

@@ -66,8 +66,7 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		"Count what cells hold; set by itself where density follows without a hybrid.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, spread, "1",
-		"In a continuum alone, where density follows: rate over the shear rate at which points are spread over their cells; 0: they are "
-		"not.",
+		"Where density follows: rate over the shear rate at which points are spread over their cells; 0: they are not.",
 		.def = 3, .max = 1e3, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, rest, "1",
 		"In a hybrid, shear rate over sqrt(g/D) below which material is at rest and motion below the grid is stopped, of "
@@ -408,6 +407,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->damped = p->damped || p->damping > 0;
 	const quern_material_ops *ops = material->ops;
 	ops->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
+	p->bears = 0.5 * p->density * quern_gravity_size(setup->dim, setup->gravity) * p->cell;
 	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
 	p->alone =
 		ops->friction && (p->follow > 0 || p->alone) && p->rest > 0 && !setup->host->keeps(setup, "hybrid");
@@ -479,7 +479,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum"
 	.limit = limit, .account = account, .cell = cell, .accept = accept, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 6,
+	.revision = 7,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.mpm",
 	.brief = "The continuum: material points on a sparse grid.",

@@ -102,8 +102,8 @@ QUERN_INLINE void spread_chunk(
 		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim), full = m->held[c] * volume;
 		const quern_real part =
 			w->p->spread * time * flowing_share(w->still, rate2) * sheared_rate(m, i, rate2, dim);
-		if (!m->inside[c] || !(m->level[c] > 0) || !(m->level[c] < waves * w->p->bulk) || !(full > 0) ||
-			!(part > 0) || !spread_within(w, b, m->trip.stencil.position, i, dim))
+		if (!m->inside[c] || !(m->level[c] > w->p->bears) || !(m->level[c] < waves * w->p->bulk) ||
+			!(full > 0) || !(part > 0) || !spread_within(w, b, m->trip.stencil.position, i, dim))
 			continue;
 		for (int k = 0; k < dim; k++) {
 			const quern_real off = spread_offset(w, b, k, m->trip.stencil.position[k][i]),

@@ -200,7 +200,7 @@ static void what_a_hybrid_makes(void **unused) {
 	table_head("a hybrid that flows");
 	table_note("J, given by gravity", work);
 	table_note("J, of motion", kinetic);
-	const double little = shake(run, 2e-4);
+	const double little = shake(run, 3e-4);
 	table_note("J, made: runs on", little);
 	harness_steps(run, 1);
 	const double much = shake(run, 1e-3);

@@ -107,9 +107,10 @@ def block(scene, x, y):
 
 def fall(scene, place):
     """In free fall there is no pressure: what is continuum stays so, but for cells that the block has just come into. Single points that are
-    as dense as at rest press for a moment, and may turn a part of the block: how it lies in the cells decides, so the middle of six counts."""
+    as dense as at rest press for a moment, and may turn a part of the block: how it lies in the cells decides, so the middle of 24 counts."""
     mean = []
-    for x, y in ((0, 0), (1e-3, 0), (0, 1e-3), (0, 2e-3), (1e-3, 1e-3), (1e-3, 3e-3)):
+    for k in range(24):
+        x, y = 0.7e-3 * (k // 4), 1e-3 * (k % 4)
         block(scene, x, y)
         lab.run(scene, place / f"fall_{x:g}_{y:g}")
         mean.append(numpy.mean([value for time, value in shares(place / f"fall_{x:g}_{y:g}") if time > 0]))
