@@ -94,29 +94,40 @@ static double weight_of(const quern_check_kernel *k, uint32_t i, int32_t node, d
 	return quern_check_found(k, VALUE, (uint32_t)(node - first))[i];
 }
 
+/* Nodes from a wall on, and places from which on their functions are summed up, in cells. */
+enum { NEAR = 4, CUTS = 17 };
+/* The whole of a function is its integral; parts may be those of boxes that points stand for. */
+static const double most_of_boxes = 0.05;
+static double cut_at(int cut) { return 0.25 * (cut - CUTS / 2); }
+
 /* Integrals over the nodes at a wall, and slopes as the mean of derivatives: both by walking from node to node. */
 static void check_walk(const quern_check *c, const quern_check_instance *it, tallies *t) {
 	enum { STEPS = 6000 };
 	quern_check_kernel *k = make(c, it, 1, STEPS);
 	const quern_shape_ops *ops = c->ops;
-	double sum[2] = { 0 }, before[CELLS + 1], share[2], slope;
+	double above[NEAR][CUTS] = { { 0 } }, before[CELLS + 1], slope;
 	for (uint32_t i = 0; i < STEPS; i++)
 		quern_check_given(k, POSITION, 0)[i] = (i + 0.5) * CELLS * cell / STEPS;
 	c->host->run(k, 512, false);
 	for (uint32_t i = 0; i < STEPS; i++)
 		for (int32_t node = 0; node <= CELLS; node++) {
 			const double v = weight_of(k, i, node, &slope), way = CELLS * cell / STEPS;
-			if (node < 2) sum[node] += v * CELLS / STEPS;
+			for (int cut = 0; cut < CUTS && node < NEAR; cut++)
+				if ((i + 0.5) * CELLS / STEPS - node > cut_at(cut)) above[node][cut] += v * CELLS / STEPS;
 			if (i) /* a jump shows as a change that no slope within reach explains */
 				c->host->measure(&t->smooth, fabs(v - before[node]), 2.5 * way / cell,
 					"%u-D: the weight of node %d jumps by %.3g at x = %.6g cells", it->dim, node,
 					v - before[node], (double)i * CELLS / STEPS);
 			before[node] = v;
 		}
-	ops->shares(it->self, &share[0], &share[1]);
-	for (int i = 0; i < 2; i++)
-		c->host->measure(&t->shares, fabs(sum[i] - share[i]), 1e-4,
-			"%u-D: shares() says %.6g of a cell, the integral %.6g", it->dim, share[i], sum[i]);
+	for (int node = 0; node < NEAR; node++)
+		for (int cut = 0; cut < CUTS; cut++) {
+			const double share = ops->beyond(it->self, node, cut_at(cut)),
+						 allowed = cut ? most_of_boxes : 1e-4;
+			c->host->measure(&t->shares, fabs(above[node][cut] - share), allowed,
+				"%u-D: %d cells above a wall beyond() says %.6g from %.2f cells on, the integral %.6g",
+				it->dim, node, share, cut_at(cut), above[node][cut]);
+		}
 	c->host->expect(&t->shares, ops->stiffness(it->self) > 0 && isfinite(ops->stiffness(it->self)),
 		"stiffness is %.3g", ops->stiffness(it->self));
 	c->host->kernel_destroy(k);

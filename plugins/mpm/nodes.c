@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* nodes - the grid between scatter and gather: velocities from momenta and forces, and what bodies do to them */
 #include "../bodies/books.h"
+#include "cut_hat.h"
 #include "mpm.h"
 #include <math.h>
 #include <quern/vec.h>
@@ -22,8 +23,8 @@ typedef struct {
 
 typedef struct {
 	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
+	int32_t faced[SURFACES][N]; /* cells to the face of the domain that a surface is, or many */
 	quern_real room[SURFACES][N],
-		more[SURFACES][N],      /* than a hat's part: what shape functions of this size have before a face */
 		facing[SURFACES][3][N]; /* what faces and bodies leave of a node, and which way they face */
 	uint32_t surfaces[N];
 	quern_real counted[N]; /* what bodies leave of the hat around the cell above the node */
@@ -33,11 +34,21 @@ static int32_t cells_to_face(const quern_grid_view *g, const int32_t at[3], uint
 	return at[k] < g->cells[k] - at[k] ? at[k] : g->cells[k] - at[k];
 }
 
+/* Of a node's volume the part before a surface in the distance `gap`; where a face of the domain, `away` cells off, is behind. */
+static quern_real share_before(const grid_work *w, int32_t away, quern_real gap) {
+	const quern_bound *shape = &w->s->slot[SLOT_SHAPE][0];
+	return ((const quern_shape_ops *)shape->ops)->beyond(shape->self, away, -gap / w->g->cell);
+}
+
 /* Volume of a node over that of one inside: less at and next to a face. */
+enum { MANY = 9 };
 static quern_real share_along(const grid_work *w, const int32_t at[3], uint32_t k) {
 	const int32_t away = cells_to_face(w->g, at, k);
-	return w->g->periodic[k] || away > 1 ? 1 : away == 1 ? w->p->share_next : w->p->share_wall;
+	return w->g->periodic[k] || away > 1 ? 1 : share_before(w, away, away * w->g->cell);
 }
+
+/* Cells that a node's function may reach. */
+static const quern_real widest = 1.5;
 
 static uint32_t axis_nearest(const near_nodes *n, uint32_t i, uint32_t dim) {
 	uint32_t axis = 0;
@@ -145,8 +156,8 @@ static bool body_is_far(const quern_bound *body, const near_nodes *n, quern_body
 		batch.normal[k] = one.normal[k];
 		batch.velocity[k] = one.velocity[k];
 	}
-	/* sqrt(3)/2 and a little, and the cell in which a body takes room */
-	const quern_real reach = 0.9 * extent + cell + ((const body_item *)body->item)->displacement;
+	/* sqrt(3)/2 and a little, and the cells in which a body takes room */
+	const quern_real reach = 0.9 * extent + widest * cell + ((const body_item *)body->item)->displacement;
 	for (uint32_t i = 0; i < QUERN_LANES; i++) one.radius[i] = reach;
 	batch.n = 1;
 	batch.cap = QUERN_LANES;
@@ -160,12 +171,6 @@ static void bring_nodes(const body_pose *pose, uint32_t dim, near_nodes *n) {
 	quern_motion_bring_all(pose, dim, N,
 		(const quern_real *const[3]) { n->position[0], n->position[1], n->position[2] },
 		(quern_real *const[3]) { n->own[0], n->own[1], n->own[2] });
-}
-
-/* Of the hat around a node, the part on this side of a plane in the distance `gap`: exact across an axis, within 0.013 elsewhere. */
-static quern_real share_before(quern_real gap, quern_real cell) {
-	const quern_real t = fmin(fabs(gap) / cell, 1), beyond = 0.5 * (1 - t) * (1 - t);
-	return gap > 0 ? 1 - beyond : beyond;
 }
 
 /* A plane on a face of the domain is that face. */
@@ -186,7 +191,7 @@ static void begin_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n
 		if (!(share < 1)) continue;
 		const uint32_t q = n->surfaces[i]++;
 		n->room[q][i] = share;
-		n->more[q][i] = share - (cells_to_face(w->g, at, k) ? 1 : 0.5);
+		n->faced[q][i] = cells_to_face(w->g, at, k);
 		for (uint32_t m = 0; m < w->g->dim; m++) n->facing[q][m][i] = 0;
 		n->facing[q][k][i] = at[k] < w->g->cells[k] - at[k] ? 1 : -1;
 	}
@@ -197,16 +202,16 @@ static const quern_real alike = 0.7;
 
 /* Surfaces that face the same way are one, of which the nearest counts; two that face each other both take; what stands across multiplies. */
 static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
-	const quern_real share = share_before(n->gap[i], w->g->cell);
+	const quern_real gap = n->gap[i], share = share_before(w, MANY, gap);
 	uint32_t q = 0;
-	if (w->again || !(n->gap[i] < w->g->cell) || is_face(w, n, b, i)) return;
+	if (w->again || !(share < 1) || is_face(w, n, b, i)) return;
 	if (!n->surfaces[i]) begin_room(w, b, i, n);
 	for (; q < n->surfaces[i]; q++) {
 		quern_real along = 0;
 		for (uint32_t k = 0; k < w->g->dim; k++) along += n->facing[q][k][i] * n->normal[k][i];
 		if (fabs(along) < alike) continue;
-		n->room[q][i] =
-			along > 0 ? fmin(n->room[q][i], share + n->more[q][i]) : fmax(0, n->room[q][i] + share - 1);
+		n->room[q][i] = along > 0 ? fmin(n->room[q][i], share_before(w, n->faced[q][i], gap))
+								  : fmax(0, n->room[q][i] + share - 1);
 		return;
 	}
 	if (q == SURFACES) {
@@ -215,7 +220,7 @@ static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n)
 	}
 	n->surfaces[i] = q + 1;
 	n->room[q][i] = share;
-	n->more[q][i] = 0;
+	n->faced[q][i] = MANY;
 	for (uint32_t k = 0; k < w->g->dim; k++) n->facing[q][k][i] = n->normal[k][i];
 }
 
@@ -231,7 +236,7 @@ static void take_count(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n
 	quern_grid_cell_of(w->g, b * N + i, at);
 	const bool folded = !w->g->periodic[k] && fabs(n->normal[k][i]) > alike &&
 						at[k] == (n->normal[k][i] > 0 ? 0 : w->g->cells[k] - 1);
-	if (folded) n->counted[i] *= gap > 0 ? fmin(1, 0.5 + gap / cell) : share_before(gap, cell);
+	if (folded) n->counted[i] *= gap > 0 ? fmin(1, 0.5 + gap / cell) : cut_hat_beyond(-gap / cell);
 }
 
 /* A node to which bodies leave hardly any room does not say how full that is; its density is marked by a sign, and its size is that of a node

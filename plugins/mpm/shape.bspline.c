@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* shape.bspline - the quadratic B-spline: a hat averaged over a whole cell. At walls the nodes outside are folded back, which
  * leaves the hat and keeps completeness. docs/theory/mpm.md, section 2 */
+#include "cut_hat.h"
 #include <quern/math.h>
 #include <quern/shape.h>
 
@@ -44,11 +45,9 @@ static void weights(const void *self, const quern_shape_batch *b) {
 	}
 }
 
-/* The integrals of the folded functions: h/2 + h/24 on the wall, h - h/24 next to it. */
-static void shares(const void *self, quern_real *wall, quern_real *next) {
+static quern_real beyond(const void *self, int32_t to_wall, quern_real from) {
 	(void)self;
-	*wall = 0.5 + 1.0 / 24;
-	*next = 1 - 1.0 / 24;
+	return to_wall > 1 ? cut_hat_averaged(0.5, from) : cut_hat_folded(0.5, to_wall, from);
 }
 
 /* chi h^2 of omega^2 = chi max(d K, 2 G)/rho, for any arrangement of points: docs/theory/mpm.md, section 5 */
@@ -58,10 +57,10 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
+	.size = sizeof ops, .weights = weights, .beyond = beyond, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.bspline",
 	.brief = "Quadratic B-splines, folded at walls.",

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* shape.gimp - uniform generalised interpolation: hats averaged over a particle of half-width l. At walls the nodes
  * outside are folded back, which leaves the hat and keeps completeness. docs/theory/mpm.md, section 2 */
+#include "cut_hat.h"
 #include <quern/math.h>
 #include <quern/shape.h>
 
@@ -56,11 +57,10 @@ static void weights(const void *self, const quern_shape_batch *b) {
 		else weights_along(l, b, a, false);
 }
 
-/* The integrals of the folded functions: h/2 + l^2/(6h) on the wall, h - l^2/(6h) next to it. */
-static void shares(const void *self, quern_real *wall, quern_real *next) {
-	const quern_real l = ((const gimp *)self)->half_width;
-	*wall = 0.5 + l * l / 6;
-	*next = 1 - l * l / 6;
+/* Points stand for boxes: where those fill a region the sum over them is the integral of the hat over it. */
+static quern_real beyond(const void *self, int32_t to_wall, quern_real from) {
+	return to_wall > 1 ? cut_hat_beyond(from)
+					   : cut_hat_folded(((const gimp *)self)->half_width, to_wall, from);
 }
 
 /* chi h^2 of omega^2 = chi max(d K, 2 G)/rho, for any arrangement of points: docs/theory/mpm.md, section 5 */
@@ -70,10 +70,10 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
+	.size = sizeof ops, .weights = weights, .beyond = beyond, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.gimp",
 	.brief = "Generalised interpolation (uGIMP), folded at walls.",

@@ -411,7 +411,6 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
 	p->alone =
 		ops->friction && (p->follow > 0 || p->alone) && p->rest > 0 && !setup->host->keeps(setup, "hybrid");
-	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)
 		return QUERN_E_PARAM;
