@@ -250,6 +250,7 @@ QUERN_INLINE void gather_block(
 	if (last) speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
 	if (last && (w->answers || w->counts)) level_block(w, m, b, dim);
+	if (last && w->spreads) spread_find_cut(w, m, b);
 	if (last && w->strain->means) strain_block(w, m, b, dim);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
@@ -362,11 +363,10 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	w.moved = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.full = s->use[GATHER_FULL].real[0] ? dead_band * s->use[GATHER_FULL].real[0][0] : 0;
 	w.answers = p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
-	w.counts = p->alone && s->use[GATHER_UNCOUNTED].index[0] == 1;
+	const bool due = p->counted && s->use[GATHER_UNCOUNTED].index[0] == 1;
+	w.counts = due && p->alone;
 	w.still = p->alone ? flowing_alone * p->rest_alone : flowing * p->rest_rate;
-	/* a hybrid counts its cells itself, in every update */
-	w.spreads = (w.counts || (w.answers && (s->step - s->stage_step) % COUNT_EVERY == 0)) && p->spread > 0 &&
-				w.still > 0;
+	w.spreads = due && (p->alone || w.answers) && p->spread > 0 && w.still > 0;
 	if (w.spreads && !spread_measure(&w)) return QUERN_E_MEMORY;
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };

@@ -16,10 +16,11 @@ typedef struct gather_work {
 	const quern_row *motion;
 	trips trips;
 	calm calm;
-	bool answers;      /* volume does, to how full cells are */
-	bool counts;       /* the same of a continuum alone, in this step */
-	bool spreads;      /* points are, in this step */
-	quern_row *moment; /* by cell, where they are: spread.h */
+	bool answers;          /* volume does, to how full cells are */
+	bool counts;           /* the same of a continuum alone, in this step */
+	bool spreads;          /* points are, in this step */
+	quern_row *moment;     /* by cell, where they are: spread.h */
+	const body_pose *pose; /* by body, for that */
 	const quern_strain_ops *strain;
 	quern_real full;      /* from there on a cell is crowded */
 	quern_real still;     /* 1/s: sheared much faster, material flows */
@@ -39,6 +40,9 @@ typedef struct gather_memory {
 	/* a continuum alone: by what share a cell holds more than its points know, and the mean of that around it */
 	quern_real excess[QUERN_BLOCK_CELLS], excess_around[QUERN_BLOCK_CELLS];
 	bool inside[QUERN_BLOCK_CELLS]; /* away from surfaces and bodies */
+	quern_real cut
+		[3]
+		[QUERN_BLOCK_CELLS]; /* of a cell that a body cuts: how far its points' mean has to be off its middle, in cells and whole cells */
 	/* of what a strain measures: at points, and by cell the mean over what bears, and the volume of that; the gradient as nodes say it */
 	_Alignas(64) quern_real measured[QUERN_STRAIN_MOST][STENCIL], raw[9][STENCIL];
 	quern_real strained[QUERN_STRAIN_MOST][QUERN_BLOCK_CELLS], bearing[QUERN_BLOCK_CELLS];

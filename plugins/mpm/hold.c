@@ -11,7 +11,7 @@ typedef struct {
 	const quern_grid_view *g;
 	const uint32_t *point;
 	const body_pose *pose; /* by body */
-	bool slopes;           /* points send one that keeps its moment on the way that they were to go */
+	bool slopes;           /* points send one that may have grown on the way that they were to go */
 	bool *holds;
 	int32_t *left; /* by block: whether a point has left the tile */
 } hold_work;

@@ -8,8 +8,8 @@
 #define UNSORTED_USE \
 	"total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: points must be sorted before the next scatter."
 #define UNCOUNTED_USE(ACCESS) \
-	"total.uncounted", "1", ACCESS, QUERN_INDEX, .when = "alone", \
-	.doc = "1: what cells hold was counted in this step; counts up to the next time."
+	"total.uncounted", "1", ACCESS, QUERN_INDEX, .when = "counted", \
+	.doc = "1: what cells hold was counted in this step, and points are spread; counts up to the next time."
 #define IMPULSE_USE "body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL
 #define TWIST_USE "body.twist", "N m s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL
 #define WORK_USE "body.work", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL
@@ -93,7 +93,7 @@ QUERN_USE_ENUM(WATCH_USES);
 #define HOLD_USES(X) \
 	X(HOLD_POSITION, "point.position", "m", QUERN_UPDATE, QUERN_VECTOR) \
 	X(HOLD_UNSORTED, UNSORTED_USE) \
-	X(HOLD_AFFINE, "point.affine", "1/s", QUERN_UPDATE, QUERN_TENSOR, .flags = QUERN_OPTIONAL)
+	X(HOLD_AFFINE, "point.affine", "1/s", QUERN_UPDATE, QUERN_TENSOR, .flags = QUERN_OPTIONAL, .with = "point.affine")
 QUERN_USE_ENUM(HOLD_USES);
 
 #define SORT_USES(X) \

@@ -130,11 +130,13 @@ quern_status quern_mpm_scatter(const void *self, const quern_step *s) {
 		.node = (quern_row *)(void *)s->use[SCATTER_NODE_MASS].real[0] };
 	for (uint32_t k = SCATTER_POSITION; k <= SCATTER_AFFINE; k++) ahead_add(&w.ahead, &s->use[k]);
 	ahead_end(&w.ahead, points.n);
-	if (((const mpm *)self)->alone) {
+	const mpm *p = self;
+	if (p->counted) {
 		int32_t *uncounted = s->use[SCATTER_UNCOUNTED].index;
 		/* a stage of the scene begins as a scene that starts from the state before it would */
-		w.counts = s->step == s->stage_step || *uncounted % COUNT_EVERY == 0;
-		*uncounted = w.counts ? 1 : *uncounted + 1;
+		const bool due = s->step == s->stage_step || *uncounted % COUNT_EVERY == 0;
+		*uncounted = due ? 1 : *uncounted + 1;
+		w.counts = due && p->alone;
 	}
 	if (points.n) stencil_by_colour(s, w.g, scatter_one, &w);
 	return QUERN_OK;

@@ -65,6 +65,8 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, alone, NULL,
 		"Count what cells hold; set by itself where density follows without a hybrid.",
 		.flags = QUERN_ADVANCED),
+	QUERN_PARAM(mpm, counted, NULL,
+		"Do something in every so many steps; set by itself where density follows.", .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, spread, "1",
 		"Where density follows: rate over the shear rate at which points are spread over their cells; 0: they are not.",
 		.def = 3, .max = 1e3, .flags = QUERN_ADVANCED),
@@ -409,8 +411,9 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	ops->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
 	p->bears = 0.5 * p->density * quern_gravity_size(setup->dim, setup->gravity) * p->cell;
 	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
-	p->alone =
-		ops->friction && (p->follow > 0 || p->alone) && p->rest > 0 && !setup->host->keeps(setup, "hybrid");
+	const bool follows = ops->friction && p->rest > 0;
+	p->alone = follows && (p->follow > 0 || p->alone) && !setup->host->keeps(setup, "hybrid");
+	p->counted = p->alone || (follows && p->follow > 0 && p->spread > 0);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)
 		return QUERN_E_PARAM;

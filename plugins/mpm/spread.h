@@ -12,7 +12,7 @@ static const quern_real pressed_off = 0.02;
 static const quern_real most_pull = 0.2;
 
 /* How far along an axis a point (m from the grid's lower corner) is from the middle of its cell, in cells. Between sorts one may be beyond its
- * block's cells, and is in none of them: more than half. Beyond the end of a period narrower than a block the last cell stands for the first. */
+ * block's cells, and is in none of them: more than half. Beyond the end of a period narrower than a block, in a continuum alone, the last cell stands for the first. */
 QUERN_INLINE quern_real spread_offset(const gather_work *w, uint32_t b, int axis, quern_real position) {
 	const int32_t begin = w->g->at[b][axis] * (int32_t)w->g->edge;
 	const quern_real t = position / w->g->cell - begin, most = (quern_real)w->g->edge;
@@ -86,15 +86,60 @@ static bool spread_measure(gather_work *w) {
 	w->moment = w->s->host->memory(w->s->run, size);
 	if (!w->moment) return false;
 	memset(w->moment, 0, size);
+	w->pose = quern_body_poses_now(w->s, SLOT_BODIES);
+	if (!w->pose) return false;
 	stencil_by_colour(w->s, w->g, spread_scatter, w);
 	return true;
 }
 
-/* Means go to the middle of the cell and mean squares to those of the start, by a part for each unit of shear. Nothing is moved across a face, and
+static quern_real spread_gap(
+	const gather_work *w, uint32_t j, const quern_real x[3], quern_real beyond, quern_real normal[3]) {
+	const quern_bound *body = &w->s->slot[SLOT_BODIES][j];
+	const quern_real displacement = ((const body_item *)body->item)->displacement;
+	return quern_body_gap(body, &w->pose[j], w->s->dim, x, displacement + beyond, normal);
+}
+
+/* Points of a cell that a body cuts across an axis are off its middle, and have to be; where it cuts along no axis they are left alone. */
+static void spread_cut_cell(
+	const gather_work *w, gather_memory *m, uint32_t c, quern_real gap, const quern_real normal[3]) {
+	const quern_real cut = 0.5 - gap / w->g->cell;
+	bool across = false;
+	if (!(cut > 1e-6)) return;
+	for (uint32_t k = 0; k < w->s->dim; k++) {
+		if (fabs(normal[k]) < 1 - 1e-9) continue;
+		m->cut[k][c] += normal[k] * 0.5 * cut * (1 - cut);
+		across = true;
+	}
+	m->inside[c] = m->inside[c] && across && cut < 1;
+}
+
+static void spread_find_cut(const gather_work *w, gather_memory *m, uint32_t b) {
+	const quern_grid_view *g = w->g;
+	memset(m->cut, 0, sizeof m->cut);
+	for (uint32_t j = 0; j < w->s->n_slot[SLOT_BODIES]; j++) {
+		const body_item *item = w->s->slot[SLOT_BODIES][j].item;
+		quern_real x[3] = { 0 }, normal[3];
+		if (!quern_body_is_there(&w->s->slot[SLOT_BODIES][j], w->s->settling) ||
+			(item->boundary == BOUNDARY_NONE && isnan(item->friction)))
+			continue;
+		quern_grid_corner(g, b * QUERN_BLOCK_CELLS, x);
+		for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * g->edge * g->cell;
+		if (spread_gap(w, j, x, 0.9 * g->edge * g->cell, normal) > 0) continue;
+		for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
+			quern_grid_corner(g, b * QUERN_BLOCK_CELLS + c, x);
+			for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * g->cell;
+			const quern_real gap = spread_gap(w, j, x, 0, normal);
+			spread_cut_cell(w, m, c, gap, normal);
+		}
+	}
+}
+
+/* Points of a hybrid's zone stay: grains lie between them. Means go to the middle of the cell and mean squares to those of the start, by a part for each unit of shear. Nothing is moved across a face, and
  * little along an axis along which the flow takes points through cells anyway. */
 QUERN_INLINE void spread_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
 	const quern_real time = w->s->dt * COUNT_EVERY, volume = quern_grid_cell_volume(w->g);
+	const quern_real *weight = w->s->use[GATHER_WEIGHT].real[0];
 	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t c = (uint32_t)m->cell[i];
@@ -103,11 +148,12 @@ QUERN_INLINE void spread_chunk(
 		const quern_real part =
 			w->p->spread * time * flowing_share(w->still, rate2) * sheared_rate(m, i, rate2, dim);
 		if (!m->inside[c] || !(m->level[c] > w->p->bears) || !(m->level[c] < waves * w->p->bulk) ||
-			!(full > 0) || !(part > 0) || !spread_within(w, b, m->trip.stencil.position, i, dim))
+			!(full > 0) || !(part > 0) || (weight && weight[begin + i] < 1) ||
+			!spread_within(w, b, m->trip.stencil.position, i, dim))
 			continue;
 		for (int k = 0; k < dim; k++) {
 			const quern_real off = spread_offset(w, b, k, m->trip.stencil.position[k][i]),
-							 mean = (*row)[2 * k] / full, wide = (*row)[2 * k + 1] / full,
+							 mean = (*row)[2 * k] / full - m->cut[k][c], wide = (*row)[2 * k + 1] / full,
 							 passes = m->trip.pic[k][i] / w->g->cell,
 							 share = part / (1 + part) * (rate2 / (rate2 + passes * passes)),
 							 pull = share * (spread_beyond(mean) + wide * off);
