@@ -23,16 +23,18 @@ typedef struct quern_shape_ops {
 	uint32_t size, pad;
 	void (*weights)(
 		const void *self, const quern_shape_batch *); /* [batch] completeness up to the walls, 1e-13 */
-	/* [step] of a node that stands `to_wall` cells above a wall (many: above none), the volume above the place that is `from` cells above the
-	 * node (negative: below it), over that of a node inside; nothing is below the wall */
-	quern_real (*beyond)(const void *self, int32_t to_wall, quern_real from);
+	/* [setup] the volume of a node on a wall and of the next one, over that of a node inside */
+	void (*shares)(const void *self, quern_real *wall, quern_real *next);
 	quern_real (*stiffness)(
 		const void *self); /* [setup] chi h^2 of the step limit, model of docs/theory/mpm.md */
+	/* [step] may be NULL, for that of hats: of a node that stands `to_wall` cells above a wall (many: above none), the volume above the place that is `from` cells above the
+	 * node (negative: below it), over that of a node inside; nothing is below the wall */
+	quern_real (*beyond)(const void *self, int32_t to_wall, quern_real from);
 } quern_shape_ops;
 
 QUERN_KIND(shape, quern_shape_ops, "Weights of grid nodes at a particle.",
-	QUERN_ONE(quern_shape_ops, weights), QUERN_ONE(quern_shape_ops, beyond),
-	QUERN_ONE(quern_shape_ops, stiffness));
+	QUERN_ONE(quern_shape_ops, weights), QUERN_ONE(quern_shape_ops, shares),
+	QUERN_ONE(quern_shape_ops, stiffness), QUERN_OPTIONALLY(quern_shape_ops, beyond));
 
 #ifdef __cplusplus
 }

@@ -105,7 +105,7 @@ static void check_walk(const quern_check *c, const quern_check_instance *it, tal
 	enum { STEPS = 6000 };
 	quern_check_kernel *k = make(c, it, 1, STEPS);
 	const quern_shape_ops *ops = c->ops;
-	double above[NEAR][CUTS] = { { 0 } }, before[CELLS + 1], slope;
+	double above[NEAR][CUTS] = { { 0 } }, before[CELLS + 1], share[2], slope;
 	for (uint32_t i = 0; i < STEPS; i++)
 		quern_check_given(k, POSITION, 0)[i] = (i + 0.5) * CELLS * cell / STEPS;
 	c->host->run(k, 512, false);
@@ -120,13 +120,17 @@ static void check_walk(const quern_check *c, const quern_check_instance *it, tal
 					v - before[node], (double)i * CELLS / STEPS);
 			before[node] = v;
 		}
-	for (int node = 0; node < NEAR; node++)
+	ops->shares(it->self, &share[0], &share[1]);
+	for (int node = 0; node < 2; node++)
+		c->host->measure(&t->shares, fabs(above[node][0] - share[node]), 1e-4,
+			"%u-D: shares() says %.6g of a cell, the integral %.6g", it->dim, share[node], above[node][0]);
+	for (int node = 0; node < NEAR && ops->beyond; node++)
 		for (int cut = 0; cut < CUTS; cut++) {
-			const double share = ops->beyond(it->self, node, cut_at(cut)),
+			const double part = ops->beyond(it->self, node, cut_at(cut)),
 						 allowed = cut ? most_of_boxes : 1e-4;
-			c->host->measure(&t->shares, fabs(above[node][cut] - share), allowed,
+			c->host->measure(&t->shares, fabs(above[node][cut] - part), allowed,
 				"%u-D: %d cells above a wall beyond() says %.6g from %.2f cells on, the integral %.6g",
-				it->dim, node, share, cut_at(cut), above[node][cut]);
+				it->dim, node, part, cut_at(cut), above[node][cut]);
 		}
 	c->host->expect(&t->shares, ops->stiffness(it->self) > 0 && isfinite(ops->stiffness(it->self)),
 		"stiffness is %.3g", ops->stiffness(it->self));

@@ -366,7 +366,7 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	const bool due = p->counted && s->use[GATHER_UNCOUNTED].index[0] == 1;
 	w.counts = due && p->alone;
 	w.still = p->alone ? flowing_alone * p->rest_alone : flowing * p->rest_rate;
-	w.spreads = due && (p->alone || w.answers) && p->spread > 0 && w.still > 0;
+	w.spreads = due && (p->alone || (w.answers && p->follow > 0)) && p->spread > 0 && w.still > 0;
 	if (w.spreads && !spread_measure(&w)) return QUERN_E_MEMORY;
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };

@@ -39,10 +39,8 @@ typedef struct gather_memory {
 		held[QUERN_BLOCK_CELLS], mean[QUERN_BLOCK_CELLS];
 	/* a continuum alone: by what share a cell holds more than its points know, and the mean of that around it */
 	quern_real excess[QUERN_BLOCK_CELLS], excess_around[QUERN_BLOCK_CELLS];
-	bool inside[QUERN_BLOCK_CELLS]; /* away from surfaces and bodies */
-	quern_real cut
-		[3]
-		[QUERN_BLOCK_CELLS]; /* of a cell that a body cuts: how far its points' mean has to be off its middle, in cells and whole cells */
+	bool inside[QUERN_BLOCK_CELLS];          /* away from surfaces and bodies */
+	quern_real cut[3][2][QUERN_BLOCK_CELLS]; /* by axis and side: the share of a cell that a body takes */
 	/* of what a strain measures: at points, and by cell the mean over what bears, and the volume of that; the gradient as nodes say it */
 	_Alignas(64) quern_real measured[QUERN_STRAIN_MOST][STENCIL], raw[9][STENCIL];
 	quern_real strained[QUERN_STRAIN_MOST][QUERN_BLOCK_CELLS], bearing[QUERN_BLOCK_CELLS];

@@ -31,6 +31,7 @@ typedef struct mpm {
 	quern_real bears;          /* Pa, from where on they are: the weight of half a cell */
 	quern_real rest, diameter, rest_rate; /* shear rate of what is at rest: over sqrt(g/D), 1/s */
 	quern_real rest_alone;                /* 1/s: the same of a continuum alone, from sqrt(g/h) */
+	quern_real share_wall, share_next;    /* of a wall's nodes */
 	uint32_t dim;
 	quern_real loosest; /* kg/m^3, of what bears */
 	quern_real damping; /* s, of elastic waves */

@@ -34,17 +34,22 @@ static int32_t cells_to_face(const quern_grid_view *g, const int32_t at[3], uint
 	return at[k] < g->cells[k] - at[k] ? at[k] : g->cells[k] - at[k];
 }
 
-/* Of a node's volume the part before a surface in the distance `gap`; where a face of the domain, `away` cells off, is behind. */
-static quern_real share_before(const grid_work *w, int32_t away, quern_real gap) {
-	const quern_bound *shape = &w->s->slot[SLOT_SHAPE][0];
-	return ((const quern_shape_ops *)shape->ops)->beyond(shape->self, away, -gap / w->g->cell);
+/* Volume of a node over that of one inside: less at and next to a face. */
+static quern_real share_at(const grid_work *w, int32_t away) {
+	return away > 1 ? 1 : away == 1 ? w->p->share_next : w->p->share_wall;
+}
+static quern_real share_along(const grid_work *w, const int32_t at[3], uint32_t k) {
+	return w->g->periodic[k] ? 1 : share_at(w, cells_to_face(w->g, at, k));
 }
 
-/* Volume of a node over that of one inside: less at and next to a face. */
+/* Of that the part before a surface in the distance `gap`; a face of the domain may be `away` cells off behind it, or many. */
 enum { MANY = 9 };
-static quern_real share_along(const grid_work *w, const int32_t at[3], uint32_t k) {
-	const int32_t away = cells_to_face(w->g, at, k);
-	return w->g->periodic[k] || away > 1 ? 1 : share_before(w, away, away * w->g->cell);
+static quern_real share_before(const grid_work *w, int32_t away, quern_real gap) {
+	const quern_bound *shape = &w->s->slot[SLOT_SHAPE][0];
+	const quern_shape_ops *ops = shape->ops;
+	const quern_real from = -gap / w->g->cell;
+	if (ops->beyond) return ops->beyond(shape->self, away, from);
+	return cut_hat_beyond(fmax(from, -away)) + share_at(w, away) - (away ? 1 : 0.5);
 }
 
 /* Cells that a node's function may reach. */
@@ -204,7 +209,7 @@ static const quern_real alike = 0.7;
 static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
 	const quern_real gap = n->gap[i], share = share_before(w, MANY, gap);
 	uint32_t q = 0;
-	if (w->again || !(share < 1) || is_face(w, n, b, i)) return;
+	if (w->again || !(share < 1) || isnan(gap) || is_face(w, n, b, i)) return;
 	if (!n->surfaces[i]) begin_room(w, b, i, n);
 	for (; q < n->surfaces[i]; q++) {
 		quern_real along = 0;

@@ -45,6 +45,13 @@ static void weights(const void *self, const quern_shape_batch *b) {
 	}
 }
 
+/* The integrals of the folded functions: h/2 + h/24 on the wall, h - h/24 next to it. */
+static void shares(const void *self, quern_real *wall, quern_real *next) {
+	(void)self;
+	*wall = 0.5 + 1.0 / 24;
+	*next = 1 - 1.0 / 24;
+}
+
 static quern_real beyond(const void *self, int32_t to_wall, quern_real from) {
 	(void)self;
 	return to_wall > 1 ? cut_hat_averaged(0.5, from) : cut_hat_folded(0.5, to_wall, from);
@@ -57,7 +64,7 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .beyond = beyond, .stiffness = stiffness
+	.size = sizeof ops, .weights = weights, .shares = shares, .beyond = beyond, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 2,

@@ -57,6 +57,13 @@ static void weights(const void *self, const quern_shape_batch *b) {
 		else weights_along(l, b, a, false);
 }
 
+/* The integrals of the folded functions: h/2 + l^2/(6h) on the wall, h - l^2/(6h) next to it. */
+static void shares(const void *self, quern_real *wall, quern_real *next) {
+	const quern_real l = ((const gimp *)self)->half_width;
+	*wall = 0.5 + l * l / 6;
+	*next = 1 - l * l / 6;
+}
+
 /* Points stand for boxes: where those fill a region the sum over them is the integral of the hat over it. */
 static quern_real beyond(const void *self, int32_t to_wall, quern_real from) {
 	return to_wall > 1 ? cut_hat_beyond(from)
@@ -70,7 +77,7 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .beyond = beyond, .stiffness = stiffness
+	.size = sizeof ops, .weights = weights, .shares = shares, .beyond = beyond, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 2,

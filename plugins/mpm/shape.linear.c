@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* shape.linear - hats: two nodes per axis. Their slopes jump at cell faces; for comparison. docs/theory/mpm.md */
-#include "cut_hat.h"
 #include <quern/math.h>
 #include <quern/shape.h>
 
@@ -36,9 +35,10 @@ static void weights(const void *self, const quern_shape_batch *b) {
 	}
 }
 
-static quern_real beyond(const void *self, int32_t to_wall, quern_real from) {
+static void shares(const void *self, quern_real *wall, quern_real *next) {
 	(void)self;
-	return cut_hat_beyond(fmax(from, -to_wall));
+	*wall = 0.5;
+	*next = 1;
 }
 
 /* No bound holds for every arrangement of points, since a node of little mass may feel a full force. This one, a
@@ -49,10 +49,10 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .beyond = beyond, .stiffness = stiffness
+	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 2,
+	.revision = 1,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.linear",
 	.brief = "Linear hats.",

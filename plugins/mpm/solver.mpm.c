@@ -66,7 +66,8 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 		"Count what cells hold; set by itself where density follows without a hybrid.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, counted, NULL,
-		"Do something in every so many steps; set by itself where density follows.", .flags = QUERN_ADVANCED),
+		"Count the steps until cells are counted or points spread again; set by itself where density may follow.",
+		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, spread, "1",
 		"Where density follows: rate over the shear rate at which points are spread over their cells; 0: they are not.",
 		.def = 3, .max = 1e3, .flags = QUERN_ADVANCED),
@@ -413,7 +414,9 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
 	const bool follows = ops->friction && p->rest > 0;
 	p->alone = follows && (p->follow > 0 || p->alone) && !setup->host->keeps(setup, "hybrid");
-	p->counted = p->alone || (follows && p->follow > 0 && p->spread > 0);
+	/* in a hybrid always, so that a stage may spread points or not */
+	p->counted = p->alone || (ops->friction && setup->host->keeps(setup, "hybrid"));
+	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)
 		return QUERN_E_PARAM;
@@ -481,7 +484,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum"
 	.limit = limit, .account = account, .cell = cell, .accept = accept, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 7,
+	.revision = 8,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.mpm",
 	.brief = "The continuum: material points on a sparse grid.",

@@ -99,18 +99,28 @@ static quern_real spread_gap(
 	return quern_body_gap(body, &w->pose[j], w->s->dim, x, displacement + beyond, normal);
 }
 
-/* Points of a cell that a body cuts across an axis are off its middle, and have to be; where it cuts along no axis they are left alone. */
+/* Points of a cell that a body cuts across an axis are off its middle, and have to be; where it cuts along no axis, or is thin, they are left alone. */
 static void spread_cut_cell(
-	const gather_work *w, gather_memory *m, uint32_t c, quern_real gap, const quern_real normal[3]) {
-	const quern_real cut = 0.5 - gap / w->g->cell;
+	const gather_work *w, gather_memory *m, uint32_t j, uint32_t c, const quern_real x[3]) {
+	quern_real normal[3], deep[3] = { 0 };
+	const quern_real half = 0.5 * w->g->cell, gap = spread_gap(w, j, x, 0, normal),
+					 cut = 0.5 - gap / w->g->cell;
 	bool across = false;
 	if (!(cut > 1e-6)) return;
+	for (uint32_t k = 0; k < w->s->dim; k++) deep[k] = x[k] - half * normal[k];
+	const bool solid = fabs(spread_gap(w, j, deep, 0, NULL) - (gap - half)) < 1e-6 * half;
 	for (uint32_t k = 0; k < w->s->dim; k++) {
+		quern_real *share = &m->cut[k][normal[k] < 0][c];
 		if (fabs(normal[k]) < 1 - 1e-9) continue;
-		m->cut[k][c] += normal[k] * 0.5 * cut * (1 - cut);
-		across = true;
+		*share = fmax(*share, cut);
+		across = solid;
 	}
 	m->inside[c] = m->inside[c] && across && cut < 1;
+}
+
+/* Where the mean of points in order is along an axis, over the mass of a whole cell, in cells from its middle. */
+QUERN_INLINE quern_real spread_wanted(quern_real low, quern_real high) {
+	return 0.5 * (low - high) * (1 - low - high);
 }
 
 static void spread_find_cut(const gather_work *w, gather_memory *m, uint32_t b) {
@@ -118,18 +128,17 @@ static void spread_find_cut(const gather_work *w, gather_memory *m, uint32_t b) 
 	memset(m->cut, 0, sizeof m->cut);
 	for (uint32_t j = 0; j < w->s->n_slot[SLOT_BODIES]; j++) {
 		const body_item *item = w->s->slot[SLOT_BODIES][j].item;
-		quern_real x[3] = { 0 }, normal[3];
+		quern_real x[3] = { 0 };
 		if (!quern_body_is_there(&w->s->slot[SLOT_BODIES][j], w->s->settling) ||
 			(item->boundary == BOUNDARY_NONE && isnan(item->friction)))
 			continue;
 		quern_grid_corner(g, b * QUERN_BLOCK_CELLS, x);
 		for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * g->edge * g->cell;
-		if (spread_gap(w, j, x, 0.9 * g->edge * g->cell, normal) > 0) continue;
+		if (spread_gap(w, j, x, 0.9 * g->edge * g->cell, NULL) > 0) continue;
 		for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
 			quern_grid_corner(g, b * QUERN_BLOCK_CELLS + c, x);
 			for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * g->cell;
-			const quern_real gap = spread_gap(w, j, x, 0, normal);
-			spread_cut_cell(w, m, c, gap, normal);
+			spread_cut_cell(w, m, j, c, x);
 		}
 	}
 }
@@ -153,8 +162,9 @@ QUERN_INLINE void spread_chunk(
 			continue;
 		for (int k = 0; k < dim; k++) {
 			const quern_real off = spread_offset(w, b, k, m->trip.stencil.position[k][i]),
-							 mean = (*row)[2 * k] / full - m->cut[k][c], wide = (*row)[2 * k + 1] / full,
-							 passes = m->trip.pic[k][i] / w->g->cell,
+							 low = m->cut[k][0][c], high = m->cut[k][1][c],
+							 mean = (*row)[2 * k] / full - spread_wanted(low, high),
+							 wide = (*row)[2 * k + 1] / full, passes = m->trip.pic[k][i] / w->g->cell,
 							 share = part / (1 + part) * (rate2 / (rate2 + passes * passes)),
 							 pull = share * (spread_beyond(mean) + wide * off);
 			w->s->use[GATHER_POSITION].real[k][begin + i] -=

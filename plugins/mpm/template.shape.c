@@ -2,7 +2,6 @@
  *
  * Weights along the axes are multiplied by the solver. Of three nodes from `first` on they must sum to one, and their
  * slopes to zero, also next to walls, which lie on node lines and beyond which there is no node. */
-#include <math.h>
 #include <quern/math.h>
 #include <quern/shape.h>
 
@@ -34,11 +33,11 @@ static void weights(const void *self, const quern_shape_batch *b) {
 	}
 }
 
-/* At a wall a hat is cut off, and stays as it is otherwise. */
-static quern_real beyond(const void *self, int32_t to_wall, quern_real from) {
-	const quern_real t = fmin(fmax(from, to_wall ? -1 : 0), 1), left = 1 - fabs(t), tail = 0.5 * left * left;
+/* A node on a wall has half a hat. */
+static void shares(const void *self, quern_real *wall, quern_real *next) {
 	(void)self;
-	return t < 0 ? 1 - tail : tail;
+	*wall = 0.5;
+	*next = 1;
 }
 
 /* chi h^2 of omega^2 = chi max(d K, 2 G)/rho, the highest frequency of the grid: the step in time follows from it. */
@@ -48,7 +47,7 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .beyond = beyond, .stiffness = stiffness
+	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 1,

@@ -199,7 +199,7 @@ BROKEN = [
     ("leans", "shape", [("slope[0][i] = -inverse;", "slope[0][i] = -1.1 * inverse;")], "slopes sum to zero"),
     ("jumps", "shape", [("= 1 - (t - cell);", "= t - cell < 0.5 ? 1 : 0;"), ("= t - cell;", "= t - cell < 0.5 ? 0 : 1;")],
      "no jumps"),
-    ("has large walls", "shape", [("to_wall ? -1 : 0", "to_wall ? -1 : -0.1")], "shares and stiffness"),
+    ("has large walls", "shape", [("*wall = 0.5;", "*wall = 0.6;")], "shares and stiffness"),
     ("pulls apart what is together", "coupling", [("* (other[i] - v[i]) : 0;", "* (other[i] - v[i]) + 1e-3 : 0;")],
      "equal velocities stay"),
     ("overdoes it", "coupling", [("both ? share * (", "both ? 2.5 * share * (")], "no energy gained"),
