@@ -35,6 +35,12 @@ QUERN_INLINE bool quern_body_is_there(const quern_bound *body, bool settling) {
 	return when == BODY_ALWAYS || (when != BODY_NEVER && (when == BODY_SETTLING) == settling);
 }
 
+/* And whether a continuum meets it. */
+QUERN_INLINE bool quern_body_meets_points(const quern_bound *body, bool settling) {
+	const body_item *item = body->item;
+	return quern_body_is_there(body, settling) && !(item->boundary == BOUNDARY_NONE && isnan(item->friction));
+}
+
 /* Poses of all bodies of a slot, with the velocities of the time `rate`, until the stage returns; NULL: no memory. While
  * settling time has not begun. A body that never moves is where the scene put it, to the bit. */
 static inline body_pose *quern_body_poses(

@@ -39,9 +39,8 @@ bool quern_placer_bodies(placer *p, const quern_step *s, uint32_t slot, bool nod
 	p->n_bodies = 0;
 	p->nodes = nodes;
 	for (uint32_t b = 0; b < s->n_slot[slot]; b++) {
-		const body_item *item = s->slot[slot][b].item;
-		if (!quern_body_is_there(&s->slot[slot][b], s->settling)) continue;
-		if (nodes && item->boundary == BOUNDARY_NONE && isnan(item->friction)) continue;
+		const quern_bound *here = &s->slot[slot][b];
+		if (!(nodes ? quern_body_meets_points : quern_body_is_there)(here, s->settling)) continue;
 		pose[p->n_bodies] = pose[b];
 		body[p->n_bodies++] = s->slot[slot][b];
 	}

@@ -34,9 +34,7 @@ static quern_status check_bodies(const mpm *p, const quern_step *s, uint32_t n) 
 	if (!pose) return QUERN_E_MEMORY;
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
-		const body_item *item = body->item;
-		if (!quern_body_is_there(body, false) || (item->boundary == BOUNDARY_NONE && isnan(item->friction)))
-			continue;
+		if (!quern_body_meets_points(body, false)) continue;
 		for (uint32_t i = 0; i < n; i++) {
 			quern_real x[3] = { 0 };
 			char which[BODY_WORDS], why[BODY_WORDS + 60];

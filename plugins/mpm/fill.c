@@ -163,9 +163,7 @@ static quern_status clip(const quern_step *s, uint32_t *n) {
 	if (!inside || !from || !pose) return QUERN_E_MEMORY;
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
-		const body_item *item = body->item;
-		if (!quern_body_is_there(body, false) || (item->boundary == BOUNDARY_NONE && isnan(item->friction)))
-			continue;
+		if (!quern_body_meets_points(body, false)) continue;
 		const uint32_t found = mark_inside(s, body, &pose[b], *n, inside);
 		char which[BODY_WORDS];
 		quern_body_say(body, b, which);

@@ -26,8 +26,7 @@ typedef struct {
 static bool holds(const quern_bound *body, const quern_step *s) {
 	const body_item *item = body->item;
 	quern_real lower[3], upper[3];
-	if (!quern_body_is_there(body, s->settling) || quern_motion_is_any(&item->motion)) return false;
-	if (item->boundary == BOUNDARY_NONE && isnan(item->friction)) return false;
+	if (!quern_body_meets_points(body, s->settling) || quern_motion_is_any(&item->motion)) return false;
 	((const quern_body_ops *)body->ops)->bounds(body->self, s->dim, lower, upper);
 	for (uint32_t k = 0; k < s->dim; k++)
 		if (!s->periodic[k] &&

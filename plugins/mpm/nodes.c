@@ -278,9 +278,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 	for (uint32_t j = 0; j < w->n_bodies; j++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][j];
 		const body_item *item = body->item;
-		if (!quern_body_is_there(body, s->settling) ||
-			(item->boundary == BOUNDARY_NONE && isnan(item->friction)))
-			continue;
+		if (!quern_body_meets_points(body, s->settling)) continue;
 		batch.pose = &w->pose[j].pose;
 		if (w->pose[j].repeats) bring_nodes(&w->pose[j], s->dim, n);
 		else if (body_is_far(body, n, batch, w->g->cell, w->g->cell * w->g->edge)) continue;

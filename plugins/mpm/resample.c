@@ -99,7 +99,7 @@ static bool is_cut(const looking *w, const int32_t cell[3]) {
 	for (uint32_t b = 0; b < s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][b];
 		const body_item *item = body->item;
-		if (quern_body_is_there(body, s->settling) && item->boundary != BOUNDARY_NONE &&
+		if (quern_body_meets_points(body, s->settling) &&
 			quern_body_gap(body, &w->pose[b], s->dim, x, item->displacement, NULL) < 0.499 * g->cell)
 			return true;
 	}

@@ -412,10 +412,10 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	ops->moduli(material->self, setup->dim, &p->bulk, &p->shear, &p->density);
 	p->bears = 0.5 * p->density * quern_gravity_size(setup->dim, setup->gravity) * p->cell;
 	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
-	const bool follows = ops->friction && p->rest > 0;
-	p->alone = follows && (p->follow > 0 || p->alone) && !setup->host->keeps(setup, "hybrid");
+	const bool hybrid = setup->host->keeps(setup, "hybrid");
+	p->alone = ops->friction && (p->follow > 0 || p->alone) && p->rest > 0 && !hybrid;
 	/* in a hybrid always, so that a stage may spread points or not */
-	p->counted = p->alone || (ops->friction && setup->host->keeps(setup, "hybrid"));
+	p->counted = p->alone || (ops->friction && hybrid);
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)

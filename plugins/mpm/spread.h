@@ -115,7 +115,7 @@ static void spread_cut_cell(
 		*share = fmax(*share, cut);
 		across = solid;
 	}
-	m->inside[c] = m->inside[c] && across && cut < 1;
+	m->inside[c] = across && cut < 1;
 }
 
 /* Where the mean of points in order is along an axis, over the mass of a whole cell, in cells from its middle. */
@@ -127,15 +127,13 @@ static void spread_find_cut(const gather_work *w, gather_memory *m, uint32_t b) 
 	const quern_grid_view *g = w->g;
 	memset(m->cut, 0, sizeof m->cut);
 	for (uint32_t j = 0; j < w->s->n_slot[SLOT_BODIES]; j++) {
-		const body_item *item = w->s->slot[SLOT_BODIES][j].item;
 		quern_real x[3] = { 0 };
-		if (!quern_body_is_there(&w->s->slot[SLOT_BODIES][j], w->s->settling) ||
-			(item->boundary == BOUNDARY_NONE && isnan(item->friction)))
-			continue;
+		if (!quern_body_meets_points(&w->s->slot[SLOT_BODIES][j], w->s->settling)) continue;
 		quern_grid_corner(g, b * QUERN_BLOCK_CELLS, x);
 		for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * g->edge * g->cell;
 		if (spread_gap(w, j, x, 0.9 * g->edge * g->cell, NULL) > 0) continue;
 		for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
+			if (!m->inside[c]) continue;
 			quern_grid_corner(g, b * QUERN_BLOCK_CELLS + c, x);
 			for (uint32_t k = 0; k < w->s->dim; k++) x[k] += 0.5 * g->cell;
 			spread_cut_cell(w, m, j, c, x);
@@ -143,12 +141,11 @@ static void spread_find_cut(const gather_work *w, gather_memory *m, uint32_t b) 
 	}
 }
 
-/* Points of a hybrid's zone stay: grains lie between them. Means go to the middle of the cell and mean squares to those of the start, by a part for each unit of shear. Nothing is moved across a face, and
- * little along an axis along which the flow takes points through cells anyway. */
+/* Means go to the middle of the cell and mean squares to those of the start, by a part for each unit of shear. Nothing is moved across a face, and
+ * little along an axis along which the flow takes points through cells anyway. Points of a hybrid's zone stay: grains lie between them. */
 QUERN_INLINE void spread_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
 	const quern_real time = w->s->dt * COUNT_EVERY, volume = quern_grid_cell_volume(w->g);
-	const quern_real *weight = w->s->use[GATHER_WEIGHT].real[0];
 	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t c = (uint32_t)m->cell[i];
@@ -157,7 +154,7 @@ QUERN_INLINE void spread_chunk(
 		const quern_real part =
 			w->p->spread * time * flowing_share(w->still, rate2) * sheared_rate(m, i, rate2, dim);
 		if (!m->inside[c] || !(m->level[c] > w->p->bears) || !(m->level[c] < waves * w->p->bulk) ||
-			!(full > 0) || !(part > 0) || (weight && weight[begin + i] < 1) ||
+			!(full > 0) || !(part > 0) || (w->points.weight && w->points.weight[begin + i] < 1) ||
 			!spread_within(w, b, m->trip.stencil.position, i, dim))
 			continue;
 		for (int k = 0; k < dim; k++) {
