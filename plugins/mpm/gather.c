@@ -250,7 +250,7 @@ QUERN_INLINE void gather_block(
 	if (last) speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
 	if (last && (w->answers || w->counts)) level_block(w, m, b, dim);
-	if (last && w->spreads) spread_find_cut(w, m, b);
+	if (last && w->moment) spread_find_cut(w, m, b);
 	if (last && w->strain->means) strain_block(w, m, b, dim);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
@@ -266,7 +266,8 @@ QUERN_INLINE void gather_block(
 			calm_note(
 				&w->calm, k, i + k, m->gradient, m->trip.pic, w->s->use[GATHER_VELOCITY].real, (uint32_t)dim);
 		if (w->strain->apply[dim - 2]) strain_chunk(w, m, b, i, n, dim);
-		if (w->spreads) spread_chunk(w, m, b, i, n, dim);
+		if (w->moment) spread_chunk(w, m, b, i, n, dim);
+		if (w->spreads) spread_move(w, m, i, n);
 		move_chunk(w, m, b, i, n, dim);
 		if (w->answers) answer_chunk(w, m, b, i, n, dim);
 		if (w->counts) measure_chunk(w, m, b, i, n, dim);
@@ -335,7 +336,7 @@ static quern_status lost(const gather_work *w, int32_t i) {
 /* What is read of each of n points. */
 static void note_columns(gather_work *w, uint32_t n) {
 	static const uint32_t read[] = { GATHER_POSITION, GATHER_VELOCITY, GATHER_MASS, GATHER_VOLUME,
-		GATHER_STRESS, GATHER_DASHPOT, GATHER_WEIGHT, GATHER_FOLLOWING, GATHER_AROUND };
+		GATHER_STRESS, GATHER_DASHPOT, GATHER_WEIGHT, GATHER_FOLLOWING, GATHER_AROUND, GATHER_SPREADING };
 	const quern_bound *material = &w->s->slot[SLOT_MATERIAL][0];
 	for (uint32_t k = 0; k < sizeof read / sizeof *read; k++) ahead_add(&w->ahead, &w->s->use[read[k]]);
 	for (uint32_t r = 0; r < material->n_uses; r++)
@@ -366,8 +367,8 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	const bool due = p->counted && s->use[GATHER_UNCOUNTED].index[0] == 1;
 	w.counts = due && p->alone;
 	w.still = p->alone ? flowing_alone * p->rest_alone : flowing * p->rest_rate;
-	w.spreads = due && (p->alone || (w.answers && p->follow > 0)) && p->spread > 0 && w.still > 0;
-	if (w.spreads && !spread_measure(&w)) return QUERN_E_MEMORY;
+	w.spreads = p->counted && (p->alone || (w.answers && p->follow > 0)) && p->spread > 0 && w.still > 0;
+	if (due && w.spreads && !spread_measure(&w)) return QUERN_E_MEMORY;
 	const quern_real part = calm_rate * w.p->rest_rate * s->dt;
 	w.calm = (calm) { .rate = w.p->rest_rate, .share = part / (1 + part) };
 	if (!w.bad || !w.moved || calm_init(&w.calm, s, points.n) != QUERN_OK) return QUERN_E_MEMORY;

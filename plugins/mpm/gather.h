@@ -18,8 +18,8 @@ typedef struct gather_work {
 	calm calm;
 	bool answers;          /* volume does, to how full cells are */
 	bool counts;           /* the same of a continuum alone, in this step */
-	bool spreads;          /* points are, in this step */
-	quern_row *moment;     /* by cell, where they are: spread.h */
+	bool spreads;          /* points are */
+	quern_row *moment;     /* by cell, in steps that count where they are: spread.h */
 	const body_pose *pose; /* by body, for that */
 	const quern_strain_ops *strain;
 	quern_real full;      /* from there on a cell is crowded */

@@ -176,6 +176,8 @@ QUERN_USE_ENUM(WALLS_USES);
 		.doc = "Rate at which the density goes to that of the cell, over the density.") \
 	X(GATHER_AROUND, "point.around", "Pa", QUERN_UPDATE, QUERN_SCALAR, .when = "alone", \
 		.doc = "Mean pressure of the cell when it was counted.") \
+	X(GATHER_SPREADING, "point.spreading", "1/s", QUERN_UPDATE, QUERN_VECTOR, .when = "counted", \
+		.doc = "Rate at which the point goes through its cell to where others are not, in cells.") \
 	X(GATHER_UNCOUNTED, UNCOUNTED_USE(QUERN_READ)) \
 	X(GATHER_HELD, "node.held", "kg", QUERN_READ, QUERN_SCALAR, .when = "alone") \
 	X(GATHER_CROWDING, "cell.crowding", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \

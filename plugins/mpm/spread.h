@@ -141,11 +141,13 @@ static void spread_find_cut(const gather_work *w, gather_memory *m, uint32_t b) 
 	}
 }
 
-/* Means go to the middle of the cell and mean squares to those of the start, by a part for each unit of shear. Nothing is moved across a face, and
- * little along an axis along which the flow takes points through cells anyway. Points of a hybrid's zone stay: grains lie between them. */
+/* How fast the points of a chunk will go until cells are counted again: means to the middle of the cell and mean squares to those of the start, by a part
+ * for each unit of shear, and little along an axis along which the flow takes points through cells anyway. Points of a hybrid's zone stay: grains lie
+ * between them. */
 QUERN_INLINE void spread_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
 	const quern_real time = w->s->dt * COUNT_EVERY, volume = quern_grid_cell_volume(w->g);
+	quern_real *const *rate = w->s->use[GATHER_SPREADING].real;
 	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t c = (uint32_t)m->cell[i];
@@ -153,19 +155,38 @@ QUERN_INLINE void spread_chunk(
 		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim), full = m->held[c] * volume;
 		const quern_real part =
 			w->p->spread * time * flowing_share(w->still, rate2) * sheared_rate(m, i, rate2, dim);
-		if (!m->inside[c] || !(m->level[c] > w->p->bears) || !(m->level[c] < waves * w->p->bulk) ||
-			!(full > 0) || !(part > 0) || (w->points.weight && w->points.weight[begin + i] < 1) ||
-			!spread_within(w, b, m->trip.stencil.position, i, dim))
-			continue;
+		const bool stays = !m->inside[c] || !(m->level[c] > w->p->bears) ||
+						   !(m->level[c] < waves * w->p->bulk) || !(full > 0) || !(part > 0) ||
+						   (w->points.weight && w->points.weight[begin + i] < 1) ||
+						   !spread_within(w, b, m->trip.stencil.position, i, dim);
 		for (int k = 0; k < dim; k++) {
+			if (stays) {
+				rate[k][begin + i] = 0;
+				continue;
+			}
 			const quern_real off = spread_offset(w, b, k, m->trip.stencil.position[k][i]),
 							 low = m->cut[k][0][c], high = m->cut[k][1][c],
 							 mean = (*row)[2 * k] / full - spread_wanted(low, high),
 							 wide = (*row)[2 * k + 1] / full, passes = m->trip.pic[k][i] / w->g->cell,
 							 share = part / (1 + part) * (rate2 / (rate2 + passes * passes)),
 							 pull = share * (spread_beyond(mean) + wide * off);
-			w->s->use[GATHER_POSITION].real[k][begin + i] -=
-				fmin(fmax(pull, -most_pull), most_pull) * (1 - 4 * off * off) * w->g->cell;
+			rate[k][begin + i] = -fmin(fmax(pull, -most_pull), most_pull) / time;
+		}
+	}
+}
+
+/* Nothing is moved across a face. */
+static void spread_move(const gather_work *w, const gather_memory *m, uint32_t begin, uint32_t n) {
+	const quern_real dt = w->s->dt, cell = w->g->cell, inverse = 1 / cell;
+	for (uint32_t k = 0; k < w->s->dim; k++) {
+		const quern_real *restrict rate = w->s->use[GATHER_SPREADING].real[k] + begin, *restrict place =
+																						   m->trip.stencil
+																							   .position[k];
+		quern_real *restrict x = w->s->use[GATHER_POSITION].real[k] + begin;
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) {
+			const quern_real t = place[i] * inverse, off = t - quern_floor(t) - 0.5;
+			x[i] += dt * rate[i] * (1 - 4 * off * off) * cell;
 		}
 	}
 }

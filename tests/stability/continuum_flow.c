@@ -111,7 +111,7 @@ void flow_over_step(void **unused) {
 			quern_run *run = open_chute(&rows[k]);
 			begin_flow(run);
 			beyond_force_step(run, factors[i] * continuum_limit(run));
-			const noise n = flow_for(run, beyond_is_long() ? 1 : 0.2);
+			const noise n = flow_for(run, 1);
 			beyond_row("%s | %s | %g | %.2g | %.2g | %.2g | %s", rows[k].material, rows[k].transfer,
 				factors[i], n.off, n.across, n.pressure, beyond_message(run));
 			if (factors[i] <= 1.25 &&
