@@ -169,57 +169,67 @@ enum { CARRIED = QUERN_LANES / 2 };
 QUERN_INLINE bool part_carries(const int k) { return k * PART_LANES < CARRIED; }
 QUERN_INLINE bool part_pushes(const int k) { return (k + 1) * PART_LANES > CARRIED; }
 
-/* What a particle sends: `base` to every node; `along` per metre of way from the particle to the node (a velocity
- * gradient); `slope` per unit of the function's slope (a stress). The former two have the carried lanes, `slope` the others. */
+/* What a particle sends: `base` to every node; of `lean`, the carried lanes per metre of way from the particle to the node (a velocity gradient), the
+ * others per unit of the function's slope (a stress). `base` has none of the latter. */
 typedef struct sent {
-	parted_row base, along[3], slope[3];
+	parted_row base, lean[3];
 } sent;
 enum { SENDS_BASE = 0, SENDS_ALONG = 1, SENDS_SLOPE = 2 };
 
 /* Nodes per axis of a tile, a constant where the dimension is one. */
 QUERN_INLINE uint32_t tile_span(const int dim) { return dim == 2 ? 12 : 8; }
 
+/* By what `lean` goes to node k along an axis. What carries and what pushes lie in lanes of their own, and cost no more together than one of them. */
+QUERN_INLINE row_part stencil_lean(const stencil *s, uint32_t i, const int what, quern_real way[3][3],
+	const uint32_t axis, const uint32_t k, const int part) {
+	const bool along = part_carries(part) && what & SENDS_ALONG,
+			   pushes = part_pushes(part) && what & SENDS_SLOPE;
+	const quern_real c = along ? s->value[axis][k][i] * way[axis][k] : 0,
+					 p = pushes ? s->slope[axis][k][i] : 0;
+	const row_part none = { 0 };
+	if (along && pushes) return PARTED(c, c, c, c, p, p, p, p).part[0];
+	return (along ? c : p) + none;
+}
+
 /* Lanes of the other kind are zero, and what is added for them does not change a bit: rows come out alike however they are cut.
  * What is added may lie anywhere for all that the compiler knows: what nodes share is read before. */
 QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent *p, const int what,
 	quern_row *tile, const int dim, quern_real way[3][3], const uint32_t to_x, const uint32_t to_y,
 	const uint32_t to_z, const int k) {
-	const bool carries = part_carries(k), along = carries && what & SENDS_ALONG,
-			   pushes = part_pushes(k) && what & SENDS_SLOPE;
+	const bool carries = part_carries(k),
+			   leans = (carries && what & SENDS_ALONG) || (part_pushes(k) && what & SENDS_SLOPE);
 	const row_part none = { 0 };
-	if (!carries && !pushes) return;
+	if (!carries && !leans) return;
 	const uint32_t span = tile_span(dim);
 	quern_row *const lowest = tile + s->node[i];
-	row_part value[3], slope[3], lean[3];
+	row_part value[3], lean[3];
 	for (uint32_t x = 0; x < to_x; x++) {
 		value[x] = s->value[0][x][i] + none;
-		slope[x] = s->slope[0][x][i] + none;
-		lean[x] = s->value[0][x][i] * way[0][x] + none;
+		if (leans) lean[x] = stencil_lean(s, i, what, way, 0, x, k);
 	}
 	for (uint32_t z = 0; z < to_z; z++) {
-		row_part base = p->base.part[k], ax = p->along[0].part[k], ay = p->along[1].part[k];
-		row_part sx = p->slope[0].part[k], sy = p->slope[1].part[k], sz = none;
+		row_part base = p->base.part[k], gx = p->lean[0].part[k], gy = p->lean[1].part[k];
 		if (dim == 3) {
 			const quern_real v = s->value[2][z][i];
-			if (along) base += way[2][z] * p->along[2].part[k], ax *= v, ay *= v;
-			base *= v;
-			if (pushes) sx *= v, sy *= v, sz = s->slope[2][z][i] * p->slope[2].part[k];
+			const row_part gz = p->lean[2].part[k];
+			if (carries) base *= v;
+			if (leans) gx *= v, gy *= v;
+			if (leans && carries) base += stencil_lean(s, i, what, way, 2, z, k) * gz;
+			else if (leans) base = stencil_lean(s, i, what, way, 2, z, k) * gz;
 		}
 		for (uint32_t y = 0; y < to_y; y++) {
 			const quern_real v = s->value[1][y][i];
-			row_part even = none, tilt = none, push = none;
-			if (along) even = v * (base + way[1][y] * ay), tilt = v * ax;
-			else if (carries) even = v * base;
-			if (pushes) {
-				row_part cross = s->slope[1][y][i] * sy;
-				if (dim == 3) cross += v * sz;
-				even += cross;
-				push = v * sx;
+			row_part even = none, tilt = none;
+			if (carries || dim == 3) even = v * base;
+			if (leans) {
+				const row_part cross = stencil_lean(s, i, what, way, 1, y, k) * gy;
+				if (carries || dim == 3) even += cross;
+				else even = cross;
+				tilt = v * gx;
 			}
 			for (uint32_t x = 0; x < to_x; x++) {
 				row_part to = value[x] * even;
-				if (along) to += lean[x] * tilt;
-				if (pushes) to += slope[x] * push;
+				if (leans) to += lean[x] * tilt;
 				parts_of(lowest + (z * span + y) * span + x)[k] += to;
 			}
 		}

@@ -31,7 +31,7 @@ QUERN_INLINE sent send_grain(
 	quern_row v[4];
 	stencil_gather(&m->stencil, k, m->motion, dim, true, v);
 	for (int a = 0; a < dim; a++)
-		p.along[a] = PARTED(0, mass * v[1 + a][0], mass * v[1 + a][1], dim == 3 ? mass * v[1 + a][2] : 0);
+		p.lean[a] = PARTED(0, mass * v[1 + a][0], mass * v[1 + a][1], dim == 3 ? mass * v[1 + a][2] : 0);
 	return p;
 }
 

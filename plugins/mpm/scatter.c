@@ -55,18 +55,18 @@ QUERN_INLINE sent send_point(scatter_memory *m, uint32_t i, const int dim, const
 	quern_real *const push[] = { m->push[0], m->push[1], m->push[2], m->push[3], m->push[4], m->push[5] };
 	const symmetric t = SYMMETRIC_AT(push, i, dim);
 	sent p = { 0 };
+	quern_real l[3][3] = { { 0 } }; /* m (v + L (x_i - x)) */
+	for (int k = 0; k < dim * dim && affine; k++) l[k % dim][k / dim] = m->along[k][i];
 	if (dim == 2) {
 		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i]);
-		p.slope[0] = PARTED(0, 0, 0, 0, -t.xx, -t.xy);
-		p.slope[1] = PARTED(0, 0, 0, 0, -t.xy, -t.yy);
+		p.lean[0] = PARTED(0, l[0][0], l[0][1], 0, -t.xx, -t.xy);
+		p.lean[1] = PARTED(0, l[1][0], l[1][1], 0, -t.xy, -t.yy);
 	} else {
 		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i], m->base[3][i]);
-		p.slope[0] = PARTED(0, 0, 0, 0, 0, -t.xx, -t.xy, -t.xz);
-		p.slope[1] = PARTED(0, 0, 0, 0, 0, -t.xy, -t.yy, -t.yz);
-		p.slope[2] = PARTED(0, 0, 0, 0, 0, -t.xz, -t.yz, -t.zz);
+		p.lean[0] = PARTED(0, l[0][0], l[0][1], l[0][2], 0, -t.xx, -t.xy, -t.xz);
+		p.lean[1] = PARTED(0, l[1][0], l[1][1], l[1][2], 0, -t.xy, -t.yy, -t.yz);
+		p.lean[2] = PARTED(0, l[2][0], l[2][1], l[2][2], 0, -t.xz, -t.yz, -t.zz);
 	}
-	for (int a = 0; a < dim && affine; a++) /* m (v + L (x_i - x)) */
-		p.along[a] = PARTED(0, m->along[a][i], m->along[dim + a][i], dim == 3 ? m->along[2 * dim + a][i] : 0);
 	return p;
 }
 

@@ -48,12 +48,11 @@ static void reach_is_found(void **unused) {
 
 static sent some_sent(uint32_t *state) {
 	sent p;
-	quern_real lane[7][QUERN_LANES] = { { 0 } };
-	for (uint32_t k = 0; k < 7; k++) /* base and along carry, slope pushes */
-		for (uint32_t l = k < 4 ? 0 : CARRIED; l < (k < 4 ? CARRIED : QUERN_LANES); l++)
-			lane[k][l] = random_real(state);
+	quern_real lane[4][QUERN_LANES] = { { 0 } };
+	for (uint32_t k = 0; k < 4; k++)
+		for (uint32_t l = 0; l < (k ? QUERN_LANES : CARRIED); l++) lane[k][l] = random_real(state);
 	p.base = parted(lane[0]);
-	for (uint32_t a = 0; a < 3; a++) p.along[a] = parted(lane[1 + a]), p.slope[a] = parted(lane[4 + a]);
+	for (uint32_t a = 0; a < 3; a++) p.lean[a] = parted(lane[1 + a]);
 	return p;
 }
 
