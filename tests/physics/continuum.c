@@ -194,7 +194,7 @@ static wave ripple(const char *transfer) {
 		"{quern: 1, dimension: 2, gravity: [0, 0], domain: {lower: [0, 0], upper: [%d, 2], periodic: [true, "
 		"true]},\n"
 		"time: {end: 1000, step: %.17g, force: true}, output: {every: 100},\n"
-		"continuum: {cell: 1, material: {elastic: {bulk_modulus: 50, poisson: 0, density: 1}},\n"
+		"continuum: {cell: 1, shape: gimp, material: {elastic: {bulk_modulus: 50, poisson: 0, density: 1}},\n"
 		"  transfer: {%s}, fill: [{region: {box: {lower: [0, 0], upper: [%d, 2]}}}]}}\n",
 		WAVE_CELLS, 1.0 / WAVE_STEPS, transfer, WAVE_CELLS);
 	const quern_column x = harness_field(run, "point.position"), v = harness_field(run, "point.velocity");
@@ -215,7 +215,7 @@ static wave ripple(const char *transfer) {
 	return out;
 }
 
-/* Of a velocity that varies like cos kx, two points per cell a quarter of a cell from their nodes, a round trip to the grid
+/* Of a velocity that varies like cos kx, two points of gimp per cell a quarter of a cell from their nodes, a round trip to the grid
  * leaves A = 5/8 + 3/8 cos kh; XPIC of order m takes (1 - A)^m of it in every step, half of that from the amplitude of
  * a wave, whose energy is in motion half of the time. What FLIP takes comes from the stress, which is updated last. */
 static void xpic_damps_less_by_order(void **unused) {
@@ -253,15 +253,16 @@ enum { ELASTIC, DRUCKER_PRAGER, MU_I, MATERIALS };
 enum { COLUMN_CELLS = 20 };
 
 /* A column of one metre between slip walls. */
-static quern_run *column(int which, const char *boundary, const char *stress, double rate) {
+static quern_run *column(
+	int which, const char *shape, const char *boundary, const char *stress, double rate) {
 	const double h = 1.0 / COLUMN_CELLS;
 	return harness_open(1,
 		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [%.17g, %.17g]},\n"
 		"time: {end: 1000}, output: {every: 0.1},\n"
 		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: %s}}],\n"
-		"continuum: {cell: %.17g, material: {%s: {bulk_modulus: 1e7, %s}}, transfer: {picflip: {rate: %g}},\n"
+		"continuum: {cell: %.17g, shape: %s, material: {%s: {bulk_modulus: 1e7, %s}}, transfer: {picflip: {rate: %g}},\n"
 		"  fill: [{region: {box: {lower: [0, 0], upper: [%.17g, 1]}}, stress: %s, lateral: 0.7}]}}\n",
-		4 * h, 1 + 2 * h, boundary, h, materials[which].name, materials[which].parameters, rate, 4 * h,
+		4 * h, 1 + 2 * h, boundary, h, shape, materials[which].name, materials[which].parameters, rate, 4 * h,
 		stress);
 }
 
@@ -281,6 +282,9 @@ static double weight_gap(quern_run *run, int top) {
 	return worst;
 }
 
+/* B-splines see a surface a quarter of a cell beside it: of the little that the topmost cell bears that is some percent. */
+static const char *const both_shapes[] = { "gimp", "bspline" };
+
 /* A column under its own weight stays at rest and carries it, every cell its own. */
 static void weight_at_rest(void **unused) {
 	(void)unused;
@@ -288,12 +292,12 @@ static void weight_at_rest(void **unused) {
 	char what[80];
 	table_head("at rest from the start, 1 s: gap over rho g depth");
 	for (int which = 0; which < MATERIALS; which++)
-		for (int sticky = 0; sticky <= 1; sticky++) {
-			quern_run *run = column(which, sticky ? "sticky" : "slip", "at_rest", 0);
+		for (int k = 0; k < 4; k++) {
+			const char *floor = k % 2 ? "sticky" : "slip", *shape = both_shapes[k / 2];
+			quern_run *run = column(which, shape, floor, "at_rest", 0);
 			harness_until(run, 1);
-			snprintf(
-				what, sizeof what, "%s on a %s floor", materials[which].name, sticky ? "sticky" : "slip");
-			good &= table_row(what, weight_gap(run, 0), 0, 0.01);
+			snprintf(what, sizeof what, "%s, %s, on a %s floor", materials[which].name, shape, floor);
+			good &= table_row(what, weight_gap(run, k / 2), 0, 0.01);
 			harness_close(run);
 		}
 	assert_true(good);
@@ -356,15 +360,19 @@ static void weight_after_ringing(void **unused) {
 	bool good = true;
 	char what[80];
 	table_head("gravity switched on, PIC, 4 s: gap over rho g depth");
-	for (int which = 0; which < MATERIALS; which++) {
-		/* a rebound opens the top of what yields, and half a cell of it then lies loose */
-		const int top = which == DRUCKER_PRAGER ? 3 : 0;
-		quern_run *run = column(which, "sticky", "none", 1e300);
-		harness_until(run, 4);
-		snprintf(what, sizeof what, "%s, all but %d cells at the top", materials[which].name, top);
-		good &= table_row(what, weight_gap(run, top), 0, 0.01);
-		harness_close(run);
-	}
+	for (int which = 0; which < MATERIALS; which++)
+		for (int k = 0; k < 2; k++) {
+			/* a rebound opens the top of what yields, and half a cell of it then lies loose */
+			const int top = (which == DRUCKER_PRAGER ? 3 : 0) + k;
+			quern_run *run = column(which, both_shapes[k], "sticky", "none", 1e300);
+			harness_until(run, 4);
+			snprintf(what, sizeof what, "%s, %s, all but %d cells at the top", materials[which].name,
+				both_shapes[k], top);
+			/* what yields keeps stresses that take turns from cell to cell, where no node of B-splines feels them: some percent */
+			if (k && which == DRUCKER_PRAGER) table_note(what, weight_gap(run, top));
+			else good &= table_row(what, weight_gap(run, top), 0, 0.01);
+			harness_close(run);
+		}
 	assert_true(good);
 }
 
@@ -425,7 +433,7 @@ static void thrown_and_fallen(void **unused) {
 
 /* ==== a lattice of points as the grid sees it ==== */
 
-/* Particles as wide as their points are apart fill space: for any number of points per cell and axis every node that is
+/* Particles of gimp, as wide as their points are apart, fill space: for any number of points per cell and axis every node that is
  * wholly within them has the density of the points. */
 static void lattice_is_uniform(void **state) {
 	(void)state;
@@ -437,7 +445,7 @@ static void lattice_is_uniform(void **state) {
 			quern_run *run = harness_open(1,
 				"{quern: 1, dimension: %d, gravity: %s, domain: {lower: %s, upper: %s},\n"
 				"time: {end: 1e-6, step: 1e-9}, output: {fields: [motion.density]},\n"
-				"continuum: {cell: 0.1, points: %d, material: {elastic: {bulk_modulus: 1, density: 1000}},\n"
+				"continuum: {cell: 0.1, shape: gimp, points: %d, material: {elastic: {bulk_modulus: 1, density: 1000}},\n"
 				"  fill: [{region: {box: {lower: %s, upper: %s}}}]}}\n",
 				dim, dim == 2 ? "[0, 0]" : "[0, 0, 0]", dim == 2 ? "[0, 0]" : "[0, 0, 0]",
 				dim == 2 ? "[1, 1]" : "[1, 1, 1]", points, dim == 2 ? "[0.2, 0.2]" : "[0.2, 0.2, 0.2]",

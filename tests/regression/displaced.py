@@ -94,6 +94,7 @@ time: {end: 0.4 s}
 bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: {rough: 7}, displacement: 0.6 mm}}]
 continuum:
   cell: 4 mm
+  shape: gimp # whose points stand for boxes
   material: {mu_i: {bulk_modulus: 1e5 Pa, diameter: 2 mm, grain_density: 2500, critical_density: 2000}}
   fill: {region: {box: {lower: [0, 0.6 mm], upper: [40 mm, 60.6 mm]}}, stress: at_rest}
 output: {every: 0.4 s, fields: [point.pressure]}

@@ -14,6 +14,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static const double cell = 0.1, bulk = 1e6, density = 1500, gravity = 9.81;
 
@@ -237,22 +238,24 @@ static void faster_than_waves(void **unused) {
 
 /* ==== a column at rest ==== */
 
-static void column_row(const material *m, double factor) {
+static void column_row(const material *m, const char *shape, double factor) {
 	quern_run *run = harness_open(1,
 		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [1, 1.5]},\n"
 		"time: {end: 1000}, output: {every: 1000},\n"
 		"bodies: [{plane: {point: [0, 0], normal: [0, 1], boundary: sticky}}],\n"
-		"continuum: {cell: %g, material: {%s}, transfer: {picflip: {rate: 0}},\n"
+		"continuum: {cell: %g, shape: %s, material: {%s}, transfer: {picflip: {rate: 0}},\n"
 		"  fill: [{region: {box: {lower: [0, 0], upper: [1, 1]}}, stress: at_rest}]}}\n",
-		cell, m->parameters);
+		cell, shape, m->parameters);
 	const double unit = density * gravity * cell; /* m g h of one cubic metre */
 	double most = 0;
 	beyond_force_step(run, factor * continuum_limit(run));
 	for (int64_t i = beyond_is_long() ? 20000 : 2000; i > 0 && harness_try(run, 1) == QUERN_OK; i--)
 		most = fmax(most, quern_run_carries(run, "kinetic"));
-	beyond_row("%s | %.3g | %.2g | %lld | %s", m->name, factor, most / unit, (long long)run->clock.step,
-		beyond_message(run));
-	if (factor <= 1.25 && (run->status != QUERN_OK || most > 1e-5 * unit)) fail_msg("%s moves", m->name);
+	beyond_row("%s | %s | %.3g | %.2g | %lld | %s", m->name, shape, factor, most / unit,
+		(long long)run->clock.step, beyond_message(run));
+	/* the limit holds for points anywhere; on a lattice gimp bears more */
+	if (factor <= (strcmp(shape, "gimp") ? 1 : 1.25) && (run->status != QUERN_OK || most > 1e-5 * unit))
+		fail_msg("%s moves", m->name);
 	if (factor >= 4) beyond_expect_culprit(run, "mpm.gather", "point");
 	harness_close(run);
 }
@@ -261,9 +264,10 @@ static void column_at_rest(void **unused) {
 	static const double factors[] = { 0.9, 1, 1.25, 1.5, 2, 2.5, 4 };
 	(void)unused;
 	beyond_table("A column at rest",
-		"material | step over hard limit | largest kinetic energy over m g h | steps | what Quern says");
-	for (size_t k = 0; k < MATERIALS; k++)
-		for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) column_row(&materials[k], factors[i]);
+		"material | shape | step over hard limit | largest kinetic energy over m g h | steps | what Quern says");
+	for (size_t k = 0; k < 2 * MATERIALS; k++)
+		for (size_t i = 0; i < sizeof factors / sizeof *factors; i++)
+			column_row(&materials[k / 2], k % 2 ? "bspline" : "gimp", factors[i]);
 }
 
 int main(int argc, char **argv) {
