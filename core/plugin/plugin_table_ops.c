@@ -221,9 +221,6 @@ static bool slot(quern_table_reader *r, const quern_solver_ops *ops, quern_slot 
 	if (s->refine && (!cases || cases->type != QUERN_T_LIST || s->same_as))
 		return quern_table_refuse(
 			r, "slot %s: '%s' shall refine it, and is no list among the parameters", s->name, s->refine);
-	if (s->choose && !s->def)
-		return quern_table_refuse(
-			r, "slot %s: what is chosen there is told by nobody: give def too", s->name);
 	if (!s->repeat != !s->again)
 		return quern_table_refuse(r, "slot %s: repeat and again are a pair of sets", s->name);
 	if (!s->rows != !s->item_size || s->item_size > QUERN_LARGEST_INSTANCE)

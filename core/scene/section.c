@@ -372,18 +372,6 @@ static void tell_filled(
 	unbind_slot(section, use, (char *)bound);
 }
 
-/* What the solver puts where the scene says nothing; NULL: what its table says. */
-static quern_node *chosen(
-	quern_scene *s, quern_section *section, const quern_slot *slot, size_t errors_before) {
-	if (!slot->choose || !section->solver->ready || quern_report_errors(s->report) != errors_before)
-		return NULL;
-	const quern_setup setup = quern_scene_setup(s, section->name);
-	quern_watch_enter(section->solver->file->plugin.id, "choose");
-	const char *text = slot->choose(section->solver->self, &setup);
-	quern_watch_leave();
-	return text ? default_node(s, text, section->mark) : NULL;
-}
-
 static void section_ready(quern_scene *s, quern_section *section) {
 	if (!section->ops->ready || quern_report_errors(s->report)) return;
 	const quern_setup setup = quern_scene_setup(s, section->name);
@@ -493,10 +481,7 @@ void quern_section_read(quern_scene *s, const quern_plugin_file *file, const que
 			if (same) borrow(s, use, same, section->mark);
 		} else if (!*slot->name) quern_slot_fill(s, use, rest, section->mark);
 		else if (strchr(slot->name, '.')) fill_items(s, section, use);
-		else {
-			quern_node *given = quern_node_find(node, slot->name);
-			quern_slot_fill(s, use, given ? given : chosen(s, section, slot, before), section->mark);
-		}
+		else quern_slot_fill(s, use, quern_node_find(node, slot->name), section->mark);
 		if (!slot->same_as) quern_slot_override(s, section, use);
 		tell_filled(s, section, use, before);
 	}

@@ -68,9 +68,6 @@ typedef struct quern_slot {
 	 * as a default may be published here. Not called where the section has a fault. May be NULL */
 	quern_status (*filled)(
 		void *self, const struct quern_setup *, const struct quern_bound *, uint32_t n, quern_err *);
-	/* since 2.1: [setup] what stands there if the scene says nothing, as in a scene, where that depends on the solver's own parameters or on the slots
-	 * before this one in the table; NULL: `def`, which is what is said of the slot. The text lives as long as the library. May be NULL */
-	const char *(*choose)(const void *self, const struct quern_setup *);
 } quern_slot;
 
 /* What a solver holds of a plugin in one of its slots. */

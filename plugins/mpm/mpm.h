@@ -53,7 +53,7 @@ typedef struct mpm_fill {
 	quern_list above;
 } mpm_fill;
 
-enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_TRANSFER, SLOT_SHAPE, SLOT_STRAIN, SLOT_BODIES };
+enum { SLOT_SOURCE_REGION, SLOT_REGION, SLOT_MATERIAL, SLOT_SHAPE, SLOT_TRANSFER, SLOT_STRAIN, SLOT_BODIES };
 
 /* Lanes of a node's row (mass, momentum, held, force: in 2-D too the force has the second half) and of its motion
  * (velocity, change, density, grip). */

@@ -126,10 +126,6 @@ static quern_status place_fills(
 static quern_status place_sources(
 	void *self, const quern_setup *, const quern_bound *shape, uint32_t n, quern_err *);
 
-static quern_status hear_transfer(
-	void *self, const quern_setup *, const quern_bound *transfer, uint32_t n, quern_err *);
-static const char *choose_shape(const void *self, const quern_setup *);
-
 /* Regions first: plugins may take the height of the fill as a default. */
 static const quern_slot slots[] = { { .name = "source.region",
 										.kind = &quern_body_kind,
@@ -146,20 +142,17 @@ static const quern_slot slots[] = { { .name = "source.region",
 		.kind = &quern_material_kind,
 		.doc = "the constitutive model",
 		.stage = { "mpm.gather", "mpm.fill" } },
+	{ .name = "shape",
+		.kind = &quern_shape_kind,
+		.doc = "the shape functions",
+		.def = "gimp",
+		.stage = { "mpm.gather" } },
 	{ .name = "transfer",
 		.kind = &quern_transfer_kind,
 		.doc = "from grid velocities to points",
 		.def = "picflip",
 		.stage = { "mpm.gather" },
-		.particle = "point",
-		.filled = hear_transfer },
-	{ .name = "shape",
-		.kind = &quern_shape_kind,
-		.doc =
-			"the shape functions; gimp where points send their affine part too: in a hybrid, with rasterise: affine and with apic",
-		.def = "bspline",
-		.stage = { "mpm.gather" },
-		.choose = choose_shape },
+		.particle = "point" },
 	{ .name = "strain",
 		.kind = &quern_strain_kind,
 		.doc = "what of the velocity gradient goes into volume and stress",
@@ -262,20 +255,6 @@ static quern_status place_sources(
 				"the region holds about %.2g points, more than %d: make cells larger", l.wanted, MOST_POINTS);
 	}
 	return QUERN_OK;
-}
-
-static quern_status hear_transfer(
-	void *self, const quern_setup *setup, const quern_bound *transfer, uint32_t n, quern_err *err) {
-	mpm *p = self;
-	(void)setup, (void)n, (void)err;
-	p->matrix = ((const quern_transfer_ops *)transfer->ops)->affine != 0;
-	return QUERN_OK;
-}
-
-/* docs/decisions/0056 */
-static const char *choose_shape(const void *self, const quern_setup *setup) {
-	const mpm *p = self;
-	return p->matrix || p->affine || setup->host->keeps(setup, "hybrid") ? "gimp" : "bspline";
 }
 
 /* After the sources. */
@@ -422,6 +401,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 			strain->means, QUERN_STRAIN_MOST);
 	const quern_bound *material = slot[SLOT_MATERIAL], *shape = slot[SLOT_SHAPE],
 					  *transfer = slot[SLOT_TRANSFER];
+	p->matrix = ((const quern_transfer_ops *)transfer->ops)->affine != 0;
 	p->moments = p->matrix && fit_has_moments(shape, setup->dim);
 	if (p->matrix && p->rasterise == RASTERISE_PLAIN)
 		return setup->host->fail(err, QUERN_E_PARAM, "rasterise",
