@@ -66,7 +66,7 @@ static quern_real density_of(
 	const gather_work *w, const gather_memory *m, uint32_t b, uint32_t c, bool *inside) {
 	const quern_real *fullness = w->s->use[GATHER_FULLNESS].real[0];
 	const quern_real centre = centre_density(w, m, c);
-	*inside = (w->p->alone || w->spreads) && surrounded(w, m, b, c);
+	*inside = (w->p->alone || w->moment) && surrounded(w, m, b, c);
 	if (w->p->alone) {
 		if (!*inside) return centre;
 		const quern_row *node = w->trips.node + (size_t)b * QUERN_BLOCK_CELLS + c;

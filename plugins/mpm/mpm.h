@@ -26,7 +26,7 @@ typedef struct mpm {
 	quern_real relief, answer; /* of the pressure to cells that are too full: over the bulk modulus, 1/s */
 	quern_real follow;         /* of density, to the cell's: a rate over the shear rate */
 	bool alone;                /* density follows without a hybrid: cells are counted here */
-	bool counted;              /* steps are, to the next one that counts cells or spreads points */
+	bool counted;              /* steps are, to the next one that counts cells, and how points lie in them */
 	quern_real spread;         /* of points over their cells: a rate over the shear rate */
 	quern_real bears;          /* Pa, from where on they are: the weight of half a cell */
 	quern_real rest, diameter, rest_rate; /* shear rate of what is at rest: over sqrt(g/D), 1/s */

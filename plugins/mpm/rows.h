@@ -9,7 +9,7 @@
 	"total.unsorted", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: points must be sorted before the next scatter."
 #define UNCOUNTED_USE(ACCESS) \
 	"total.uncounted", "1", ACCESS, QUERN_INDEX, .when = "counted", \
-	.doc = "1: what cells hold was counted in this step, and points are spread; counts up to the next time."
+	.doc = "1: what cells hold was counted in this step, and how fast points are spread; counts up to the next time."
 #define IMPULSE_USE "body.impulse", "N s", QUERN_UPDATE, QUERN_VECTOR, .flags = QUERN_OPTIONAL
 #define TWIST_USE "body.twist", "N m s", QUERN_UPDATE, QUERN_AXIAL, .flags = QUERN_OPTIONAL
 #define WORK_USE "body.work", "J", QUERN_UPDATE, QUERN_SCALAR, .flags = QUERN_OPTIONAL
@@ -176,8 +176,8 @@ QUERN_USE_ENUM(WALLS_USES);
 		.doc = "Rate at which the density goes to that of the cell, over the density.") \
 	X(GATHER_AROUND, "point.around", "Pa", QUERN_UPDATE, QUERN_SCALAR, .when = "alone", \
 		.doc = "Mean pressure of the cell when it was counted.") \
-	X(GATHER_SPREADING, "point.spreading", "1/s", QUERN_UPDATE, QUERN_VECTOR, .when = "counted", \
-		.doc = "Rate at which the point goes through its cell to where others are not, in cells.") \
+	X(GATHER_SPREADING, "point.spreading", "1/s", QUERN_UPDATE, QUERN_VECTOR, .when = "counted", .rule = QUERN_OWN, \
+		.doc = "Rate at which the point would go, from the middle of its cell, to where others are not, in cells.") \
 	X(GATHER_UNCOUNTED, UNCOUNTED_USE(QUERN_READ)) \
 	X(GATHER_HELD, "node.held", "kg", QUERN_READ, QUERN_SCALAR, .when = "alone") \
 	X(GATHER_CROWDING, "cell.crowding", "1", QUERN_READ, QUERN_SCALAR, .flags = QUERN_OPTIONAL) \

@@ -175,9 +175,10 @@ QUERN_INLINE void spread_chunk(
 	}
 }
 
-/* Nothing is moved across a face. */
+/* Nothing is moved across a face. Updates of zones come between counts: who has come into one stays from then on. */
 static void spread_move(const gather_work *w, const gather_memory *m, uint32_t begin, uint32_t n) {
 	const quern_real dt = w->s->dt, cell = w->g->cell, inverse = 1 / cell;
+	const quern_real *weight = w->points.weight ? w->points.weight + begin : NULL;
 	for (uint32_t k = 0; k < w->s->dim; k++) {
 		const quern_real *restrict rate = w->s->use[GATHER_SPREADING].real[k] + begin, *restrict place =
 																						   m->trip.stencil
@@ -185,8 +186,9 @@ static void spread_move(const gather_work *w, const gather_memory *m, uint32_t b
 		quern_real *restrict x = w->s->use[GATHER_POSITION].real[k] + begin;
 		QUERN_SIMD
 		for (uint32_t i = 0; i < n; i++) {
-			const quern_real t = place[i] * inverse, off = t - quern_floor(t) - 0.5;
-			x[i] += dt * rate[i] * (1 - 4 * off * off) * cell;
+			const quern_real t = place[i] * inverse, off = t - quern_floor(t) - 0.5,
+							 here = weight && weight[i] < 1 ? 0 : rate[i];
+			x[i] += dt * here * (1 - 4 * off * off) * cell;
 		}
 	}
 }

@@ -111,8 +111,63 @@ static void sums_are_right(void **unused) {
 	}
 }
 
+/* What one particle sends to one node, lane by lane. */
+static quern_real sent_to(const stencil *s, uint32_t i, quern_real lane[4][QUERN_LANES], const uint32_t at[3],
+	uint32_t dim, uint32_t l, quern_real cell) {
+	quern_real even = 1, sum;
+	for (uint32_t a = 0; a < dim; a++) even *= s->value[a][at[a]][i];
+	sum = even * lane[0][l];
+	for (uint32_t a = 0; a < dim; a++) {
+		quern_real by = l < CARRIED ? at[a] * cell - s->position[a][i] : s->slope[a][at[a]][i];
+		for (uint32_t b = 0; b < dim; b++)
+			if (l < CARRIED || b != a) by *= s->value[b][at[b]][i];
+		sum += by * lane[1 + a][l];
+	}
+	return sum;
+}
+
+static void what_is_sent_arrives(int what, const int dim) {
+	static stencil s;
+	static quern_row tile[QUERN_TILE_MOST];
+	static quern_real plain[QUERN_TILE_MOST][QUERN_LANES];
+	const quern_real cell = 0.004;
+	uint32_t state = 11, third[STENCIL];
+	for (uint32_t i = 0; i < STENCIL; i++) third[i] = dim == 3 ? i % KINDS : KINDS - 1;
+	fill(&s, third, false, &state);
+	stencil_find_reach(STENCIL, &s);
+	memset(tile, 0, sizeof tile);
+	memset(plain, 0, sizeof plain);
+	for (uint32_t i = 0; i < STENCIL; i++) {
+		quern_real lane[4][QUERN_LANES] = { { 0 } };
+		sent p = { 0 };
+		for (uint32_t k = 0; k < 4; k++)
+			for (uint32_t l = 0; l < QUERN_LANES; l++)
+				if (k == 0 ? l < CARRIED : what & (l < CARRIED ? SENDS_ALONG : SENDS_SLOPE))
+					lane[k][l] = random_real(&state);
+		p.base = parted(lane[0]);
+		for (int a = 0; a < dim; a++) p.lean[a] = parted(lane[1 + a]);
+		if (dim == 2) stencil_scatter(&s, i, &p, what, tile, 2, cell);
+		else stencil_scatter(&s, i, &p, what, tile, 3, cell);
+		for (uint32_t n = 0; n < (dim == 3 ? 27 : 9); n++) {
+			const uint32_t at[3] = { n % 3, n / 3 % 3, n / 9 }, span = tile_span(dim);
+			const uint32_t node = (uint32_t)s.node[i] + (at[2] * span + at[1]) * span + at[0];
+			for (uint32_t l = 0; l < QUERN_LANES; l++)
+				plain[node][l] += sent_to(&s, i, lane, at, (uint32_t)dim, l, cell);
+		}
+	}
+	for (uint32_t k = 0; k < QUERN_TILE_MOST; k++)
+		for (uint32_t l = 0; l < QUERN_LANES; l++) assert_true(fabs(tile[k][l] - plain[k][l]) < 1e-13);
+}
+
+static void all_that_is_sent_arrives(void **unused) {
+	(void)unused;
+	for (int dim = 2; dim <= 3; dim++)
+		for (int what = SENDS_BASE; what <= (SENDS_ALONG | SENDS_SLOPE); what++)
+			what_is_sent_arrives(what, dim);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(reach_is_found), cmocka_unit_test(sums_are_whole),
-		cmocka_unit_test(sums_are_right) };
+		cmocka_unit_test(sums_are_right), cmocka_unit_test(all_that_is_sent_arrives) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
