@@ -142,16 +142,15 @@ static void zone_swept(void **unused) {
 		"top, diameters | "
 		"carried mass, worst | carried mass, last | entries over the mass | ledger | grains, points");
 	for (size_t k = 0; k < 2; k++) {
-		enum { MOST_STATES = 5 };
-		const int states = beyond_is_long() ? MOST_STATES : 3;
-		double rest[MOST_STATES];
+		enum { STATES = 8 }; /* of three chance decided */
+		double rest[STATES];
 		swept mean = { .kinetic = 0 };
-		for (int seed = 1; seed <= states; seed++) {
+		for (int seed = 1; seed <= STATES; seed++) {
 			const swept w = sweep(of_packer[k].packer, seed);
-			add_state(&mean, &w, states);
+			add_state(&mean, &w, STATES);
 			rest[seed - 1] = w.rest;
 		}
-		mean.rest = held_middle(rest, states);
+		mean.rest = held_middle(rest, STATES);
 		judge(&of_packer[k], &mean);
 	}
 }
