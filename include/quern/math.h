@@ -4,7 +4,7 @@
  * libm's exp, log, pow and trigonometry differ between versions and, inside one version, between processors,
  * since it picks a variant with or without fma when the program starts. These differ nowhere: they consist of
  * + - * /, square roots, comparisons and integer operations, which IEEE 754 defines to the last bit. That
- * holds for gcc and clang on any x86-64, provided that nothing is contracted to fma and nothing reassociated:
+ * holds for gcc and clang on any x86-64, provided that compilers contract nothing to fma and reassociate nothing:
  * compile with -ffp-contract=off -fno-math-errno -fno-trapping-math, and never with -ffast-math. The rounding
  * mode is to nearest, subnormals are not flushed.
  *

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* stencil - particles of one grid block and the nodes they reach, in the block's tile; for points and grains alike */
 #pragma once
+#include "fused.h"
 #include <math.h>
 #include <quern/grid.h>
 #include <quern/shape.h>
@@ -133,16 +134,6 @@ QUERN_INLINE void stencil_cells(const quern_grid_view *g, uint32_t block, int ax
 
 /* ---- rows in parts ---- */
 
-/* A row as the processor takes it in one go: a compiler that has to cut rows by itself passes each factor through memory, and waits for it. */
-#if defined __AVX512F__
-enum { PARTS = 1 };
-#elif defined __AVX__
-enum { PARTS = 2 };
-#else
-enum { PARTS = 4 };
-#endif
-enum { PART_LANES = QUERN_LANES / PARTS };
-typedef quern_real row_part __attribute__((vector_size(PART_LANES * sizeof(quern_real)), may_alias));
 typedef struct parted_row {
 	row_part part[PARTS];
 } parted_row;
@@ -186,9 +177,8 @@ QUERN_INLINE row_part stencil_lean(const stencil *s, uint32_t i, const int what,
 			   pushes = part_pushes(part) && what & SENDS_SLOPE;
 	const quern_real c = along ? s->value[axis][k][i] * way[axis][k] : 0,
 					 p = pushes ? s->slope[axis][k][i] : 0;
-	const row_part none = { 0 };
 	if (along && pushes) return PARTED(c, c, c, c, p, p, p, p).part[0];
-	return (along ? c : p) + none;
+	return part_of(along ? c : p);
 }
 
 /* Lanes of the other kind are zero, and what is added for them does not change a bit: rows come out alike however they are cut.
@@ -202,9 +192,9 @@ QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent 
 	if (!carries && !leans) return;
 	const uint32_t span = tile_span(dim);
 	quern_row *const lowest = tile + s->node[i];
-	row_part value[3], lean[3];
+	row_part value[3], lean[3] = { none, none, none };
 	for (uint32_t x = 0; x < to_x; x++) {
-		value[x] = s->value[0][x][i] + none;
+		value[x] = part_of(s->value[0][x][i]);
 		if (leans) lean[x] = stencil_lean(s, i, what, way, 0, x, k);
 	}
 	for (uint32_t z = 0; z < to_z; z++) {
@@ -214,7 +204,7 @@ QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent 
 			const row_part gz = p->lean[2].part[k];
 			if (carries) base *= v;
 			if (leans) gx *= v, gy *= v;
-			if (leans && carries) base += stencil_lean(s, i, what, way, 2, z, k) * gz;
+			if (leans && carries) base = part_fma(stencil_lean(s, i, what, way, 2, z, k), gz, base);
 			else if (leans) base = stencil_lean(s, i, what, way, 2, z, k) * gz;
 		}
 		for (uint32_t y = 0; y < to_y; y++) {
@@ -222,15 +212,16 @@ QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent 
 			row_part even = none, tilt = none;
 			if (carries || dim == 3) even = v * base;
 			if (leans) {
-				const row_part cross = stencil_lean(s, i, what, way, 1, y, k) * gy;
-				if (carries || dim == 3) even += cross;
-				else even = cross;
+				const row_part lean_y = stencil_lean(s, i, what, way, 1, y, k);
+				if (carries || dim == 3) even = part_fma(lean_y, gy, even);
+				else even = lean_y * gy;
 				tilt = v * gx;
 			}
 			for (uint32_t x = 0; x < to_x; x++) {
-				row_part to = value[x] * even;
-				if (leans) to += lean[x] * tilt;
-				parts_of(lowest + (z * span + y) * span + x)[k] += to;
+				row_part *const to = &parts_of(lowest + (z * span + y) * span + x)[k];
+				row_part now = part_fma(value[x], even, *to);
+				if (leans) now = part_fma(lean[x], tilt, now);
+				*to = now;
 			}
 		}
 	}
@@ -263,33 +254,41 @@ QUERN_INLINE void stencil_gather_part(const stencil *s, uint32_t i, const quern_
 	const uint32_t to_y, const uint32_t to_z, const int k) {
 	const bool sloped = slopes && part_carries(k);
 	const uint32_t span = tile_span(dim);
-	row_part sum = { 0 }, sx = { 0 }, sy = { 0 }, sz = { 0 };
+	row_part sum = { 0 };
+	half_part sx = { 0 }, sy = { 0 }, sz = { 0 };
 	for (uint32_t z = 0; z < to_z; z++) {
-		row_part u = { 0 }, ux = { 0 }, uy = { 0 };
+		row_part u = { 0 };
+		half_part ux = { 0 }, uy = { 0 };
 		for (uint32_t y = 0; y < to_y; y++) {
 			const quern_row *row = tile + s->node[i] + (z * span + y) * span;
-			const row_part a = const_parts_of(row)[k], b = const_parts_of(row + 1)[k];
-			row_part e = s->value[0][0][i] * a + s->value[0][1][i] * b, d = { 0 };
-			if (sloped) d = slope[0][0][i] * a + slope[0][1][i] * b;
-			if (to_x == 3) {
-				const row_part c = const_parts_of(row + 2)[k];
-				e += s->value[0][2][i] * c;
-				if (sloped) d += slope[0][2][i] * c;
+			row_part e = { 0 };
+			half_part d = { 0 };
+			for (uint32_t x = 0; x < to_x; x++) {
+				const row_part a = const_parts_of(row + x)[k];
+				e = part_fma(part_of(s->value[0][x][i]), a, e);
+				if (sloped) d = half_fma(half_with(slope[0][x][i]), half_of(a), d);
 			}
-			u += s->value[1][y][i] * e;
+			const row_part v = part_of(s->value[1][y][i]);
+			u = part_fma(v, e, u);
 			if (!sloped) continue;
-			ux += s->value[1][y][i] * d;
-			uy += slope[1][y][i] * e;
+			ux = half_fma(half_of(v), d, ux);
+			uy = half_fma(half_with(slope[1][y][i]), half_of(e), uy);
 		}
-		const quern_real v = dim == 3 ? s->value[2][z][i] : 1;
-		sum += v * u;
+		if (dim == 2) {
+			sum = u, sx = ux, sy = uy;
+			break;
+		}
+		const row_part v = part_of(s->value[2][z][i]);
+		sum = part_fma(v, u, sum);
 		if (!sloped) continue;
-		sx += v * ux;
-		sy += v * uy;
-		if (dim == 3) sz += slope[2][z][i] * u;
+		sx = half_fma(half_of(v), ux, sx);
+		sy = half_fma(half_of(v), uy, sy);
+		sz = half_fma(half_with(slope[2][z][i]), half_of(u), sz);
 	}
 	parts_of(&out[0])[k] = sum;
-	if (sloped) parts_of(&out[1])[k] = sx, parts_of(&out[2])[k] = sy, parts_of(&out[3])[k] = sz;
+	if (!sloped) return;
+	const half_part along[3] = { sx, sy, sz };
+	for (int a = 0; a < dim; a++) *(half_part *)(void *)&parts_of(&out[1 + a])[k] = along[a];
 }
 
 QUERN_INLINE void stencil_gather_reach(const stencil *s, uint32_t i, const quern_row *tile, const int dim,
