@@ -151,11 +151,11 @@ static void touch_node(const grid_work *w, uint32_t j, const near_nodes *n, uint
 	booked[B_WORK] += quern_vec_dot(QUERN_VEC_OF(given), QUERN_VEC_AT(n->velocity, i, dim), 3);
 }
 
-static bool body_is_far(const quern_bound *body, const near_nodes *n, quern_body_batch batch, quern_real cell,
-	quern_real extent) {
+static bool body_is_far(const quern_bound *body, const quern_real first[3], quern_body_batch batch,
+	quern_real cell, quern_real extent) {
 	near_nodes one;
 	for (uint32_t k = 0; k < batch.dim; k++) {
-		one.position[k][0] = n->position[k][0] + 0.5 * extent;
+		one.position[k][0] = first[k] + 0.5 * extent;
 		for (uint32_t i = 1; i < QUERN_LANES; i++) one.position[k][i] = one.position[k][0];
 		batch.position[k] = one.position[k];
 		batch.normal[k] = one.normal[k];
@@ -244,6 +244,21 @@ static void take_count(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n
 	if (folded) n->counted[i] *= gap > 0 ? fmin(1, 0.5 + gap / cell) : cut_hat_beyond(-gap / cell);
 }
 
+/* Whether faces of the domain leave all nodes of a block their room. */
+static bool is_inside(const quern_grid_view *g, uint32_t b) {
+	for (uint32_t k = 0; k < g->dim; k++) {
+		const int32_t first = g->at[b][k] * (int32_t)g->edge, last = first + (int32_t)g->edge - 1;
+		if (!g->periodic[k] && (first < 2 || g->cells[k] - last < 2)) return false;
+	}
+	return true;
+}
+
+static void measure_densities_inside(const grid_work *w, uint32_t b) {
+	const quern_real volume = quern_grid_cell_volume(w->g);
+	const uint32_t lane = motion_density(w->g->dim);
+	for (uint32_t i = b * N; i < (b + 1) * N; i++) w->motion[i][lane] = w->node[i][0] / volume;
+}
+
 /* A node to which bodies leave hardly any room does not say how full that is; its density is marked by a sign, and its size is that of a node
  * with the least room that says something. What is counted around a cell's centre becomes that of a whole one. */
 static void measure_densities(const grid_work *w, uint32_t b, const near_nodes *n) {
@@ -261,27 +276,37 @@ static void measure_densities(const grid_work *w, uint32_t b, const near_nodes *
 	}
 }
 
-static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
+static void place_nodes(const grid_work *w, uint32_t b, near_nodes *n) {
+	for (uint32_t i = 0; i < N; i++) {
+		quern_real x[3];
+		quern_grid_corner(w->g, b * N + i, x);
+		for (uint32_t k = 0; k < w->s->dim; k++) n->position[k][i] = x[k];
+		n->surfaces[i] = 0;
+		n->counted[i] = 1;
+	}
+}
+
+/* False where no body is near, and nothing is placed. */
+static bool meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 	const quern_step *s = w->s;
+	bool placed = false;
+	quern_real first[3];
+	quern_grid_corner(w->g, b * N, first);
 	quern_body_batch batch = { .n = N, .cap = N, .dim = s->dim, .radius = n->radius, .gap = n->gap };
 	for (uint32_t k = 0; k < s->dim; k++) {
 		batch.normal[k] = n->normal[k];
 		batch.velocity[k] = n->velocity[k];
-	}
-	for (uint32_t i = 0; i < N; i++) {
-		quern_real x[3];
-		quern_grid_corner(w->g, b * N + i, x);
-		for (uint32_t k = 0; k < s->dim; k++) n->position[k][i] = x[k];
-		n->surfaces[i] = 0;
-		n->counted[i] = 1;
 	}
 	for (uint32_t j = 0; j < w->n_bodies; j++) {
 		const quern_bound *body = &s->slot[SLOT_BODIES][j];
 		const body_item *item = body->item;
 		if (!quern_body_meets_points(body, s->settling)) continue;
 		batch.pose = &w->pose[j].pose;
+		if (!w->pose[j].repeats && body_is_far(body, first, batch, w->g->cell, w->g->cell * w->g->edge))
+			continue;
+		if (!placed) place_nodes(w, b, n);
+		placed = true;
 		if (w->pose[j].repeats) bring_nodes(&w->pose[j], s->dim, n);
-		else if (body_is_far(body, n, batch, w->g->cell, w->g->cell * w->g->edge)) continue;
 		for (uint32_t i = 0; i < N; i++) n->radius[i] = item->displacement;
 		for (uint32_t k = 0; k < s->dim; k++)
 			batch.position[k] = w->pose[j].repeats ? n->own[k] : n->position[k];
@@ -294,6 +319,7 @@ static void meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 				touch_node(w, j, n, b, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
 		}
 	}
+	return placed;
 }
 
 /* A face of the domain without a body is closed unless the scene opens it: nothing passes, nothing rubs. */
@@ -323,8 +349,12 @@ static void meet_walls(void *arg, uint32_t b, uint32_t worker) {
 	bool any = false;
 	for (uint32_t i = 0; i < N && !any; i++) any = w->node[(size_t)b * N + i][0] > 0;
 	if (!any || !n) return;
-	meet_bodies(w, b, n);
-	if (!w->again) measure_densities(w, b, n);
+	const bool met = meet_bodies(w, b, n);
+	if (!w->again && !met && is_inside(w->g, b)) measure_densities_inside(w, b);
+	else if (!w->again) {
+		if (!met) place_nodes(w, b, n);
+		measure_densities(w, b, n);
+	}
 	close_faces(w, b, body_booked(&w->books, b, w->n_bodies));
 }
 
