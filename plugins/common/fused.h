@@ -6,8 +6,12 @@
 #endif
 #include <quern/grid.h>
 
+#if defined __AVX512F__ && defined __FMA__
+#define QUERN_WHOLE_ROWS
+#endif
+
 /* Rows are cut here: a compiler that has to do so by itself passes each factor through memory, and waits for it. */
-#if defined __AVX512F__
+#if defined QUERN_WHOLE_ROWS
 enum { PARTS = 1 };
 #elif defined __AVX__
 enum { PARTS = 2 };
@@ -19,7 +23,7 @@ typedef quern_real row_part __attribute__((vector_size(PART_LANES * sizeof(quern
 
 /* The same in all lanes. */
 QUERN_INLINE row_part part_of(quern_real x) {
-#if defined __AVX512F__
+#if defined QUERN_WHOLE_ROWS
 	return (row_part) { x, x, x, x, x, x, x, x };
 #elif defined __AVX__
 	return (row_part) { x, x, x, x };
@@ -70,7 +74,7 @@ static inline row_part part_fma_apart(row_part a, row_part b, row_part c) {
 #endif
 
 QUERN_INLINE row_part part_fma(row_part a, row_part b, row_part c) {
-#if defined __AVX512F__
+#if defined QUERN_WHOLE_ROWS
 	return (row_part)_mm512_fmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
 #elif defined __AVX__ && defined __FMA__
 	return (row_part)_mm256_fmadd_pd((__m256d)a, (__m256d)b, (__m256d)c);
@@ -83,7 +87,7 @@ QUERN_INLINE row_part part_fma(row_part a, row_part b, row_part c) {
 }
 
 /* The first half of a row, or of the part of it that there is. */
-#if defined __AVX512F__
+#if defined QUERN_WHOLE_ROWS
 typedef quern_real half_part __attribute__((vector_size(4 * sizeof(quern_real)), may_alias));
 QUERN_INLINE half_part half_of(row_part a) { return (half_part)_mm512_castpd512_pd256((__m512d)a); }
 QUERN_INLINE half_part half_with(quern_real x) { return (half_part) { x, x, x, x }; }

@@ -144,7 +144,7 @@ QUERN_INLINE const row_part *const_parts_of(const quern_row *row) {
 }
 /* Lanes in a list are put together in registers; one after the other they are not. */
 QUERN_INLINE parted_row parted(const quern_real l[QUERN_LANES]) {
-#if defined __AVX512F__
+#if defined QUERN_WHOLE_ROWS
 	return (parted_row) { { { l[0], l[1], l[2], l[3], l[4], l[5], l[6], l[7] } } };
 #elif defined __AVX__
 	return (parted_row) { { { l[0], l[1], l[2], l[3] }, { l[4], l[5], l[6], l[7] } } };
@@ -181,7 +181,8 @@ QUERN_INLINE row_part stencil_lean(const stencil *s, uint32_t i, const int what,
 	return part_of(along ? c : p);
 }
 
-/* Lanes of the other kind are zero, and what is added for them does not change a bit: rows come out alike however they are cut.
+/* Lanes of the other kind are zero, and what is added for them changes nothing but the sign of a zero, which goes as tiles are added to nodes: rows come
+ * out alike however they are cut.
  * What is added may lie anywhere for all that the compiler knows: what nodes share is read before. */
 QUERN_INLINE void stencil_scatter_part(const stencil *s, uint32_t i, const sent *p, const int what,
 	quern_row *tile, const int dim, quern_real way[3][3], const uint32_t to_x, const uint32_t to_y,

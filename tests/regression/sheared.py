@@ -108,8 +108,8 @@ def block(scene, x, y):
 
 def fall(scene, place):
     """In free fall there is no pressure: what is continuum stays so, but for cells that the block has just come into. Single points that are
-    as dense as at rest press for a moment, and may turn a part of the block: how it lies in the cells decides, in a quarter of all places,
-    so the middle of fifteen drawn ones counts."""
+    as dense as at rest press for a moment, and may turn a part of the block: how it lies in the cells decides, so the middle of fifteen drawn
+    places counts."""
     mean = []
     for x, y in numpy.random.default_rng(5).uniform(0, CELL, (15, 2)):
         block(scene, x, y)
