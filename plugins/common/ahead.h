@@ -3,10 +3,11 @@
  * block, where no processor foresees what is wanted next */
 #pragma once
 #include <quern/columns.h>
+#include <quern/grid.h>
 #include <quern/solver.h>
 
 /* A set of less than so many bytes stays in caches, which need not be asked. */
-enum { AHEAD_MOST = 64, AHEAD_BYTES = 8 << 20 };
+enum { AHEAD_MOST = 64, AHEAD_BYTES = 4 << 20 };
 
 typedef struct ahead {
 	const quern_real *column[AHEAD_MOST];
@@ -27,10 +28,31 @@ static inline void ahead_end(ahead *a, uint32_t n) {
 	if ((size_t)n * a->n * sizeof(quern_real) < AHEAD_BYTES) a->n = 0;
 }
 
-/* Those from `begin` on, `most` of them and none beyond `end`. */
-QUERN_INLINE void ahead_ask(const ahead *a, uint32_t begin, uint32_t end, uint32_t most) {
-	enum { LINE = 64 / sizeof(quern_real) };
-	const uint32_t n = begin >= end ? 0 : end - begin < most ? end - begin : most;
-	for (uint32_t c = 0; c < a->n; c++)
-		for (uint32_t i = 0; i < n; i += LINE) __builtin_prefetch(a->column[c] + begin + i);
+/* What follows a chunk: the entries from `begin` on, of `n` in the set, and nodes of the next block. */
+typedef struct ahead_at {
+	uint32_t begin, n, next, rows; /* rows: nodes that have been asked for with the chunks before */
+} ahead_at;
+
+/* Behind those n of block b that begin at entry i; `first`: of each block. */
+QUERN_INLINE ahead_at ahead_from(
+	const quern_grid_view *g, const uint32_t *first, uint32_t b, uint32_t next, uint32_t i, uint32_t n) {
+	const uint32_t after = i + n < first[b + 1] ? i + n : first[next];
+	return QUERN_VALUE(ahead_at, after, first[g->n_blocks], next, i - first[b]);
+}
+
+/* One part in AHEAD of the lines of the next AHEAD entries: a processor waits once it has asked for some tens of lines that have not come yet, so
+ * they are asked for in turn with other work. */
+enum { AHEAD = 64, AHEAD_LINE = 64 / sizeof(quern_real), AHEAD_LINES = AHEAD / AHEAD_LINE };
+QUERN_INLINE void ahead_ask(const ahead *a, const ahead_at *at, uint32_t part) {
+	const uint32_t i = at->begin + part % AHEAD_LINES * AHEAD_LINE;
+	if (i >= at->n) return;
+	for (uint32_t c = part / AHEAD_LINES; c < a->n; c += AHEAD_LINES) __builtin_prefetch(a->column[c] + i);
+}
+
+/* One node of the next block's tile. In a plane all nodes are few enough to be near anyway. */
+QUERN_INLINE void ahead_ask_rows(
+	const quern_grid_view *g, const quern_row *rows, const ahead_at *at, uint32_t part, const int dim) {
+	if (dim == 2 || at->rows + part >= g->tile_size) return;
+	const int32_t entry = g->tile[(size_t)at->next * g->tile_size + at->rows + part];
+	__builtin_prefetch(rows + (entry < 0 ? 0 : entry));
 }

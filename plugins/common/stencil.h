@@ -320,23 +320,28 @@ QUERN_INLINE void stencil_gather(
 
 /* ---- all blocks, where they add to nodes ---- */
 
+/* `next` is worked on after `block`, by whichever worker; the same where there is none. */
+typedef void stencil_body(void *arg, uint32_t block, uint32_t next, uint32_t worker);
+
 typedef struct stencil_blocks {
-	void (*body)(void *arg, uint32_t block, uint32_t worker);
+	stencil_body *body;
 	void *arg;
 	const uint32_t *list; /* of one colour */
+	uint32_t n;
 } stencil_blocks;
 
 static inline void stencil_one_block(void *arg, uint32_t i, uint32_t worker) {
 	const stencil_blocks *all = arg;
-	all->body(all->arg, all->list[i], worker);
+	all->body(all->arg, all->list[i], all->list[i + 1 < all->n ? i + 1 : i], worker);
 }
 
 /* Colour by colour, so that no two blocks whose tiles share a node run at once, and each node sums in a fixed order. */
-static inline void stencil_by_colour(const quern_step *s, const quern_grid_view *g,
-	void (*body)(void *arg, uint32_t block, uint32_t worker), void *arg) {
-	stencil_blocks all = { body, arg, NULL };
+static inline void stencil_by_colour(
+	const quern_step *s, const quern_grid_view *g, stencil_body *body, void *arg) {
+	stencil_blocks all = { body, arg, NULL, 0 };
 	for (uint32_t c = 0; c < g->n_colours; c++) {
 		all.list = g->by_colour + g->colour[c];
-		s->host->parallel(s->run, g->colour[c + 1] - g->colour[c], stencil_one_block, &all);
+		all.n = g->colour[c + 1] - g->colour[c];
+		s->host->parallel(s->run, all.n, stencil_one_block, &all);
 	}
 }

@@ -80,8 +80,7 @@ QUERN_INLINE void trips_send(const trips *t, trip_memory *m, uint32_t i, quern_r
 /* ---- all blocks ---- */
 
 /* All round trips; `send` is what a block does in one, and afterwards the last pass is left to do. */
-static inline quern_status trips_run(
-	trips *t, void (*send)(void *arg, uint32_t block, uint32_t worker), void *arg) {
+static inline quern_status trips_run(trips *t, stencil_body *send, void *arg) {
 	const quern_step *s = t->s;
 	const uint32_t passes = quern_transfer_trips(t->transfer->ops, t->transfer->self);
 	const size_t nodes = (size_t)t->g->n_blocks * QUERN_BLOCK_CELLS;

@@ -163,7 +163,10 @@ static void back_run(void *arg, uint32_t b, uint32_t worker, bool last) {
 	else back_block(w, m, b, 3, false);
 }
 static void back_one(void *arg, uint32_t b, uint32_t worker) { back_run(arg, b, worker, true); }
-static void send_one(void *arg, uint32_t b, uint32_t worker) { back_run(arg, b, worker, false); }
+static void send_one(void *arg, uint32_t b, uint32_t next, uint32_t worker) {
+	(void)next;
+	back_run(arg, b, worker, false);
+}
 
 quern_status quern_hybrid_back(const void *self, const quern_step *s) {
 	const quern_column *u = s->use;

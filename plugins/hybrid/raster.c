@@ -57,7 +57,8 @@ QUERN_INLINE void raster_block(const raster_work *w, raster_memory *m, uint32_t 
 	quern_tile_add(w->g, w->mixture, b, m->sum);
 }
 
-static void raster_one(void *arg, uint32_t b, uint32_t worker) {
+static void raster_one(void *arg, uint32_t b, uint32_t next, uint32_t worker) {
+	(void)next;
 	const raster_work *w = arg;
 	raster_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
 	if (!m) return;

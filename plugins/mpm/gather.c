@@ -35,9 +35,11 @@ static void speak_for_others(const gather_work *w, gather_memory *m) {
 }
 
 /* What the nodes say at the points of a chunk. */
-QUERN_INLINE void collect_chunk(
-	const gather_work *w, gather_memory *m, uint32_t n, const int dim, const bool slopes) {
+QUERN_INLINE void collect_chunk(const gather_work *w, gather_memory *m, uint32_t n, const int dim,
+	const bool slopes, const ahead_at *at) {
 	for (uint32_t i = 0; i < n; i++) {
+		ahead_ask(&w->ahead, at, i);
+		ahead_ask_rows(w->g, w->motion, at, i, dim);
 		quern_row v[4];
 		stencil_gather(&m->trip.stencil, i, m->tile, dim, slopes, v);
 		trips_hear(&m->trip, i, &v[0], 0, dim);
@@ -45,6 +47,7 @@ QUERN_INLINE void collect_chunk(
 			for (int a = 0; a < dim && slopes; a++) m->gradient[dim * k + a][i] = v[1 + a][k];
 		m->grid_density[i] = v[0][2 * dim];
 	}
+	for (uint32_t i = n; i < AHEAD; i++) ahead_ask(&w->ahead, at, i);
 	trips_hear_echo(&w->trips, &m->trip, n, dim);
 }
 
@@ -241,11 +244,10 @@ QUERN_INLINE void finish_chunk(
 }
 
 QUERN_INLINE void gather_block(
-	const gather_work *w, gather_memory *m, uint32_t b, const int dim, const bool last) {
+	const gather_work *w, gather_memory *m, uint32_t b, uint32_t next, const int dim, const bool last) {
 	quern_real *const *x = w->s->use[GATHER_POSITION].real;
 	const uint32_t begin = w->point[b], end = w->point[b + 1];
 	if (begin == end) return;
-	ahead_ask(&w->ahead, begin, end, STENCIL);
 	quern_tile_load(w->g, w->motion, b, m->tile);
 	if (last) speak_for_others(w, m);
 	trips_begin_block(&w->trips, &m->trip, b, last);
@@ -254,9 +256,9 @@ QUERN_INLINE void gather_block(
 	if (last && w->strain->means) strain_block(w, m, b, dim);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
-		ahead_ask(&w->ahead, i + n, end, STENCIL);
+		const ahead_at at = ahead_from(w->g, w->point, b, next, i, n);
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
-		collect_chunk(w, m, n, dim, last);
+		collect_chunk(w, m, n, dim, last, &at);
 		if (last && w->p->matrix) fit_chunk(w, m, n, dim);
 		call_transfer(w, m, i, n, last);
 		for (uint32_t k = 0; k < n && !last; k++)
@@ -285,18 +287,22 @@ QUERN_INLINE void gather_block(
 	trips_end_block(&w->trips, &m->trip, b, last);
 }
 
-static void run_block(void *arg, uint32_t b, uint32_t worker, bool last) {
-	const gather_work *w = arg;
+static void run_block(const gather_work *w, uint32_t b, uint32_t next, uint32_t worker, bool last) {
 	gather_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
 	if (!m) w->bad[b] = 0;
 	else if (w->s->dim == 2) {
-		if (last) gather_block(w, m, b, 2, true);
-		else gather_block(w, m, b, 2, false);
-	} else if (last) gather_block(w, m, b, 3, true);
-	else gather_block(w, m, b, 3, false);
+		if (last) gather_block(w, m, b, next, 2, true);
+		else gather_block(w, m, b, next, 2, false);
+	} else if (last) gather_block(w, m, b, next, 3, true);
+	else gather_block(w, m, b, next, 3, false);
 }
-static void gather_one(void *arg, uint32_t b, uint32_t worker) { run_block(arg, b, worker, true); }
-static void send_one(void *arg, uint32_t b, uint32_t worker) { run_block(arg, b, worker, false); }
+static void gather_one(void *arg, uint32_t b, uint32_t worker) {
+	const gather_work *w = arg;
+	run_block(w, b, b + 1 < w->g->n_blocks ? b + 1 : b, worker, true);
+}
+static void send_one(void *arg, uint32_t b, uint32_t next, uint32_t worker) {
+	run_block(arg, b, next, worker, false);
+}
 
 static quern_status lost(const gather_work *w, int32_t i) {
 	const quern_step *s = w->s;

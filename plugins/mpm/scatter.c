@@ -89,37 +89,39 @@ QUERN_INLINE void count_point(
 }
 
 QUERN_INLINE void scatter_block(
-	const scatter_work *w, scatter_memory *m, uint32_t b, const int dim, const bool affine) {
+	const scatter_work *w, scatter_memory *m, uint32_t b, uint32_t next, const int dim, const bool affine) {
 	const quern_column *u = w->s->use;
 	const uint32_t begin = w->point[b], end = w->point[b + 1];
 	if (begin == end) return;
-	ahead_ask(&w->ahead, begin, end, STENCIL);
 	memset(m->tile, 0, w->g->tile_size * sizeof(quern_row));
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
-		ahead_ask(&w->ahead, i + n, end, STENCIL);
+		const ahead_at at = ahead_from(w->g, w->point, b, next, i, n);
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[SCATTER_POSITION].real, i, NULL, n, &m->stencil);
 		load_chunk(u, m, i, n, dim, affine);
 		for (uint32_t k = 0; k < n; k++) {
+			ahead_ask(&w->ahead, &at, k);
+			ahead_ask_rows(w->g, w->node, &at, k, dim);
 			const sent p = send_point(m, k, dim, affine);
 			stencil_scatter(&m->stencil, k, &p, affine ? SENDS_SLOPE | SENDS_ALONG : SENDS_SLOPE, m->tile,
 				dim, w->g->cell);
 			if (w->counts) count_point(w, m, b, k, u[SCATTER_MASS].real[0][i + k], dim);
 		}
+		for (uint32_t k = n; k < AHEAD; k++) ahead_ask(&w->ahead, &at, k);
 	}
 	quern_tile_add(w->g, w->node, b, m->tile);
 }
 
-static void scatter_one(void *arg, uint32_t b, uint32_t worker) {
+static void scatter_one(void *arg, uint32_t b, uint32_t next, uint32_t worker) {
 	const scatter_work *w = arg;
 	const bool affine = w->s->use[SCATTER_AFFINE].real[0];
 	scatter_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
 	if (!m) return;
 	if (w->s->dim == 2) {
-		if (affine) scatter_block(w, m, b, 2, true);
-		else scatter_block(w, m, b, 2, false);
-	} else if (affine) scatter_block(w, m, b, 3, true);
-	else scatter_block(w, m, b, 3, false);
+		if (affine) scatter_block(w, m, b, next, 2, true);
+		else scatter_block(w, m, b, next, 2, false);
+	} else if (affine) scatter_block(w, m, b, next, 3, true);
+	else scatter_block(w, m, b, next, 3, false);
 }
 
 quern_status quern_mpm_scatter(const void *self, const quern_step *s) {

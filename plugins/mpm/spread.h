@@ -62,7 +62,8 @@ QUERN_INLINE void spread_send(const gather_work *w, quern_row *tile, uint32_t b,
 		}
 }
 
-static void spread_scatter(void *arg, uint32_t b, uint32_t worker) {
+static void spread_scatter(void *arg, uint32_t b, uint32_t next, uint32_t worker) {
+	(void)next;
 	const gather_work *w = arg;
 	gather_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
 	if (!m || w->point[b] == w->point[b + 1]) return;

@@ -68,6 +68,11 @@ QUERN_INLINE quern_real isochoric_excess(const int dim, symmetric s) {
 	return excess_step(excess_step(y, q, det), q, det);
 }
 
+/* t, where only the sum of s and t I is asked for */
+QUERN_INLINE quern_real isochoric_mean(const int dim, symmetric s) {
+	return dim == 2 ? __builtin_sqrt(1 + symmetric_half_square(dim, s)) : 1 + isochoric_excess(dim, s);
+}
+
 /* det(1 + A) - 1 */
 QUERN_INLINE quern_real volume_change(const int dim, tensor a) {
 	const quern_real plane = a.xx * a.yy - a.xy * a.yx;
@@ -118,24 +123,27 @@ QUERN_INLINE void update(const int dim, const void *self, const quern_material_b
 		const tensor a = { dt * l.xx, dt * l.xy, dt * l.xz, dt * l.yx, dt * l.yy, dt * l.yz, dt * l.zx,
 			dt * l.zy, dt * l.zz };
 		const symmetric was = SYMMETRIC_AT(deviator, i, dim);
-		const quern_real excess = isochoric_excess(dim, was), change = volume_change(dim, a);
-		const symmetric whole = symmetric_scale_shift(dim, 1, was, 1 + excess);
+		const quern_real change = volume_change(dim, a);
+		const symmetric whole = symmetric_scale_shift(dim, 1, was, isochoric_mean(dim, was));
 		const quern_real edge = dim == 2 ? 1 : quern_cbrt(1 + change);
-		const quern_real shrink = dim == 2 ? 1 / (1 + change) : 1 / (edge * edge);
+		const quern_real wide = dim == 2 ? 1 + change : edge * edge;
 		const symmetric trial = symmetric_deviator(dim, pushed(dim, was, whole, a));
 		const quern_real e = strain[i] + (1 + strain[i]) * change;
 		/* Kirchhoff: p = K/2 (1 - J^2), tau = G sqrt(s:s/2) <= mu p */
 		const quern_real p = -half_bulk * e * (2 + e), limit = law.friction * p;
-		const quern_real tau = shear * shrink * __builtin_sqrt(symmetric_half_square(dim, trial));
-		const bool open = e > 0;
-		const symmetric back = symmetric_scale_shift(dim, shrink * (tau > limit ? limit / tau : 1), trial, 0);
+		/* the part of the trial that is left, 1/wide, or limit/tau of that: one quotient */
+		const quern_real wide_tau = shear * __builtin_sqrt(symmetric_half_square(dim, trial));
+		const bool open = e > 0, yields = wide_tau > limit * wide;
+		const quern_real left = (yields ? limit : 1) / (yields ? wide_tau : wide);
+		const symmetric back = symmetric_scale_shift(dim, left, trial, 0);
 		const symmetric now = symmetric_select(open, (symmetric) { 0, 0, 0, 0, 0, 0 }, back);
 		SYMMETRIC_PUT(deviator, i, now, dim);
 		/* an open point's volume is the grid's: J = max(1, rho_0/rho_g) */
 		const quern_real rho = grid_density[i], loose = rho < full ? rho : full;
-		strain[i] = open ? (full - loose) / loose : e;
+		const quern_real quotient = (open ? full - loose : 1) / (open ? loose : 1 + e);
+		strain[i] = open ? quotient : e;
 		density[i] = open ? loose : density[i];
-		const quern_real one_over_j = open ? 0 : 1 / (1 + e);
+		const quern_real one_over_j = open ? 0 : quotient;
 		const symmetric stress = symmetric_scale_shift(dim, shear * one_over_j, now, -p * one_over_j);
 		SYMMETRIC_PUT(b->stress, i, stress, dim);
 	}
@@ -195,7 +203,7 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.moduli = moduli,
 	.friction = friction };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 2,
+	.revision = 3,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.drucker_prager",
 	.brief = "Hyperelastic with Drucker and Prager's yield stress, one friction for every rate.",
