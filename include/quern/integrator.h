@@ -44,6 +44,8 @@ typedef struct quern_integrator_ops {
 	/* By how much of its second derivative the velocity of `predict` is late, in dt^2: 1/2 where the last acceleration predicts it by half
 	 * a step; at most 1. Laws may weaken their dashpots by it (quern_dashpot_share). 0, or no `predict`: it is not late. */
 	quern_real lag;
+	/* 1: `open` changes neither velocities nor spins. What it gives for velocities is not taken then, and it is called without spins. */
+	uint32_t coasts;
 } quern_integrator_ops;
 
 /* After which share of the step forces are evaluated; below 1, all of their impulse is given in that step. */

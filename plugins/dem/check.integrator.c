@@ -135,10 +135,11 @@ static void begin_flight(
 	f->open = opens ? create(c, it, WITH_SPIN | OPENS, n) : NULL;
 }
 
-/* Springs are stretched by dt times the velocity that `open` leaves: it has moved the grains by that. */
+/* Springs are stretched by dt times the velocity that `open` leaves: it has moved the grains by that. What coasts leaves it as it was. */
 static void compare_way(flight *f) {
 	const quern_check_kernel *k = f->open;
-	const quern_real asked = ((const quern_integrator_ops *)k->ops)->at, at = asked > 0 ? asked : 1;
+	const quern_integrator_ops *ops = k->ops;
+	const quern_real at = ops->at > 0 ? ops->at : 1;
 	for (uint32_t a = 0; a < k->dim; a++)
 		for (uint32_t i = 0; i < k->n; i++) {
 			const double from = quern_check_given(k, POSITION, a)[i],
@@ -146,7 +147,15 @@ static void compare_way(flight *f) {
 			const double left = quern_check_found(k, NEW_SPEED, a)[i];
 			k->host->measure(f->way, fabs(to - from - at * k->dt * left), 1e-15 * (1 + fabs(from) + fabs(to)),
 				"%u-D: open moves by %.15g m and leaves %.15g m/s", k->dim, to - from, left);
+			const double was = ops->coasts ? quern_check_given(k, SPEED, a)[i] : left;
+			k->host->measure(f->way, fabs(left - was), 0,
+				"%u-D: open turns %.15g m/s into %.15g, and should coast", k->dim, was, left);
 		}
+	for (uint32_t a = 0; a < quern_check_axial(k->dim) && ops->coasts; a++)
+		for (uint32_t i = 0; i < k->n; i++)
+			k->host->measure(f->way,
+				fabs(quern_check_found(k, NEW_SPIN, a)[i] - quern_check_given(k, SPIN, a)[i]), 0,
+				"%u-D: open changes spins, and should coast", k->dim);
 }
 
 static void before_forces(flight *f) {

@@ -66,9 +66,10 @@ static const quern_integrator_ops ops = { .size = sizeof ops,
 	.damping = 2,
 	.lag = 0.5,
 	.at = 0.5,
-	.step = 0.05 };
+	.step = 0.05,
+	.coasts = 1 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "integrator.position_verlet",
 	.brief = "Half a way, a kick, half a way: second order.",

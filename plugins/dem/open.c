@@ -10,6 +10,7 @@ typedef struct {
 	const quern_step *s;
 	const quern_bound *bound;
 	uint32_t n, n_spin;
+	bool coasts;          /* velocities and spins stay */
 	quern_real *farthest; /* by chunk: square of the way since the last list */
 	ways *ways;           /* by chunk */
 	bool boxed;
@@ -80,7 +81,7 @@ static void open_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 		const quern_real *x = u[OPEN_POSITION].real[k] + begin, *from = u[OPEN_ANCHOR].real[k] + begin;
 		quern_real *restrict along = w->along, *range = o->ways[chunk].along[k];
 		keep(u[OPEN_POSITION].real[k] + begin, w->position[k], held, n);
-		keep(u[OPEN_VELOCITY].real[k] + begin, w->velocity[k], held, n);
+		if (!o->coasts) keep(u[OPEN_VELOCITY].real[k] + begin, w->velocity[k], held, n);
 		QUERN_SIMD
 		for (uint32_t i = 0; i < n; i++) {
 			along[i] = x[i] - from[i];
@@ -100,8 +101,10 @@ quern_status quern_dem_open(const void *self, const quern_step *s) {
 	opening o = { .s = s, .bound = dem_integrator(s), .n = s->host->set(s->run, "grain").n };
 	o.boxed = ((const dem *)self)->boxed;
 	if (o.boxed) o.box = dem_box_at(s, &s->use[OPEN_BOX_LENGTH]);
-	if (!((const quern_integrator_ops *)o.bound->ops)->open[s->dim - 2] || !o.n) return QUERN_OK;
-	o.n_spin = s->use[OPEN_SPIN].real[0] ? (s->dim == 3 ? 3 : 1) : 0;
+	const quern_integrator_ops *ops = o.bound->ops;
+	if (!ops->open[s->dim - 2] || !o.n) return QUERN_OK;
+	o.coasts = ops->coasts;
+	o.n_spin = s->use[OPEN_SPIN].real[0] && !o.coasts ? (s->dim == 3 ? 3 : 1) : 0;
 	const uint32_t chunks = (o.n + CHUNK - 1) / CHUNK;
 	o.farthest = s->host->memory(s->run, chunks * sizeof(quern_real));
 	o.ways = s->host->memory(s->run, chunks * sizeof(ways));
