@@ -130,7 +130,7 @@ static double stress_size(const quern_check_kernel *k, uint32_t i, bool found) {
 }
 
 typedef struct {
-	quern_check_tally moduli, friction, again, held, yields, turned, violent;
+	quern_check_tally moduli, friction, again, held, yields, turned, taken, violent;
 } tallies;
 
 static void check_moduli(const quern_check_kernel *assign, tallies *t) {
@@ -279,8 +279,61 @@ static void check_rotation(quern_check_kernel *k, tallies *t) {
 	}
 }
 
+/* ---- what deformation costs ---- */
+
+enum { CYCLE = 200, POINTS = 300 };
+
+/* Of strain^2 (K + G). A law in rates is off by some ten times the strain, since no energy is behind it. */
+static const double cycle_off = 0.02;
+
+/* The velocity gradient of step s on a circle in strain, through 0: e (A sin t + B (1 - cos t)), A and B of a point's own. */
+static void set_cycle(quern_check_kernel *k, double strain, int s) {
+	const double step = 2 * 3.141592653589793 / CYCLE, t = (s + 0.5) * step;
+	for (uint32_t c = 0; c < k->dim * k->dim; c++)
+		for (uint32_t i = 0; i < k->n; i++) {
+			const uint64_t at = c * 65536 + i;
+			const double a = k->host->uniform(70, at, -1, 1), b = k->host->uniform(71, at, -1, 1);
+			quern_check_given(k, GRADIENT, c)[i] = strain * step * (a * cos(t) + b * sin(t)) / k->dt;
+		}
+}
+
+/* J/kg, of the stress before and behind a step, half each. */
+static double work_of(const quern_check_kernel *k, uint32_t i) {
+	double old[3][3], now[3][3], sum = 0;
+	unpack(k, i, false, old);
+	unpack(k, i, true, now);
+	for (uint32_t a = 0; a < k->dim; a++)
+		for (uint32_t b = 0; b < k->dim; b++)
+			sum += 0.5 * (old[a][b] + now[a][b]) * quern_check_given(k, GRADIENT, a * k->dim + b)[i] * k->dt;
+	return sum / quern_check_given(k, DENSITY, 0)[i];
+}
+
+/* Work is stored or lost. Round a circle in strain, either way, a law that stores less than it is given gives nothing of its own. */
+static void check_cycle(quern_check_kernel *k, double strain, tallies *t) {
+	const moduli m = moduli_of(k);
+	double *work = k->host->memory(2 * POINTS, sizeof *work), *before = work + POINTS;
+	k->dt = 1e-4;
+	k->host->fill(k, GRADIENT, k->dim * k->dim, 69, 0, 0);
+	k->host->run(k, 512, false);
+	for (uint32_t i = 0; i < k->n; i++) work[i] = 0, before[i] = quern_check_found(k, ENERGY, 0)[i];
+	for (int s = 0; s < CYCLE; s++) {
+		k->host->advance(k);
+		set_cycle(k, strain, s);
+		follow_volume(k);
+		k->host->run(k, 512, false);
+		for (uint32_t i = 0; i < k->n; i++) work[i] += work_of(k, i);
+	}
+	for (uint32_t i = 0; i < k->n; i++) {
+		const double stored = quern_check_found(k, ENERGY, 0)[i] - before[i],
+					 whole = strain * strain * (m.bulk + m.shear) / m.density;
+		k->host->measure(&t->taken, (stored - work[i]) / whole, cycle_off,
+			"%u-D: round a circle of strain %.0e work of %.6g J/kg stores %.6g, over %.6g of such strains",
+			k->dim, strain, work[i], stored, whole);
+	}
+	free(work);
+}
+
 static void try_dimension(const quern_check *c, const quern_check_instance *it, tallies *t) {
-	enum { POINTS = 300 };
 	quern_check_kernel *k = create(c, it, QUERN_MATERIAL_ASSIGN, false, POINTS);
 	check_moduli(k, t);
 	check_friction(k, t);
@@ -290,6 +343,10 @@ static void try_dimension(const quern_check *c, const quern_check_instance *it, 
 	start(c, it, k, 1e-2, 0.1);
 	check_rest(k, t);
 	check_rotation(k, t);
+	for (int e = -4; e <= -3; e++) {
+		start(c, it, k, 1e-3, 0.1);
+		check_cycle(k, pow(10, e), t);
+	}
 	for (int e = -5; e <= 0; e++) {
 		start(c, it, k, 1e-3, 0.1);
 		check_yield(c, it, k, 0.3 * pow(10, e), t);
@@ -300,7 +357,7 @@ static void try_dimension(const quern_check *c, const quern_check_instance *it, 
 static void law(const quern_check *c) {
 	tallies t = { { .name = "moduli and density" }, { .name = "friction at walls" },
 		{ .name = "assign twice" }, { .name = "assign and read back" }, { .name = "yield" },
-		{ .name = "rotation" }, { .name = "large gradients" } };
+		{ .name = "rotation" }, { .name = "work is stored or lost" }, { .name = "large gradients" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it) try_dimension(c, it, &t);
@@ -312,6 +369,7 @@ static void law(const quern_check *c) {
 	c->host->tell(c, &t.held, NULL);
 	c->host->tell(c, &t.yields, NULL);
 	c->host->tell(c, &t.turned, NULL);
+	c->host->tell(c, &t.taken, "round circles of strains of 1e-4 and 1e-3");
 	c->host->tell(c, &t.violent, "strains of 3e-6 to 0.3 in one step");
 }
 

@@ -115,6 +115,11 @@ BROKEN = [
     ("drives what twists", ROLLS, [('normal force; 0: twists freely; 3-D.", .max = 10)', 'normal force; 0: twists freely; 3-D.", .def = 0.5, .max = 10)'),
                                    ("axpy(-r * all, n, couple)", "axpy(r * all, n, couple)"),
                                    ('(setup->dim == 2 && law->twisting_friction > 0)', "(0)")], "impacts gain no energy"),
+    ("is driven by what turns strain", "mpm_hypo/material.elastic.c", [
+        ("const symmetric stress = elastic_trial(dim, old, l, dt, shear, lambda);",
+         "symmetric stress = elastic_trial(dim, old, l, dt, shear, lambda); const quern_real odd = 0.2 * shear * dt; "
+         "stress.xx += odd * (l.xy + l.yx); stress.yy -= odd * (l.xy + l.yx); stress.xy -= odd * (l.xx - l.yy);")],
+     "work is stored or lost"),
     ("does not turn", "mpm_hypo/material.elastic.c", [
         ("const tensor l = TENSOR_AT(b->gradient, i, dim);",
          "tensor l = TENSOR_AT(b->gradient, i, dim); l.xy = l.yx = 0.5 * (l.xy + l.yx);")], "rotation"),
