@@ -49,10 +49,10 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness
+	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness, .light = 0.03
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.linear",
 	.brief = "Linear hats.",

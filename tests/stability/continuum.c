@@ -140,7 +140,9 @@ static shaken shake_for(const block *b, double factor, int64_t steps) {
 	snprintf(found.said, sizeof found.said, "%s", beyond_message(run));
 	if (factor <= b->sound && (run->status != QUERN_OK || found.most > 1.01))
 		fail_msg("%s %s, %s: energy within the limit", b->name, b->shape, b->transfer);
-	if (factor >= b->failing) beyond_expect_culprit(run, "mpm.gather", "point");
+	/* energy of hats grows more slowly, and is seen before a point is turned inside out */
+	const bool hat = !strcmp(b->shape, "linear");
+	if (factor >= b->failing) beyond_expect_culprit(run, hat ? "mpm." : "mpm.gather", hat ? "" : "point");
 	if (found.most > 3) beyond_expect_culprit(run, "mpm.", "");
 	harness_close(run);
 	return found;
@@ -162,7 +164,7 @@ static void shaken_block(void **unused) {
 		}
 }
 
-/* Whatever the shape and the transfer, in the plane and in space; hats, whose limit is none, on a lattice. */
+/* Whatever the shape and the transfer, in the plane and in space. */
 static void limits(void **unused) {
 	static const char *const shapes[] = { "gimp", "bspline", "linear" };
 	static const char *const transfers[] = { flip, "picflip: {rate: 30}", "picflip: {flip: 0.95}",
@@ -173,12 +175,13 @@ static void limits(void **unused) {
 	for (uint32_t dim = 2; dim <= 3; dim++)
 		for (size_t k = 0; k < 3; k++)
 			for (size_t t = 0; t < sizeof transfers / sizeof *transfers; t++) {
-				const bool hat = k == 2;
-				const block b = { "", shapes[k], transfers[t], dim, !hat, 1e-3, 1, hat ? INFINITY : 2 };
+				/* what takes all that no node sees calms hats in space at twice the limit too */
+				const bool hat = k == 2, calm = hat && dim == 3 && t >= 3 && t <= 6;
+				const block b = { "", shapes[k], transfers[t], dim, true, 0, 1, calm ? INFINITY : 2 };
 				const int64_t steps = (beyond_is_long() ? 4000 : 1000) / (dim == 3 ? 10 : 1);
-				const shaken near = shake_for(&b, 0.9, steps), far = shake_for(&b, 2, steps);
-				beyond_row("%u-D%s | %s | %s | %.3g | %lld | %s", dim, hat ? ", lattice" : ", random points",
-					shapes[k], transfers[t], near.most, (long long)far.taken, far.said);
+				const shaken near = shake_for(&b, 0.9, steps), far = shake_for(&b, 2, hat ? 1000 : steps);
+				beyond_row("%u-D | %s | %s | %.3g | %lld | %s", dim, shapes[k], transfers[t], near.most,
+					(long long)far.taken, far.said);
 			}
 }
 
@@ -188,27 +191,28 @@ static void limits_over_step(void **unused) {
 	static const char *const shapes[] = { "gimp", "bspline", "linear" };
 	static const char *const transfers[] = { flip, "picflip: {rate: 30}", "apic", "xpic: {order: 2}" };
 	(void)unused;
-	beyond_table("Energy over the step by shape and transfer, the shaken block in 2-D; hats on a lattice",
+	beyond_table("Energy over the step by shape and transfer, the shaken block in 2-D",
 		"shape | transfer | step over hard limit | largest kinetic energy over first | steps | what Quern says");
 	for (size_t k = 0; k < 3; k++)
 		for (size_t t = 0; t < sizeof transfers / sizeof *transfers; t++)
 			for (size_t i = 0; i < sizeof factors / sizeof *factors; i++) {
-				const block b = { "", shapes[k], transfers[t], 2, k != 2, 1e-3, 1, k == 2 ? INFINITY : 2 };
+				const block b = { "", shapes[k], transfers[t], 2, true, 0, 1, k == 2 ? INFINITY : 2 };
 				const shaken f = shake_for(&b, factors[i], beyond_is_long() ? 2000 : 200);
 				beyond_row("%s | %s | %g | %.3g | %lld | %s", shapes[k], transfers[t], factors[i], f.most,
 					(long long)f.taken, f.said);
 			}
 }
 
-/* Hats have no limit that holds for all places of points: a point just over a cell's face feeds a node of no mass. */
+/* A point just over a cell's face feeds a node of no mass: hats have a limit as long as its force is limited as it is by default. */
 static void light_nodes(void **unused) {
 	static const block shapes[] = { { "gimp, cut 1e-6", "gimp", flip, 2, true, 1e-6, 0.5, INFINITY },
 		{ "linear, cut 1e-6", "linear", flip, 2, true, 1e-6, 0, INFINITY },
-		{ "linear, cut 1e-3", "linear", flip, 2, true, 1e-3, 0, INFINITY } };
+		{ "linear, cut 1e-3", "linear", flip, 2, true, 1e-3, 0, INFINITY },
+		{ "linear, cut 0.03", "linear", flip, 2, true, 0, 0.5, INFINITY } };
 	(void)unused;
 	beyond_table("Nodes that hardly have mass: random points at half of the recommended step",
 		"shape | steps | largest kinetic energy over first | what Quern says");
-	for (size_t k = 0; k < 3; k++) {
+	for (size_t k = 0; k < 4; k++) {
 		quern_run *run = open_block(&shapes[k], 0, true);
 		double most = 0;
 		shake(run, &shapes[k]);
@@ -218,7 +222,8 @@ static void light_nodes(void **unused) {
 			most = fmax(most, quern_run_carries(run, "kinetic"));
 		beyond_row("%s | %lld | %.3g | %s", shapes[k].name, (long long)run->clock.step, most / before,
 			beyond_message(run));
-		if (!k && (run->status != QUERN_OK || most > 1.01 * before)) fail_msg("gimp gains energy");
+		if (k % 3 == 0 && (run->status != QUERN_OK || most > 1.01 * before))
+			fail_msg("%s gains energy", shapes[k].name);
 		if (k == 1) beyond_expect_culprit(run, "mpm.gather", "point");
 		if (k == 2) beyond_expect_culprit(run, "mpm.watch", "makes energy");
 		harness_close(run);

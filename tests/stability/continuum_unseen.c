@@ -182,7 +182,7 @@ static quern_run *open_lone(const reach *r, double deep, double pressure) {
 
 void lone_point(void **unused) {
 	(void)unused;
-	static const reach reaches[] = { { "linear", "1e-12", 1 }, { "linear", "1e-3", 1 },
+	static const reach reaches[] = { { "linear", "1e-12", 1 }, { "linear", "0.03", 1 },
 		{ "gimp", "1e-12", 1.25 }, { "gimp", "1e-3", 1.25 }, { "bspline", "1e-12", 1.5 },
 		{ "bspline", "1e-3", 1.5 } };
 	const double pressure = 1e-3 * bulk;
