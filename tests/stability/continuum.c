@@ -241,6 +241,21 @@ static void faster_than_waves(void **unused) {
 	harness_close(run);
 }
 
+/* Faces hold points that move by less than a cell a step. One that is outside all the same is told of, and not taken in again. */
+static void outside(void **unused) {
+	static const block still = { "still", "gimp", flip, 2, false, 1e-3, 1, INFINITY };
+	(void)unused;
+	for (int upper = 0; upper <= 1; upper++) {
+		quern_run *run = open_block(&still, 0, true);
+		assert_int_equal(harness_try(run, 1), QUERN_OK);
+		harness_field(run, "point.position").real[1][7] = upper ? 1.4 + 1e-4 : -1e-4;
+		harness_field(run, "total.unsorted").index[0] = 1;
+		harness_try(run, 1);
+		beyond_expect_culprit(run, "left the domain along axis 1", "point");
+		harness_close(run);
+	}
+}
+
 /* ==== a column at rest ==== */
 
 static void column_row(const material *m, const char *shape, double factor) {
@@ -278,7 +293,7 @@ static void column_at_rest(void **unused) {
 int main(int argc, char **argv) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(shaken_block), cmocka_unit_test(limits),
 		cmocka_unit_test(limits_over_step), cmocka_unit_test(light_nodes),
-		cmocka_unit_test(faster_than_waves), cmocka_unit_test(column_at_rest),
+		cmocka_unit_test(faster_than_waves), cmocka_unit_test(outside), cmocka_unit_test(column_at_rest),
 		cmocka_unit_test(cell_crossing), cmocka_unit_test(unseen_motion), cmocka_unit_test(random_motion),
 		cmocka_unit_test(lone_point), cmocka_unit_test(share_as_viscosity), cmocka_unit_test(flow_over_step),
 		cmocka_unit_test(stiff_flow), cmocka_unit_test(stiff_slump), cmocka_unit_test(thin_layers),
