@@ -4,6 +4,9 @@
 #include <quern/columns.h>
 #include <quern/solver.h>
 
+/* kg, of a node: less has no inverse, or one that is no number once it is multiplied. A particle on a wall leaves such to the next node. */
+#define NO_MASS 1e-290
+
 /* Faster than light by v, or by v times a length: what such a number stands for is not known, but its energy is
  * none. */
 static inline bool quern_too_fast(const quern_real v[3], quern_real times) {

@@ -92,7 +92,7 @@ static inline quern_status trips_run(trips *t, stencil_body *send, void *arg) {
 		memset(t->sent, 0, nodes * sizeof(quern_row));
 		stencil_by_colour(s, t->g, send, arg);
 		for (size_t i = 0; i < nodes; i++)
-			echo[i] = t->node[i][0] > 0 ? t->sent[i] * (1 / t->node[i][0]) : (quern_row) { 0 };
+			echo[i] = t->node[i][0] > NO_MASS ? t->sent[i] * (1 / t->node[i][0]) : (quern_row) { 0 };
 		t->echo = echo;
 	}
 	return QUERN_OK;

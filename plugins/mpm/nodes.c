@@ -358,7 +358,7 @@ static void meet_walls(void *arg, uint32_t b, uint32_t worker) {
 	close_faces(w, b, body_booked(&w->books, b, w->n_bodies));
 }
 
-/* v = v_0 + dt (f/m + g); a light node's force is limited to what a mass m_cut would feel of it. */
+/* v = v_0 + dt (f/m + g); of less mass than has an inverse a node knows no velocity; a light node's force is limited to what a mass m_cut would feel of it. */
 static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 	const grid_work *w = arg;
 	const quern_step *s = w->s;
@@ -368,9 +368,9 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 	for (uint32_t i = 0; i < N; i++) {
 		const quern_row row = w->node[(size_t)b * N + i];
 		quern_row out = { 0 };
-		const quern_real mass = row[0], one_over = mass > 0 ? 1 / mass : 0,
+		const quern_real mass = row[0], one_over = mass > NO_MASS ? 1 / mass : 0,
 						 limited = mass > cut ? one_over : 1 / cut;
-		for (uint32_t k = 0; k < dim && mass > 0; k++) {
+		for (uint32_t k = 0; k < dim && mass > NO_MASS; k++) {
 			const quern_real force = row[node_force(dim) + k],
 							 change = s->dt * (force * limited + s->gravity[k]);
 			out[k] = row[1 + k] * one_over + change;
