@@ -373,7 +373,7 @@ static void bagnold_is_reached(void **unused) {
 	quern_run *run = open_chute(&c);
 	harness_until(run, 2);
 	table_head("from rest, 8 cells deep, off");
-	const bool good = table_row("after 2 s", off(run, &c), 0, 0.03);
+	const bool good = table_row("after 2 s", off(run, &c), 0, 0.02);
 	harness_close(run);
 	assert_true(good);
 }
