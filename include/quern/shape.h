@@ -30,14 +30,15 @@ typedef struct quern_shape_ops {
 	/* [step] may be NULL, for that of hats: of a node that stands `to_wall` cells above a wall (many: above none), the volume above the place that is `from` cells above the
 	 * node (negative: below it), over that of a node inside; nothing is below the wall */
 	quern_real (*beyond)(const void *self, int32_t to_wall, quern_real from);
-	/* Of a full cell's mass: the force of a node that holds less is limited to what it would be with that. 0 counts as 0.001; more where slopes do
-	 * not vanish with the functions, so that a node may feel a full force however little it holds. */
+	/* Of a full cell's mass, at most 0.1: the force of a node that holds less is limited to what it would be with that. For two points per cell and axis;
+	 * the fewer there are, the more. 0 counts as 0.001, for any number: more is asked for where slopes do not vanish with the functions, so that a
+	 * node may feel a full force however little it holds. */
 	quern_real light;
 } quern_shape_ops;
 
-/* The share of a full cell's mass below which a node is light. */
-QUERN_INLINE quern_real quern_shape_light(const quern_shape_ops *ops) {
-	return ops->light > 0 ? ops->light : 1e-3;
+/* The share of a full cell's mass below which a node is light, with so many points per cell and axis. */
+QUERN_INLINE quern_real quern_shape_light(const quern_shape_ops *ops, quern_real points) {
+	return ops->light > 0 ? ops->light * 2 / points : 1e-3;
 }
 
 QUERN_KIND(shape, quern_shape_ops, "Weights of grid nodes at a particle.",

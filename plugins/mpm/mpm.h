@@ -15,6 +15,7 @@
 
 typedef struct mpm {
 	quern_real cell, cut; /* from the scene */
+	quern_real light;     /* what the shape asks for, where `cut` is 0 */
 	int32_t points, rasterise, resample;
 	quern_list fill, source;
 	const char *from;

@@ -358,12 +358,14 @@ static void meet_walls(void *arg, uint32_t b, uint32_t worker) {
 	close_faces(w, b, body_booked(&w->books, b, w->n_bodies));
 }
 
-/* v = v_0 + dt (f/m + g); of less mass than has an inverse a node knows no velocity; a light node's force is limited to what a mass m_cut would feel of it. */
+/* v = v_0 + dt (f/m + g); a light node's force is limited to what a mass m_cut would feel of it. Of less mass than has an inverse a node
+ * knows no velocity. */
 static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 	const grid_work *w = arg;
 	const quern_step *s = w->s;
 	const uint32_t dim = s->dim;
-	const quern_real volume = quern_grid_cell_volume(w->g), cut = w->p->cut * w->p->density * volume;
+	const quern_real volume = quern_grid_cell_volume(w->g), share = w->p->cut > 0 ? w->p->cut : w->p->light,
+					 cut = share * w->p->density * volume;
 	quern_real *left = body_booked(&w->books, b, w->n_bodies) + B_IMPULSE;
 	for (uint32_t i = 0; i < N; i++) {
 		const quern_row row = w->node[(size_t)b * N + i];

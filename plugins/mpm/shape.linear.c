@@ -49,7 +49,7 @@ static quern_real stiffness(const void *self) {
 }
 
 static const quern_shape_ops ops = {
-	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness, .light = 0.03
+	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness, .light = 0.0625
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
 	.revision = 2,

@@ -85,8 +85,9 @@ static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 	QUERN_PARAM(mpm, damped, NULL, "Keep stresses of dashpots; set by itself where there is damping.",
 		.flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, cut, "1",
-		"Share of a full cell's mass below which a node's force is limited; 0: that of the shape, 0.001, and 0.03 for hats.",
-		.max = 0.1, .flags = QUERN_ADVANCED),
+		"Share of a full cell's mass below which a node's force is limited; 0: that of the shape, 0.001, and for "
+		"hats 1/8 over the points per cell and axis.",
+		.max = 0.5, .flags = QUERN_ADVANCED),
 	QUERN_PARAM(mpm, gain, "1",
 		"In a continuum alone: energy that nobody has given, beyond as much again as there is, that ends the run, over what lifts all "
 		"by a cell; 0: none does. A hybrid has its own.",
@@ -419,7 +420,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->counted = p->alone || (ops->friction && hybrid);
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
-	if (!(p->cut > 0)) p->cut = quern_shape_light(shape->ops);
+	p->light = quern_shape_light(shape->ops, p->points);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)
 		return QUERN_E_PARAM;
 	setup->host->publish(setup, "continuum.density", "kg/m^3", p->density);
