@@ -2,12 +2,16 @@
 /* ahead - asks memory for the next chunk of a large set while this one is worked on: each of its columns begins on a page of its own in every
  * block, where no processor foresees what is wanted next */
 #pragma once
+#include "stencil.h"
 #include <quern/columns.h>
-#include <quern/grid.h>
-#include <quern/solver.h>
 
 /* A set of less than so many bytes stays in caches, which need not be asked. */
-enum { AHEAD_MOST = 64, AHEAD_BYTES = 4 << 20 };
+enum {
+	AHEAD_MOST = 64,
+	AHEAD_BYTES = 4 << 20,
+	AHEAD_LINE = 64 / sizeof(quern_real),
+	AHEAD_LINES = STENCIL / AHEAD_LINE
+};
 
 typedef struct ahead {
 	const quern_real *column[AHEAD_MOST];
@@ -40,19 +44,14 @@ QUERN_INLINE ahead_at ahead_from(
 	return QUERN_VALUE(ahead_at, after, first[g->n_blocks], next, i - first[b]);
 }
 
-/* One part in AHEAD of the lines of the next AHEAD entries: a processor waits once it has asked for some tens of lines that have not come yet, so
- * they are asked for in turn with other work. */
-enum { AHEAD = 64, AHEAD_LINE = 64 / sizeof(quern_real), AHEAD_LINES = AHEAD / AHEAD_LINE };
-QUERN_INLINE void ahead_ask(const ahead *a, const ahead_at *at, uint32_t part) {
-	const uint32_t i = at->begin + part % AHEAD_LINES * AHEAD_LINE;
-	if (i >= at->n) return;
-	for (uint32_t c = part / AHEAD_LINES; c < a->n; c += AHEAD_LINES) __builtin_prefetch(a->column[c] + i);
-}
-
-/* One node of the next block's tile. In a plane all nodes are few enough to be near anyway. */
-QUERN_INLINE void ahead_ask_rows(
-	const quern_grid_view *g, const quern_row *rows, const ahead_at *at, uint32_t part, const int dim) {
-	if (dim == 2 || at->rows + part >= g->tile_size) return;
-	const int32_t entry = g->tile[(size_t)at->next * g->tile_size + at->rows + part];
+/* With the particle `part` of a chunk: its part of the lines of the next one and, in 3-D, one node of the next block's tile. In a plane all nodes are few enough to
+ * be near anyway. A processor waits once it has asked for some tens of lines that have not come yet, so they are asked for in turn with other work. */
+QUERN_INLINE void ahead_ask(const ahead *a, const quern_grid_view *g, const quern_row *rows,
+	const ahead_at *at, uint32_t part, const int dim) {
+	const uint32_t i = at->begin + part % AHEAD_LINES * AHEAD_LINE, row = at->rows + part;
+	for (uint32_t c = part / AHEAD_LINES; c < a->n && i < at->n; c += AHEAD_LINES)
+		__builtin_prefetch(a->column[c] + i);
+	if (dim == 2 || !a->n || row >= g->tile_size) return;
+	const int32_t entry = g->tile[(size_t)at->next * g->tile_size + row];
 	__builtin_prefetch(rows + (entry < 0 ? 0 : entry));
 }

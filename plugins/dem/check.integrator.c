@@ -147,7 +147,8 @@ static void compare_way(flight *f) {
 			const double left = quern_check_found(k, NEW_SPEED, a)[i];
 			k->host->measure(f->way, fabs(to - from - at * k->dt * left), 1e-15 * (1 + fabs(from) + fabs(to)),
 				"%u-D: open moves by %.15g m and leaves %.15g m/s", k->dim, to - from, left);
-			const double was = ops->coasts ? quern_check_given(k, SPEED, a)[i] : left;
+			if (!ops->coasts) continue;
+			const double was = quern_check_given(k, SPEED, a)[i];
 			k->host->measure(f->way, fabs(left - was), 0,
 				"%u-D: open turns %.15g m/s into %.15g, and should coast", k->dim, was, left);
 		}

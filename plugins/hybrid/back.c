@@ -33,7 +33,7 @@ typedef struct {
 QUERN_INLINE void load_mixture(const back_work *w, back_memory *m, uint32_t b, const int dim) {
 	quern_tile_load(w->g, w->mixture, b, m->mixture);
 	for (uint32_t i = 0; i < w->g->tile_size; i++) {
-		const quern_real one_over = m->mixture[i][0] > 0 ? 1 / m->mixture[i][0] : 0;
+		const quern_real one_over = m->mixture[i][0] > NO_MASS ? 1 / m->mixture[i][0] : 0;
 		for (int a = 0; a < dim; a++)
 			m->mixture[i][1 + a] = m->mixture[i][1 + a] * one_over + m->mixture[i][1 + dim + a];
 	}

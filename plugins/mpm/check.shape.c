@@ -134,6 +134,8 @@ static void check_walk(const quern_check *c, const quern_check_instance *it, tal
 		}
 	c->host->expect(&t->shares, ops->stiffness(it->self) > 0 && isfinite(ops->stiffness(it->self)),
 		"stiffness is %.3g", ops->stiffness(it->self));
+	c->host->expect(&t->shares, ops->light >= 0 && ops->light <= 0.1,
+		"a node is light below %.3g of a cell, of 0 to 0.1", ops->light);
 	c->host->kernel_destroy(k);
 }
 

@@ -38,8 +38,7 @@ static void speak_for_others(const gather_work *w, gather_memory *m) {
 QUERN_INLINE void collect_chunk(const gather_work *w, gather_memory *m, uint32_t n, const int dim,
 	const bool slopes, const ahead_at *at) {
 	for (uint32_t i = 0; i < n; i++) {
-		ahead_ask(&w->ahead, at, i);
-		ahead_ask_rows(w->g, w->motion, at, i, dim);
+		ahead_ask(&w->ahead, w->g, w->motion, at, i, dim);
 		quern_row v[4];
 		stencil_gather(&m->trip.stencil, i, m->tile, dim, slopes, v);
 		trips_hear(&m->trip, i, &v[0], 0, dim);
@@ -47,7 +46,7 @@ QUERN_INLINE void collect_chunk(const gather_work *w, gather_memory *m, uint32_t
 			for (int a = 0; a < dim && slopes; a++) m->gradient[dim * k + a][i] = v[1 + a][k];
 		m->grid_density[i] = v[0][2 * dim];
 	}
-	for (uint32_t i = n; i < AHEAD; i++) ahead_ask(&w->ahead, at, i);
+	for (uint32_t i = n; i < STENCIL; i++) ahead_ask(&w->ahead, w->g, w->motion, at, i, dim);
 	trips_hear_echo(&w->trips, &m->trip, n, dim);
 }
 

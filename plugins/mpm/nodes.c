@@ -359,7 +359,7 @@ static void meet_walls(void *arg, uint32_t b, uint32_t worker) {
 }
 
 /* v = v_0 + dt (f/m + g); a light node's force is limited to what a mass m_cut would feel of it. Of less mass than has an inverse a node
- * knows no velocity. */
+ * knows no velocity, and feels none of its force. */
 static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 	const grid_work *w = arg;
 	const quern_step *s = w->s;
@@ -372,6 +372,7 @@ static void move_nodes(void *arg, uint32_t b, uint32_t worker) {
 		quern_row out = { 0 };
 		const quern_real mass = row[0], one_over = mass > NO_MASS ? 1 / mass : 0,
 						 limited = mass > cut ? one_over : 1 / cut;
+		for (uint32_t k = 0; k < dim && !(mass > NO_MASS); k++) left[k] -= s->dt * row[node_force(dim) + k];
 		for (uint32_t k = 0; k < dim && mass > NO_MASS; k++) {
 			const quern_real force = row[node_force(dim) + k],
 							 change = s->dt * (force * limited + s->gravity[k]);

@@ -100,14 +100,13 @@ QUERN_INLINE void scatter_block(
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[SCATTER_POSITION].real, i, NULL, n, &m->stencil);
 		load_chunk(u, m, i, n, dim, affine);
 		for (uint32_t k = 0; k < n; k++) {
-			ahead_ask(&w->ahead, &at, k);
-			ahead_ask_rows(w->g, w->node, &at, k, dim);
+			ahead_ask(&w->ahead, w->g, w->node, &at, k, dim);
 			const sent p = send_point(m, k, dim, affine);
 			stencil_scatter(&m->stencil, k, &p, affine ? SENDS_SLOPE | SENDS_ALONG : SENDS_SLOPE, m->tile,
 				dim, w->g->cell);
 			if (w->counts) count_point(w, m, b, k, u[SCATTER_MASS].real[0][i + k], dim);
 		}
-		for (uint32_t k = n; k < AHEAD; k++) ahead_ask(&w->ahead, &at, k);
+		for (uint32_t k = n; k < STENCIL; k++) ahead_ask(&w->ahead, w->g, w->node, &at, k, dim);
 	}
 	quern_tile_add(w->g, w->node, b, m->tile);
 }
