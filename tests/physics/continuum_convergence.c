@@ -167,8 +167,8 @@ static double weight(const char *shape, int cells, double k, double *displacemen
 	return sqrt(sum / size);
 }
 
-/* With little weight no point leaves its cell, and displacements are of second order, and stresses of points get better with finer cells, by order one and a half with the splines. With
- * much, points lie irregularly in their cells: then the error stays what that makes of it. */
+/* With little weight no point leaves its cell: displacements are of second order, and stresses of points of order one and a half with the
+ * splines. With much, points lie irregularly in their cells: then the error stays what that makes of it. */
 static void column_of_weight(void **unused) {
 	(void)unused;
 	bool good = true;
