@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "h5.h"
+#include "text.h"
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -57,7 +58,7 @@ bool quern_h5_create(quern_h5 *h, bool compress, size_t user_block) {
 	H5FD_file_image_callbacks_t own = { image_malloc, image_copy, image_realloc, image_free, same_owner,
 		keep_owner, h };
 	const hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = without_times(H5P_FILE_CREATE);
-	H5Pset_fapl_core(access, 1 << 20, 0);
+	H5Pset_fapl_core(access, 1 << 18, 0);
 	H5Pset_file_image_callbacks(access, &own);
 	if (user_block) H5Pset_userblock(create, user_block);
 	h->file = H5Fcreate("memory", H5F_ACC_TRUNC, create, access);
@@ -103,12 +104,6 @@ bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
 
 /* ---- writing ---- */
 
-void quern_h5_put(
-	quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data) {
-	const hid_t set = quern_h5_write(h, group, name, type, rows, columns, data);
-	if (set >= 0) H5Dclose(set);
-}
-
 hid_t quern_h5_group(quern_h5 *h, hid_t parent, const char *name) {
 	const hid_t create = without_times(H5P_GROUP_CREATE);
 	const hid_t group = H5Gcreate2(parent, name, H5P_DEFAULT, create, H5P_DEFAULT);
@@ -117,10 +112,18 @@ hid_t quern_h5_group(quern_h5 *h, hid_t parent, const char *name) {
 	return group;
 }
 
-hid_t quern_h5_write(
-	quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data) {
+/* So many rows are a chunk of the file: half a megabyte of doubles or less. */
+static size_t rows_at_once(size_t columns) {
+	size_t rows = 65536;
+	while (rows * columns > 65536) rows /= 2;
+	return rows;
+}
+
+static hid_t new_set(
+	const quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns) {
 	const int rank = columns > 1 ? 2 : 1;
-	const hsize_t size[2] = { rows, columns }, chunk[2] = { rows < 65536 ? rows : 65536, columns };
+	const size_t most = rows_at_once(columns);
+	const hsize_t size[2] = { rows, columns }, chunk[2] = { rows < most ? rows : most, columns };
 	const hid_t space = H5Screate_simple(rank, size, NULL), create = without_times(H5P_DATASET_CREATE);
 	if (h->compress && rows > 64) {
 		H5Pset_chunk(create, rank, chunk);
@@ -129,9 +132,41 @@ hid_t quern_h5_write(
 		H5Pset_fletcher32(create);
 	}
 	const hid_t set = H5Dcreate2(group, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
-	if (set < 0 || (rows && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) h->failed = true;
 	H5Pclose(create);
 	H5Sclose(space);
+	return set;
+}
+
+void quern_h5_put(
+	quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data) {
+	const hid_t set = new_set(h, group, name, type, rows, columns);
+	if (set < 0 || (rows && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) h->failed = true;
+	if (set >= 0) H5Dclose(set);
+}
+
+static bool write_piece(hid_t set, hid_t type, size_t first, size_t rows, size_t columns, const void *piece) {
+	const int rank = columns > 1 ? 2 : 1;
+	const hsize_t from[2] = { first, 0 }, size[2] = { rows, columns };
+	const hid_t space = H5Dget_space(set), memory = H5Screate_simple(rank, size, NULL);
+	const bool good = H5Sselect_hyperslab(space, H5S_SELECT_SET, from, NULL, size, NULL) >= 0 &&
+					  H5Dwrite(set, type, memory, space, H5P_DEFAULT, piece) >= 0;
+	H5Sclose(memory);
+	H5Sclose(space);
+	return good;
+}
+
+hid_t quern_h5_write(quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns,
+	quern_h5_make make, const void *what) {
+	const hid_t set = new_set(h, group, name, type, rows, columns);
+	const size_t most = rows_at_once(columns), once = rows < most ? rows : most;
+	void *piece = quern_take(once * columns, H5Tget_size(type));
+	h->failed = h->failed || set < 0;
+	for (size_t first = 0; first < rows && !h->failed; first += once) {
+		const size_t n = rows - first < once ? rows - first : once;
+		make(what, first, n, piece);
+		h->failed = !write_piece(set, type, first, n, columns, piece);
+	}
+	free(piece);
 	return set;
 }
 

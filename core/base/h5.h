@@ -24,10 +24,14 @@ bool quern_h5_save(quern_h5 *, const char *path, char why[256]);
 /* Writes the checksum into the first 512 bytes of a file's image. */
 void quern_h5_seal(void *image, size_t size);
 
-/* rows x columns numbers; columns 1 makes a list. The faults of all writes are collected in `failed`. */
-hid_t quern_h5_write(
-	quern_h5 *, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data);
-/* The same for what gets no attributes. */
+/* Makes the rows from `first` on of a table, `n` of them one after the other. */
+typedef void (*quern_h5_make)(const void *what, size_t first, size_t n, void *out);
+
+/* rows x columns numbers; columns 1 makes a list. The faults of all writes are collected in `failed`. Rows are made a
+ * few at a time, so that the table is never in memory as a whole. */
+hid_t quern_h5_write(quern_h5 *, hid_t group, const char *name, hid_t type, size_t rows, size_t columns,
+	quern_h5_make make, const void *what);
+/* The same for rows that are there already, and get no attributes. */
 void quern_h5_put(
 	quern_h5 *, hid_t group, const char *name, hid_t type, size_t rows, size_t columns, const void *data);
 hid_t quern_h5_group(quern_h5 *, hid_t parent, const char *name);

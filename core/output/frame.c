@@ -22,72 +22,85 @@ static void describe(quern_h5 *h, hid_t set, const char *unit, const char *doc, 
 	H5Dclose(set);
 }
 
-/* Indices into a set, counted as its entries come in the file; `entry` and `of`: the orders of the set and of that one. */
-static int32_t *indices_of(
-	const quern_field *field, const uint32_t *entry, size_t n, const quern_set_store *of) {
-	const int32_t *index = field->data[field->now][0];
-	int32_t *out = quern_take(n, sizeof *out);
-	uint32_t *place = of && of->entry ? quern_take(of->n, sizeof *place) : NULL;
-	for (uint32_t q = 0; place && q < of->n; q++) place[of->entry[q]] = q;
+/* A field as its entries come in the file: in the order of their blocks' places, however the set is cut. */
+typedef struct {
+	const quern_field *field;
+	const uint32_t *entry, *place; /* the order of the set; where an entry of the target stands in the file */
+	uint32_t n_place;
+	int columns, from[9];
+} shown;
+
+/* Indices into a set, counted as its entries come in the file. */
+static void make_indices(const void *what, size_t first, size_t n, void *rows) {
+	const shown *w = what;
+	const int32_t *index = w->field->data[w->field->now][0];
+	int32_t *out = rows;
 	for (size_t q = 0; q < n; q++) {
-		const int32_t i = index[quern_nth(entry, q)];
-		out[q] = place && i >= 0 && (uint32_t)i < of->n ? (int32_t)place[i] : i;
+		const int32_t i = index[quern_nth(w->entry, first + q)];
+		out[q] = w->place && i >= 0 && (uint32_t)i < w->n_place ? (int32_t)w->place[i] : i;
 	}
-	free(place);
-	return out;
 }
 
-static int64_t *ids_of(const quern_field *field, const uint32_t *entry, size_t n) {
-	const int64_t *id = field->data[field->now][0];
-	int64_t *out = quern_take(n, sizeof *out);
-	for (size_t q = 0; q < n; q++) out[q] = id[quern_nth(entry, q)];
-	return out;
+static void make_ids(const void *what, size_t first, size_t n, void *rows) {
+	const shown *w = what;
+	const int64_t *id = w->field->data[w->field->now][0];
+	int64_t *out = rows;
+	for (size_t q = 0; q < n; q++) out[q] = id[quern_nth(w->entry, first + q)];
 }
 
-/* Entries come in the order of their blocks' places, however the set is cut. */
+static void make_numbers(const void *what, size_t first, size_t n, void *rows) {
+	const shown *w = what;
+	double *out = rows;
+	for (int c = 0; c < w->columns; c++) {
+		const double *column = w->from[c] < 0 ? NULL : w->field->data[w->field->now][w->from[c]];
+		for (size_t q = 0; q < n; q++)
+			out[q * (size_t)w->columns + (size_t)c] = column ? column[quern_nth(w->entry, first + q)] : 0;
+	}
+}
+
+static uint32_t *places_of(const quern_set_store *set) {
+	uint32_t *place = set->entry ? quern_take(set->n, sizeof *place) : NULL;
+	for (uint32_t q = 0; place && q < set->n; q++) place[set->entry[q]] = q;
+	return place;
+}
+
 static void write_field(quern_h5 *h, hid_t group, const quern_run *run, int k, size_t n) {
 	const quern_store *store = &run->plan->store;
 	const quern_field *field = &store->fields[k];
-	const uint32_t *entry = store->sets[field->set].entry;
 	const char *name = strchr(field->name, '.') + 1;
+	shown w = { .field = field, .entry = store->sets[field->set].entry };
 	hid_t set;
 	if (field->shape == QUERN_INDEX) {
-		int32_t *index = indices_of(field, entry, n, field->target < 0 ? NULL : &store->sets[field->target]);
-		set = quern_h5_write(h, group, name, H5T_NATIVE_INT32, n, 1, index);
-		free(index);
+		const quern_set_store *target = field->target < 0 ? NULL : &store->sets[field->target];
+		uint32_t *place = target ? places_of(target) : NULL;
+		w.place = place, w.n_place = target ? target->n : 0;
+		set = quern_h5_write(h, group, name, H5T_NATIVE_INT32, n, 1, make_indices, &w);
+		free(place);
 	} else if (field->shape == QUERN_ID) {
-		int64_t *id = ids_of(field, entry, n);
-		set = quern_h5_write(h, group, name, H5T_NATIVE_INT64, n, 1, id);
-		free(id);
+		set = quern_h5_write(h, group, name, H5T_NATIVE_INT64, n, 1, make_ids, &w);
 	} else {
-		int from[9];
-		const int columns = quern_state_columns(field->shape, (uint32_t)run->scene->general.dimension, from);
-		double *table = quern_take(n * (size_t)columns, sizeof(double));
-		for (int c = 0; c < columns; c++) {
-			const double *column = from[c] < 0 ? NULL : field->data[field->now][from[c]];
-			for (size_t i = 0; i < n; i++)
-				table[i * (size_t)columns + (size_t)c] = column ? column[quern_nth(entry, i)] : 0;
-		}
-		set = quern_h5_write(h, group, name, H5T_NATIVE_DOUBLE, n, (size_t)columns, table);
-		free(table);
+		w.columns = quern_state_columns(field->shape, (uint32_t)run->scene->general.dimension, w.from);
+		set = quern_h5_write(h, group, name, H5T_NATIVE_DOUBLE, n, (size_t)w.columns, make_numbers, &w);
 	}
 	describe(h, set, field->unit, field->doc, maker(run->plan, k));
 }
 
-static void write_centres(quern_h5 *h, hid_t group, const quern_run *run, size_t n) {
-	const quern_grid_view *v = &run->grid.view;
-	double *table = quern_take(n * 3, sizeof(double));
-	for (size_t i = 0; i < n; i++) {
-		const uint32_t place = (uint32_t)(i % 64), b = quern_nth(v->by_place, (uint32_t)(i / 64));
+static void make_centres(const void *what, size_t first, size_t n, void *rows) {
+	const quern_grid_view *v = what;
+	double *out = rows;
+	memset(out, 0, n * 3 * sizeof *out);
+	for (size_t q = 0; q < n; q++) {
+		const uint32_t i = (uint32_t)(first + q), place = i % 64, b = quern_nth(v->by_place, i / 64);
 		const uint32_t at[3] = { place % v->edge, place / v->edge % v->edge,
 			v->dim == 3 ? place / (v->edge * v->edge) : 0 };
 		for (uint32_t k = 0; k < v->dim; k++)
-			table[3 * i + k] =
-				v->lower[k] + v->cell * (v->at[b][k] * (int32_t)v->edge + (int32_t)at[k] + 0.5);
+			out[3 * q + k] = v->lower[k] + v->cell * (v->at[b][k] * (int32_t)v->edge + (int32_t)at[k] + 0.5);
 	}
-	describe(h, quern_h5_write(h, group, "position", H5T_NATIVE_DOUBLE, n, 3, table), "m",
-		"Centre of the cell.", "quern");
-	free(table);
+}
+
+static void write_centres(quern_h5 *h, hid_t group, const quern_run *run, size_t n) {
+	describe(h, quern_h5_write(h, group, "position", H5T_NATIVE_DOUBLE, n, 3, make_centres, &run->grid.view),
+		"m", "Centre of the cell.", "quern");
 }
 
 /* What something points at goes with it. */

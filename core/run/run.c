@@ -69,8 +69,17 @@ void quern_run_reset(quern_run *run) {
 	a->used = a->n_extra = a->extra_bytes = 0;
 }
 
+/* Nobody looks between steps at rows of which no field is kept; the next step begins by making them zero. */
+static void forget_rows(quern_store *store, size_t set) {
+	quern_set_store *s = &store->sets[set];
+	for (size_t k = 0; k < store->n_fields; k++)
+		if (store->fields[k].set == (int)set && store->fields[k].kept) return;
+	if (s->rows && s->row) quern_platform_forget(s->row, (size_t)s->n * 64);
+}
+
 void quern_run_rest(quern_run *run) {
 	quern_run_reset(run);
+	for (size_t i = 0; i < run->plan->store.n_sets; i++) forget_rows(&run->plan->store, i);
 	if (run->arena.data) quern_platform_forget(run->arena.data, run->arena.capacity);
 	quern_pool_rest(run->pool);
 }
