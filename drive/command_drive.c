@@ -48,8 +48,12 @@ static int check_path(const options *o) {
 	for (size_t k = 0; quern_drive_paths[k]; k++)
 		if (!strcmp(quern_drive_paths[k], o->path)) return QUERN_OPTIONS_READ;
 	const char *near = quern_nearest(o->path, quern_drive_paths);
-	return quern_usage(us, "there is no path '%s'%s%s%s; a table's name ends with .csv", o->path,
-		near ? ", did you mean '" : "", near ? near : "", near ? "'?" : "");
+	if (near) return quern_usage(us, "there is no path '%s', did you mean '%s'?", o->path, near);
+	return quern_usage(us,
+		"there is no path '%s': sand is pressed on an isotropic one from all sides, on an oedometric one between sides "
+		"that hold, on a triaxial one between sides that press; there are simple_shear, tension, and tables, whose "
+		"names end with .csv",
+		o->path);
 }
 
 static int check(const options *o) {

@@ -208,7 +208,7 @@ static bool try_crowd(uint32_t dim, int material) {
 	double parted = 0, joined = 0;
 	bool good = true;
 	sums first = sum(run, dim, material), now = first;
-	for (int round = 0; round < (dim == 2 ? 850 : 60); round++) {
+	for (int round = 0; round < (dim == 2 ? 850 : 400); round++) {
 		mix(run, dim, &state);
 		first.height += sum(run, dim, material).height - now.height; /* mixing moves the middle */
 		const uint32_t before = harness_count(run, "point");
@@ -224,7 +224,7 @@ static bool try_crowd(uint32_t dim, int material) {
 	if (material == REMEMBERS) {
 		table_note("  parted", parted);
 		table_note("  joined", joined);
-		good &= parted + joined > (dim == 2 ? 1e4 : 1e3) && joined > 300;
+		good &= parted + joined > 1e4 && joined > 300;
 	}
 	good &= compare(&first, &now, dim, material);
 	harness_close(run);
