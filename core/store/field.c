@@ -136,6 +136,7 @@ typedef struct {
 	double initial;
 	int64_t first_id;
 	uint32_t n;
+	bool all; /* every entry was one before */
 } permutation;
 
 /* Where an entry's value comes from: another one, or -1; what a part gets only by give(), or never, from nowhere. */
@@ -159,6 +160,11 @@ static void permute(void *arg, uint32_t chunk, uint32_t worker) {
 		const int64_t *old = p->old;
 		int64_t *new = p->new;
 		for (uint32_t i = begin; i < end; i++) new[i] = p->from[i] >= 0 ? old[p->from[i]] : -1;
+	} else if (p->all) {
+		const double *restrict old = p->old;
+		double *restrict new = p->new;
+		const int32_t *restrict from = p->from;
+		for (uint32_t i = begin; i < end; i++) new[i] = old[from[i]];
 	} else {
 		const double *old = p->old;
 		double *new = p->new;
@@ -327,12 +333,14 @@ static int32_t *invert(uint32_t old_n, uint32_t n, const int32_t *from) {
 
 static void permute_columns(quern_store *store, int set, uint32_t n, const int32_t *from) {
 	quern_set_store *s = &store->sets[set];
+	bool all = true;
+	for (uint32_t i = 0; i < n && all; i++) all = from[i] >= 0;
 	for (size_t i = 0; i < store->n_fields; i++) {
 		quern_field *field = &store->fields[i];
 		if (!owns(field, set)) continue;
 		for (uint8_t k = 0; k < field->n_components; k++) {
 			void **column = &field->data[field->now][k];
-			permutation p = { field, from, *column, s->spare, initial_of(field, k), s->next_id, n };
+			permutation p = { field, from, *column, s->spare, initial_of(field, k), s->next_id, n, all };
 			quern_pool_each(store->pool, (n + CHUNK - 1) / CHUNK, permute, &p);
 			if (field->shape == QUERN_INDEX) { /* its own place is too narrow for others */
 				memcpy(*column, p.new, n * sizeof(int32_t));

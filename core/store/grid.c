@@ -308,8 +308,26 @@ static void mark_asked(quern_grid *g, uint32_t n, const int32_t (*block)[3]) {
 	}
 }
 
+/* Just these blocks were asked for the last time, too: mostly so. */
+static bool are_asked(const quern_grid *g, uint32_t n, const int32_t (*block)[3]) {
+	const uint32_t n_blocks = g->view.n_blocks;
+	uint8_t *left = g->at ? malloc((size_t)n_blocks + 1) : NULL;
+	if (!left) return false;
+	memcpy(left, g->asked, n_blocks);
+	bool same = true;
+	for (uint32_t i = 0; i < n && same; i++) {
+		const int32_t b = quern_grid_find(g, block[i]);
+		same = b >= 0 && g->asked[b];
+		if (same) left[b] = 0;
+	}
+	for (uint32_t b = 0; b < n_blocks && same; b++) same = !left[b];
+	free(left);
+	return same;
+}
+
 quern_status quern_grid_cover(quern_grid *g, quern_store *store, uint32_t n, const int32_t (*block)[3]) {
 	uint32_t m = 0;
+	if (are_asked(g, n, block)) return QUERN_OK;
 	int32_t(*wanted)[3] = dilate(g, n, block, &m);
 	if (!wanted) return QUERN_E_MEMORY;
 	if (m == g->view.n_blocks && g->at && !memcmp(wanted, g->at, m * sizeof *wanted)) {
