@@ -151,6 +151,16 @@ static void touch_node(const grid_work *w, uint32_t j, const near_nodes *n, uint
 	booked[B_WORK] += quern_vec_dot(QUERN_VEC_OF(given), QUERN_VEC_AT(n->velocity, i, dim), 3);
 }
 
+/* A node within a body that turns moves as the body does there, not as its surface: what turns with the body is not sheared. */
+static void move_within(
+	const quern_pose *pose, quern_real displacement, uint32_t dim, near_nodes *n, uint32_t i) {
+	const quern_real distance = n->gap[i] + displacement;
+	const quern_vec way = quern_vec_scale(distance, QUERN_VEC_AT(n->normal, i, dim)),
+					more = quern_vec_cross(QUERN_VEC_OF(pose->spin), way);
+	n->velocity[0][i] += more.x, n->velocity[1][i] += more.y;
+	if (dim == 3) n->velocity[2][i] += more.z;
+}
+
 static bool body_is_far(const quern_bound *body, const quern_real first[3], quern_body_batch batch,
 	quern_real cell, quern_real extent) {
 	near_nodes one;
@@ -315,8 +325,9 @@ static bool meet_bodies(const grid_work *w, uint32_t b, near_nodes *n) {
 			const quern_real mass = w->node[(size_t)b * N + i][0];
 			if (mass > 0) take_room(w, b, i, n);
 			if (mass > 0 && w->p->alone) take_count(w, b, i, n);
-			if (mass > 0 && n->gap[i] <= 1e-9 * w->g->cell)
-				touch_node(w, j, n, b, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
+			if (!(mass > 0 && n->gap[i] <= 1e-9 * w->g->cell)) continue;
+			move_within(batch.pose, item->displacement, s->dim, n, i);
+			touch_node(w, j, n, b, i, mass, &w->motion[(size_t)b * N + i], body_booked(&w->books, b, j));
 		}
 	}
 	return placed;

@@ -487,7 +487,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum"
 	.limit = limit, .account = account, .cell = cell, .accept = accept, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 11,
+	.revision = 12,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.mpm",
 	.brief = "The continuum: material points on a sparse grid.",

@@ -78,6 +78,10 @@ def disc(place):
             for what, found in (("angular momentum", angular), ("spin", spin), ("energy", columns(out)["energy.points"][4:])):
                 near(f"disc: {what}, least", min(found), found[0], 0.005)
                 near(f"disc: {what}, most", max(found), found[0], 0.005)
+    lab.run("disc", place / "held", "--set=stages.1.set={bodies.ring.while: always}")
+    c = columns(place / "held")
+    print(f"disc: {c['energy.elastic'][-1] / c['energy.points'][-1]:.1e} of the kinetic energy is elastic where it turns with its ring")
+    assert c["energy.elastic"][-1] < 1e-3 * c["energy.points"][-1]
     print("disc: angular momentum kept " + ", ".join(f"{k:.4f} with {t}" for t, k in kept.items()))
     assert kept["picflip"] < 0.97
 
