@@ -4,6 +4,7 @@
 
     studies/columns/law.py [--sweep out/columns]
     studies/columns/law.py --sweep out/collapse     and how the run-out converges with the cell
+    studies/columns/law.py --sweep out/affine     that alone: laws take columns of all aspects
 
 The aspect is a = H/L with the width L of the column before the gate goes and H twice the height below
 which half of its mass lies; the run-out is r = (front - L)/L at the end. Broad columns: r = c a through a <= 2, with R^2 of that line. Slender ones:
@@ -108,11 +109,15 @@ def order_of(three):
     return f"{math.log2(first / last):.1f} ± {error:.1f}"
 
 
+def cases_of(by):
+    return {case for seeds in by.values() for columns in seeds.values() for case in columns}
+
+
 def convergence(by):
     """Run-outs of each aspect in cells of 8, 4 and 2 mm, and the order in which the last two are nearer than the first two."""
     rows = ["| material | aspect | 8 mm | 4 mm | 2 mm | order |", "|---|---|---|---|---|---|"]
     for material in sorted({name.rpartition(", ")[0] for name in by}, reverse=True):
-        for case in sorted(WIDTH, key=float):
+        for case in sorted(cases_of(by), key=float):
             three = [mean_of([columns[case][1] for columns in by[f"{material}, {cell} mm"].values() if case in columns]) for cell in (8, 4, 2)]
             rows.append(f"| `{material}` | {case} | {' | '.join(f'{mean:.3f} ± {error:.3f}' for mean, error in three)} | {order_of(three)} |")
     return "\n".join(rows) + "\n"
@@ -122,7 +127,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/columns")
     by = found(parser.parse_args().sweep)
-    print(table(by), end="")
+    if cases_of(by) == set(WIDTH):
+        print(table(by), end="")
     if all(" mm" in name for name in by):
         print(f"\n{convergence(by)}", end="")
 

@@ -18,6 +18,7 @@ typedef struct place {
 	double floor; /* m; below 0: a face of the domain */
 	double above; /* m, of the point */
 	double speed, slope;
+	double gain; /* at most, of energy; at floors gimp's D is something between h^2/8 and h^2/4 */
 } place;
 
 static const double cell = 0.1;
@@ -79,24 +80,22 @@ static double gain_of(quern_run *run, double *farthest) {
 static void no_energy_at_walls(void **unused) {
 	static const char *const shapes[] = { "gimp", "bspline" }; /* linear ones have no moment to keep */
 	static const place places[] = {
-		{ "towards a face", -1, 0.09, -0.2, 0 },
-		{ "away from a face", -1, 0.01, 0.2, 20 },
-		{ "held at a floor on nodes", 0.5, 0.004, -0.1, -0.5 },
-		{ "held at one between nodes", 0.535, 0.001, -0.1, -0.5 },
-		{ "away from one between nodes", 0.535, 0.001, 0.1, 5 },
+		{ "towards a face", -1, 0.09, -0.2, 0, 0 },
+		{ "away from a face", -1, 0.01, 0.2, 20, 0 },
+		{ "held at a floor on nodes", 0.5, 0.004, -0.1, -0.5, 0.02 },
+		{ "held at one between nodes", 0.535, 0.001, -0.1, -0.5, 0.02 },
+		{ "away from one between nodes", 0.535, 0.001, 0.1, 5, 0.4 },
 	};
 	(void)unused;
 	bool good = true;
 	table_head("a lone point with apic at a wall: energy that it gains in three seconds, over the first");
 	for (size_t k = 0; k < sizeof places / sizeof *places; k++)
 		for (int s = 0; s < 2; s++) {
-			const bool between =
-				places[k].floor >= 0; /* where gimp's D is something between h^2/8 and h^2/4 */
 			char what[80];
 			double farthest;
 			quern_run *run = open_point(&places[k], shapes[s]);
 			snprintf(what, sizeof what, "%s, %s", places[k].name, shapes[s]);
-			good &= table_row(what, gain_of(run, &farthest), 0, between && !s ? 1 : 1e-9);
+			good &= table_row(what, gain_of(run, &farthest), 0, s ? 1e-9 : fmax(places[k].gain, 1e-9));
 			table_note("  highest place, m", farthest);
 			harness_close(run);
 		}
