@@ -122,6 +122,8 @@ static quern_check_kernel *make(
 
 /* ---- what must hold ---- */
 
+enum { POINTS = 300 };
+
 static double stress_size(const quern_check_kernel *k, uint32_t i, bool found) {
 	double sum = 1e-30;
 	for (uint32_t c = 0; c < stresses(k); c++)
@@ -130,7 +132,7 @@ static double stress_size(const quern_check_kernel *k, uint32_t i, bool found) {
 }
 
 typedef struct {
-	quern_check_tally moduli, friction, again, held, yields, turned, taken, violent;
+	quern_check_tally moduli, friction, again, held, yields, turned, axes, taken, violent;
 } tallies;
 
 static void check_moduli(const quern_check_kernel *assign, tallies *t) {
@@ -279,9 +281,100 @@ static void check_rotation(quern_check_kernel *k, tallies *t) {
 	}
 }
 
+/* ---- other axes ---- */
+
+static void pack(const quern_check_kernel *k, uint32_t i, double s[3][3]) {
+	static const int planar[] = { 0, 4, 1 }, spatial[] = { 0, 4, 8, 1, 5, 2 };
+	for (uint32_t c = 0; c < stresses(k); c++) {
+		const int at = (k->dim == 2 ? planar : spatial)[c];
+		quern_check_given(k, STRESS, c)[i] = s[at / 3][at % 3];
+	}
+}
+
+/* Axes turned anyhow, point by point: q_ab is the part along the new axis a of the old one b. */
+static void axes_of(const quern_check_kernel *k, uint32_t i, double q[3][3]) {
+	double n[3] = { 0, 0, 1 };
+	if (k->dim == 3) k->host->direction(3, 74, i, n);
+	const double angle = k->host->uniform(73, i, 0, 6.283185307179586), c = cos(angle), s = sin(angle);
+	for (int a = 0; a < 3; a++)
+		for (int b = 0; b < 3; b++) {
+			const double across = a == b ? 0 : (b == (a + 1) % 3 ? -1 : 1) * n[3 - a - b];
+			q[a][b] = (a == b ? c : 0) + (1 - c) * n[a] * n[b] + s * across;
+		}
+}
+
+static void in_axes(double q[3][3], double t[3][3]) {
+	double half[3][3] = { { 0 } }, out[3][3] = { { 0 } };
+	for (int a = 0; a < 3; a++)
+		for (int b = 0; b < 3; b++)
+			for (int c = 0; c < 3; c++) half[a][b] += q[a][c] * t[c][b];
+	for (int a = 0; a < 3; a++)
+		for (int b = 0; b < 3; b++)
+			for (int c = 0; c < 3; c++) out[a][b] += half[a][c] * q[b][c];
+	memcpy(t, out, sizeof out);
+}
+
+/* The same stresses for both, in the second's own axes. */
+static void start_in_axes(
+	const quern_check *c, const quern_check_instance *it, quern_check_kernel *k, quern_check_kernel *turned) {
+	quern_check_kernel *assign = create(c, it, QUERN_MATERIAL_ASSIGN, false, k->n);
+	fill_stress(assign, 1e-3, 0.5, 75);
+	c->host->run(assign, 512, false);
+	hand_over(assign, k);
+	for (uint32_t i = 0; i < k->n; i++) {
+		double q[3][3], s[3][3];
+		axes_of(k, i, q);
+		unpack(assign, i, false, s);
+		in_axes(q, s);
+		pack(assign, i, s);
+	}
+	c->host->run(assign, 512, false);
+	hand_over(assign, turned);
+	c->host->kernel_destroy(assign);
+}
+
+static void deform_in_axes(quern_check_kernel *k, quern_check_kernel *turned, double strain) {
+	const uint32_t dim = k->dim;
+	k->dt = turned->dt = 1e-4;
+	k->host->fill(k, GRADIENT, dim * dim, 76, -strain / k->dt, strain / k->dt);
+	for (uint32_t i = 0; i < k->n; i++) {
+		double q[3][3], l[3][3] = { { 0 } };
+		axes_of(k, i, q);
+		for (uint32_t c = 0; c < dim * dim; c++) l[c / dim][c % dim] = quern_check_given(k, GRADIENT, c)[i];
+		in_axes(q, l);
+		for (uint32_t c = 0; c < dim * dim; c++)
+			quern_check_given(turned, GRADIENT, c)[i] = l[c / dim][c % dim];
+	}
+	k->host->run(k, 512, false);
+	k->host->run(turned, 512, false);
+}
+
+/* What a material does, it does in any axes: of a deformation seen from turned ones the stress is turned, and no component is another. */
+static void check_axes(const quern_check *c, const quern_check_instance *it, double strain, tallies *t) {
+	quern_check_kernel *k = create(c, it, QUERN_MATERIAL_UPDATE, true, POINTS),
+					   *turned = create(c, it, QUERN_MATERIAL_UPDATE, true, POINTS);
+	start_in_axes(c, it, k, turned);
+	deform_in_axes(k, turned, strain);
+	const double scale = (strain + 1e-3) * (moduli_of(k).bulk + moduli_of(k).shear);
+	for (uint32_t i = 0; i < k->n; i++) {
+		double q[3][3], s[3][3], now[3][3];
+		axes_of(k, i, q);
+		unpack(k, i, true, s);
+		in_axes(q, s);
+		unpack(turned, i, true, now);
+		for (int a = 0; a < 3; a++)
+			for (int b = a; b < 3; b++)
+				k->host->measure(&t->axes, fabs(now[a][b] - s[a][b]), 1e-9 * scale,
+					"%u-D: in turned axes a stress after a strain of %.0e should be %.9g, is %.9g Pa", k->dim,
+					strain, s[a][b], now[a][b]);
+	}
+	c->host->kernel_destroy(k);
+	c->host->kernel_destroy(turned);
+}
+
 /* ---- what deformation costs ---- */
 
-enum { CYCLE = 200, POINTS = 300 };
+enum { CYCLE = 200 };
 
 /* Of strain^2 (K + G). A law in rates is off by some ten times the strain, since no energy is behind it. */
 static const double cycle_off = 0.02;
@@ -343,6 +436,7 @@ static void try_dimension(const quern_check *c, const quern_check_instance *it, 
 	start(c, it, k, 1e-2, 0.1);
 	check_rest(k, t);
 	check_rotation(k, t);
+	for (int e = -6; e <= -2; e++) check_axes(c, it, pow(10, e), t);
 	for (int e = -4; e <= -3; e++) {
 		start(c, it, k, 1e-3, 0.1);
 		check_cycle(k, pow(10, e), t);
@@ -357,7 +451,8 @@ static void try_dimension(const quern_check *c, const quern_check_instance *it, 
 static void law(const quern_check *c) {
 	tallies t = { { .name = "moduli and density" }, { .name = "friction at walls" },
 		{ .name = "assign twice" }, { .name = "assign and read back" }, { .name = "yield" },
-		{ .name = "rotation" }, { .name = "work is stored or lost" }, { .name = "large gradients" } };
+		{ .name = "rotation" }, { .name = "any axes" }, { .name = "work is stored or lost" },
+		{ .name = "large gradients" } };
 	for (uint32_t dim = 2; dim <= 3; dim++) {
 		quern_check_instance *it = c->host->instance_create(c, dim, 0);
 		if (it) try_dimension(c, it, &t);
@@ -369,6 +464,7 @@ static void law(const quern_check *c) {
 	c->host->tell(c, &t.held, NULL);
 	c->host->tell(c, &t.yields, NULL);
 	c->host->tell(c, &t.turned, NULL);
+	c->host->tell(c, &t.axes, "strains of 1e-6 to 0.01 in one step");
 	c->host->tell(c, &t.taken, "round circles of strains of 1e-4 and 1e-3");
 	c->host->tell(c, &t.violent, "strains of 3e-6 to 0.3 in one step");
 }
@@ -383,7 +479,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.instance_size = 1,
 	.id = "check.material",
-	.brief = "Constitutive models: stress and history belong together, yield, rotation.",
+	.brief = "Constitutive models: stress and history belong together, yield, rotation, any axes.",
 	.params = params,
 	.uses = uses,
 	.ops = &ops };

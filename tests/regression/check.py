@@ -123,6 +123,10 @@ BROKEN = [
     ("does not turn", "mpm_hypo/material.elastic.c", [
         ("const tensor l = TENSOR_AT(b->gradient, i, dim);",
          "tensor l = TENSOR_AT(b->gradient, i, dim); l.xy = l.yx = 0.5 * (l.xy + l.yx);")], "rotation"),
+    ("takes a component for another", "mpm_hypo/material.elastic.c", [
+        ("const tensor l = TENSOR_AT(b->gradient, i, dim);",
+         "tensor l = TENSOR_AT(b->gradient, i, dim); const quern_real xz = l.xz, zx = l.zx; l.xz = l.yz; l.zx = l.zy; l.yz = xz; l.zy = zx;")],
+     "any axes"),
     ("never yields", "mpm_hypo/material.mu_i.c", [("symmetric_scale_shift(dim, grown * (flow / tau), s, -(grown * p)), trial)",
                                                    "symmetric_scale_shift(dim, 1, s, -p), trial)")], "yield"),
     ("forgets", "mpm_hyper/material.drucker_prager.c", [
