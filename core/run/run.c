@@ -69,7 +69,7 @@ void quern_run_reset(quern_run *run) {
 	a->used = a->n_extra = a->extra_bytes = 0;
 }
 
-/* Nobody looks between steps at rows of which no field is kept; the next step begins by making them zero. */
+/* Nobody looks between steps at rows of which no field is kept; the next step makes them zero, or writes all of them. */
 static void forget_rows(quern_store *store, size_t set) {
 	quern_set_store *s = &store->sets[set];
 	for (size_t k = 0; k < store->n_fields; k++)

@@ -89,6 +89,7 @@ static void clear(quern_grid *g) {
 	g->colour = g->by_colour = g->by_place = NULL;
 	g->slot = NULL;
 	g->n_slots = 0;
+	g->covers = false;
 }
 
 void quern_grid_finish(quern_grid *g) {
@@ -302,16 +303,18 @@ static quern_status carry_cells(const quern_grid *g, const quern_grid *old, quer
 /* Marks the blocks that were asked for among those that came of it. */
 static void mark_asked(quern_grid *g, uint32_t n, const int32_t (*block)[3]) {
 	memset(g->asked, 0, g->view.n_blocks);
+	g->covers = true;
 	for (uint32_t i = 0; i < n; i++) {
 		const int32_t b = quern_grid_find(g, block[i]);
 		if (b >= 0) g->asked[b] = 1;
+		else g->covers = false;
 	}
 }
 
 /* Just these blocks were asked for the last time, too: mostly so. */
 static bool are_asked(const quern_grid *g, uint32_t n, const int32_t (*block)[3]) {
 	const uint32_t n_blocks = g->view.n_blocks;
-	uint8_t *left = g->at ? malloc((size_t)n_blocks + 1) : NULL;
+	uint8_t *left = g->covers ? malloc((size_t)n_blocks + 1) : NULL;
 	if (!left) return false;
 	memcpy(left, g->asked, n_blocks);
 	bool same = true;

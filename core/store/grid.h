@@ -13,6 +13,8 @@ typedef struct quern_grid {
 	uint32_t *colour, *by_colour, *by_place; /* by_place NULL: they are in order */
 	int32_t *slot;                           /* hash table of block indices, -1 free */
 	uint32_t n_slots;
+	bool
+		covers; /* its blocks are those asked for and their neighbours: not so where a file says which they are */
 } quern_grid;
 
 /* Domain and cell size; QUERN_E_PARAM if the grid would have more than 2^22 cells along an axis, or 2^31 in all:

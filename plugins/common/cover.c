@@ -70,7 +70,7 @@ enum { LOT = 256 };
 static void bring_back(quern_real *restrict x, uint32_t n, quern_real lower, quern_real upper) {
 	const quern_real length = upper - lower;
 	int far = 0;
-	QUERN_SIMD
+#pragma omp simd reduction(| : far)
 	for (uint32_t i = 0; i < n; i++) {
 		const quern_real y = x[i] >= upper ? x[i] - length : x[i];
 		x[i] = y < lower ? y + length : y;
@@ -88,13 +88,14 @@ static bool find_cells(const work *w, uint32_t k, uint32_t begin, uint32_t n, in
 	const int32_t cells = w->g->cells[k], around = s->periodic[k] ? cells : 0;
 	int left = 0;
 	if (s->periodic[k]) bring_back(x, n, lower, upper);
-	QUERN_SIMD
+#pragma omp simd reduction(| : left)
 	for (uint32_t i = 0; i < n; i++) {
-		const int32_t c = quern_cell_along(x[i], origin, inverse);
+		const bool in = (x[i] >= lower - slack) & (x[i] <= upper + slack);
+		const int32_t c = quern_cell_along(in ? x[i] : lower, origin, inverse);
 		cell[i] = quern_cell_held(c >= cells ? c - around : c, cells);
-		left |= !(x[i] >= lower - slack) | !(x[i] <= upper + slack);
+		left |= !in;
 	}
-	return s->periodic[k] || !left;
+	return !left;
 }
 
 /* Keys and places of a lot; false where a point has left. */
@@ -171,7 +172,7 @@ static quern_status name_lost(const work *w) {
 	const quern_step *s = w->s;
 	const quern_real slack = 1e-6 * w->g->cell;
 	for (uint32_t k = 0; k < s->dim; k++)
-		for (uint32_t i = 0; i < w->n && !s->periodic[k]; i++) {
+		for (uint32_t i = 0; i < w->n; i++) {
 			const quern_real x = w->c->point.real[k][i];
 			if (x >= s->lower[k] - slack && x <= s->upper[k] + slack) continue;
 			return s->host->stop(s->run, QUERN_E_NUMERIC, "point", i,

@@ -42,6 +42,35 @@ static void one_block(void **state) {
 	quern_grid_finish(&g);
 }
 
+/* The same blocks in any order and number leave the grid where it is; others, or a grid that a file has given, make it anew. */
+static void again(void **state) {
+	static const double upper[3] = { 64, 64, 0 };
+	static const bool around[3] = { false };
+	static const int32_t two[][3] = { { 3, 3, 0 }, { 6, 3, 0 } },
+						 turned[][3] = { { 6, 3, 0 }, { 3, 3, 0 }, { 6, 3, 0 } },
+						 beyond[][3] = { { 3, 3, 0 }, { 6, 3, 0 }, { 8, 3, 0 } };
+	quern_grid g;
+	(void)state;
+	assert_int_equal(quern_grid_init(&g, 2, 1, lower, upper, around), QUERN_OK);
+	cover(&g, 2, two);
+	assert_int_equal(g.view.n_blocks, 18);
+	const int32_t *tile = g.tile;
+	cover(&g, 3, turned);
+	assert_ptr_equal(g.tile, tile);
+	cover(&g, 1, two);
+	assert_int_equal(g.view.n_blocks, 9);
+	cover(&g, 2, two);
+	assert_int_equal(g.view.n_blocks, 18);
+	cover(&g, 3, beyond); /* what lies outside is ignored, but for its neighbours */
+	cover(&g, 2, two);
+	assert_int_equal(g.view.n_blocks, 18);
+	const uint8_t asked[] = { 1, 1 };
+	assert_int_equal(quern_grid_restore(&g, 2, two, asked), QUERN_OK); /* without neighbours */
+	cover(&g, 2, two);
+	assert_int_equal(g.view.n_blocks, 18);
+	quern_grid_finish(&g);
+}
+
 /* Tile node k of the asked block is the node that its coordinates say. */
 static void tiles(void **state) {
 	static const double upper[3] = { 16, 16, 16 };
@@ -125,7 +154,7 @@ static void too_many_cells(void **state) {
 }
 
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(one_block), cmocka_unit_test(tiles),
-		cmocka_unit_test(colours), cmocka_unit_test(too_many_cells) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(one_block), cmocka_unit_test(again),
+		cmocka_unit_test(tiles), cmocka_unit_test(colours), cmocka_unit_test(too_many_cells) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
