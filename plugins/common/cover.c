@@ -21,7 +21,8 @@ typedef struct {
 	uint64_t *key;         /* of a point: its block's by place, later by number in the grid */
 	uint8_t *place;        /* of a point in its block */
 	uint8_t *seen;         /* tasks times blocks of the grid: something lies there */
-	uint8_t *strays, *out; /* of a task: something lies where no block is; a point has left the domain */
+	uint8_t *out;          /* of a task: a point has left the domain */
+	uint32_t *strays;      /* of a task: what lies where no block is, or more */
 	uint32_t *count;       /* tasks times blocks: points, later where the next one of them goes */
 	int32_t *list, *from;  /* points by block, and by block and place */
 	uint32_t *block;       /* where the points of a block begin */
@@ -130,7 +131,7 @@ static void find_points(void *arg, uint32_t task, uint32_t worker) {
 		for (uint32_t i = begin; i < begin + n; i++) {
 			if (w->key[i] == last) continue;
 			const int32_t b = look_up(w->g, &m, last = w->key[i]);
-			if (b < 0) w->strays[task] = 1;
+			if (b < 0) w->strays[task]++;
 			else seen[b] = 1;
 		}
 	}
@@ -157,7 +158,7 @@ static void find_grains(void *arg, uint32_t task, uint32_t worker) {
 	for (uint32_t i = begin_of(task, w->tasks, grains(w)), place; i < end; i++) {
 		if (!is_inside(w, i)) continue;
 		const int32_t b = look_up(w->g, &m, block_key(w->g, w->c->grain.real, i, &place));
-		if (b < 0) w->strays[task] = 1;
+		if (b < 0) w->strays[task]++;
 		else seen[b] = 1;
 	}
 }
@@ -200,9 +201,8 @@ static uint32_t list_strays(const work *w, uint64_t *stray) {
 }
 
 /* Blocks that the grid does not have, once each. */
-static quern_status add_strays(const work *w, int32_t (*block)[3], uint32_t *blocks) {
+static quern_status add_strays(const work *w, size_t most, int32_t (*block)[3], uint32_t *blocks) {
 	const quern_step *s = w->s;
-	const size_t most = (size_t)w->n + grains(w) + 1;
 	uint64_t *stray = s->host->memory(s->run, most * sizeof *stray);
 	const uint32_t n = stray ? list_strays(w, stray) : 0;
 	void *sorting = s->host->memory(s->run, quern_sort_bytes(n));
@@ -217,9 +217,9 @@ static quern_status add_strays(const work *w, int32_t (*block)[3], uint32_t *blo
 static quern_status cover_material(const work *w) {
 	const quern_step *s = w->s;
 	const quern_grid_view *g = w->g;
-	const bool strays = any(w->strays, w->tasks);
-	const size_t most = (size_t)g->n_blocks + 1 + (strays ? (size_t)w->n + grains(w) : 0);
-	int32_t(*block)[3] = s->host->memory(s->run, most * sizeof *block);
+	size_t strays = 0;
+	for (uint32_t t = 0; t < w->tasks; t++) strays += w->strays[t];
+	int32_t(*block)[3] = s->host->memory(s->run, (g->n_blocks + strays + 1) * sizeof *block);
 	if (!block) return QUERN_E_MEMORY;
 	uint32_t blocks = 0;
 	for (uint32_t b = 0; b < g->n_blocks; b++) {
@@ -227,7 +227,7 @@ static quern_status cover_material(const work *w) {
 		for (uint32_t t = 0; t < w->tasks && !wanted; t++) wanted = w->seen[(size_t)t * g->n_blocks + b];
 		if (wanted) memcpy(block[blocks++], g->at[b], sizeof *block);
 	}
-	const quern_status status = strays ? add_strays(w, block, &blocks) : QUERN_OK;
+	const quern_status status = strays ? add_strays(w, strays, block, &blocks) : QUERN_OK;
 	return status == QUERN_OK ? s->host->cover(s->run, blocks, (const int32_t(*)[3])block) : status;
 }
 
@@ -315,7 +315,7 @@ quern_status quern_cover_sort(const quern_step *s, const cover *wanted) {
 	w.key = host->memory(s->run, ((size_t)w.n + 1) * sizeof *w.key);
 	w.place = host->memory(s->run, (size_t)w.n + 1);
 	w.seen = host->memory(s->run, (size_t)w.tasks * w.g->n_blocks + 1);
-	w.strays = host->memory(s->run, w.tasks);
+	w.strays = host->memory(s->run, w.tasks * sizeof *w.strays);
 	w.out = host->memory(s->run, w.tasks);
 	if (!w.key || !w.place || !w.seen || !w.strays || !w.out) return QUERN_E_MEMORY;
 	host->parallel(s->run, w.tasks, find_points, &w);
