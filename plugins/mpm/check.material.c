@@ -238,11 +238,16 @@ static void check_yield(
 	c->host->kernel_destroy(assign);
 }
 
-static void unpack(const quern_check_kernel *k, uint32_t i, bool found, double s[3][3]) {
+/* Where component c of a stress stands in the nine of a tensor. */
+static int place_of(const quern_check_kernel *k, uint32_t c) {
 	static const int planar[] = { 0, 4, 1 }, spatial[] = { 0, 4, 8, 1, 5, 2 };
+	return (k->dim == 2 ? planar : spatial)[c];
+}
+
+static void unpack(const quern_check_kernel *k, uint32_t i, bool found, double s[3][3]) {
 	memset(s, 0, 9 * sizeof(double));
 	for (uint32_t c = 0; c < stresses(k); c++) {
-		const int at = (k->dim == 2 ? planar : spatial)[c];
+		const int at = place_of(k, c);
 		s[at / 3][at % 3] = s[at % 3][at / 3] =
 			(found ? quern_check_found : quern_check_given)(k, STRESS, c)[i];
 	}
@@ -284,11 +289,8 @@ static void check_rotation(quern_check_kernel *k, tallies *t) {
 /* ---- other axes ---- */
 
 static void pack(const quern_check_kernel *k, uint32_t i, double s[3][3]) {
-	static const int planar[] = { 0, 4, 1 }, spatial[] = { 0, 4, 8, 1, 5, 2 };
-	for (uint32_t c = 0; c < stresses(k); c++) {
-		const int at = (k->dim == 2 ? planar : spatial)[c];
-		quern_check_given(k, STRESS, c)[i] = s[at / 3][at % 3];
-	}
+	for (uint32_t c = 0; c < stresses(k); c++)
+		quern_check_given(k, STRESS, c)[i] = s[place_of(k, c) / 3][place_of(k, c) % 3];
 }
 
 /* Axes turned anyhow, point by point: q_ab is the part along the new axis a of the old one b. */
