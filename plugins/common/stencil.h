@@ -75,7 +75,9 @@ QUERN_INLINE uint32_t stencil_along(const uint32_t reach, const uint32_t axis) {
 	return 2 + (reach >> axis & 1);
 }
 
-/* Calls with a particle's reach as a constant. */
+/* Calls with a particle's reach as a constant. Without AVX, which processors have had since 2011, it is either least or most: less code, which would
+ * be most of what there is to compile, and the same sums. */
+#if defined __AVX__
 #define STENCIL_BY_REACH(s, i, dim, call)                                                                    \
 	switch (dim == 3 ? (s)->reach[i] : 3) {                                                                  \
 	case 0: call(0); break;                                                                                  \
@@ -87,6 +89,13 @@ QUERN_INLINE uint32_t stencil_along(const uint32_t reach, const uint32_t axis) {
 	case 6: call(6); break;                                                                                  \
 	default: call(7);                                                                                        \
 	}
+#else
+#define STENCIL_BY_REACH(s, i, dim, call)                                                                    \
+	switch (dim == 3 ? (s)->reach[i] : 3) {                                                                  \
+	case 0: call(0); break;                                                                                  \
+	default: call(7);                                                                                        \
+	}
+#endif
 
 /* x: whole columns; the particles are entries begin .. begin + n, or those that `index` names. */
 QUERN_INLINE void stencil_make(const quern_grid_view *g, const quern_bound *shape, uint32_t block,
