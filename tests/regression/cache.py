@@ -90,6 +90,16 @@ def by_twin(place, _):
     lab.same(place / "none", place / "from_twin", "a state kept by grains alone")
 
 
+def by_twin_that_wraps(place, _):
+    """Where grains come back through a face as their list is made, places round by when that is: a twin's state has other bits."""
+    cache, options = place / "wraps", ["--set=time.end=2 ms", "--set=output.every=1 ms"]
+    for name, more in {"wraps_twin": ["--set=model=grains"], "wraps_own": [], "wraps_again": []}.items():
+        lab.run("chute", place / name, *options, *more, QUERN_CACHE=str(cache))
+    assert TAKEN not in (place / "wraps_own/log.txt").read_text() and TAKEN in (place / "wraps_again/log.txt").read_text()
+    lab.run("chute", place / "wraps_none", *options, "--no-cache")
+    lab.same(place / "wraps_none", place / "wraps_again", "a state of its own in a periodic scene")
+
+
 def apart(place, cache):
     """What acts does: seed, gravity, bodies, laws by their contents, and the plugin's own object."""
     for k, option in enumerate(["seed=3", "gravity=[0, -9.0]", "bodies.1.plane.contact.friction=0.1",
@@ -226,6 +236,6 @@ if __name__ == "__main__":
     with lab.workplace() as name:
         place = pathlib.Path(name)
         cache = place / "cache"
-        for test in (same_bits, shared, apart, damaged, forged, changed_on_the_way, resumed, helped, together, renamed):
+        for test in (same_bits, shared, by_twin, by_twin_that_wraps, apart, damaged, forged, changed_on_the_way, resumed, helped, together, renamed):
             test(place, cache)
             print(test.__name__.replace("_", " "), "holds")
