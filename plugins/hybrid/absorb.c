@@ -94,11 +94,21 @@ static void absorb(const absorbing *a, uint32_t c) {
 
 /* How much fuller than a neighbour a cell with a surplus is, or emptier than it one with a debt. Where less than half of a cell
  * is, its surface is: nothing is moved beyond. */
-static quern_real slope_to(const update *d, uint32_t c, int32_t n, bool walled) {
-	if (n < 0 || d->zone[n] == QUERN_DISCRETE || walled) return 0;
+static quern_real slope_to(const update *d, uint32_t c, int32_t n) {
+	if (n < 0 || d->zone[n] == QUERN_DISCRETE) return 0;
 	const quern_real there = cell_holds(d, (uint32_t)n) / cell_room(d, (uint32_t)n),
 					 fuller = cell_holds(d, c) / cell_room(d, c) - there;
 	return there < 0.5 ? 0 : fmax(0, d->u[U_OWED].real[0][c] > 0 ? fuller : -fuller);
+}
+
+/* Whether a wall stands between a cell and its neighbour along axis k / 2. */
+static bool is_walled(const update *d, uint32_t c, const int32_t cell[3], uint32_t k, int32_t n) {
+	quern_real from[3], there[3];
+	int32_t beside[3] = { cell[0], cell[1], cell[2] };
+	beside[k / 2] += k % 2 ? 1 : -1; /* not brought back into a periodic domain: the line goes straight */
+	quern_hybrid_open_place(d, c, cell, from);
+	quern_hybrid_open_place(d, (uint32_t)n, beside, there);
+	return quern_hybrid_walled(d, NULL, c, from, there);
 }
 
 /* What momentum there is beside that of the mass belongs to that mass and to the points alike: if all of it stayed, a debt many
@@ -120,19 +130,14 @@ static void put(const absorbing *a, uint32_t to, uint32_t from, quern_real part)
 /* A surplus goes where less is, a debt where more is, among cells with continuum, as much as the difference is large. */
 static void pass_from(const absorbing *a, uint32_t c) {
 	const update *d = a->d;
-	quern_real part[6], from[3], there[3], sum = 0;
+	quern_real part[6], sum = 0;
 	int32_t cell[3], to[6];
 	if (d->u[U_OWED].real[0][c] == 0 || d->zone[c] == QUERN_DISCRETE || !quern_grid_cell_of(d->g, c, cell))
 		return;
-	quern_hybrid_open_place(d, c, cell, from);
 	for (uint32_t k = 0; k < 2 * d->s->dim; k++) {
-		int32_t beside[3] = { cell[0], cell[1], cell[2] };
 		to[k] = cell_beside(d, c, k / 2, k % 2 ? 1 : -1);
-		beside[k / 2] += k % 2 ? 1 : -1; /* not brought back into a periodic domain: the line goes straight */
-		part[k] = 0;
-		if (to[k] < 0) continue;
-		quern_hybrid_open_place(d, (uint32_t)to[k], beside, there);
-		part[k] = slope_to(d, c, to[k], quern_hybrid_walled(d, NULL, c, from, there));
+		part[k] = slope_to(d, c, to[k]);
+		if (part[k] > 0 && is_walled(d, c, cell, k, to[k])) part[k] = 0;
 		sum += part[k];
 	}
 	for (uint32_t k = 0; k < 2 * d->s->dim && sum > 0; k++)

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+enum { N = QUERN_BLOCK_CELLS };
+
 /* A cell that bodies leave less of has too little in it to be measured. */
 static const quern_real least_open = 0.5;
 
@@ -46,14 +48,20 @@ static void measure_full(const update *d) {
 	if (n) d->u[U_FULL].real[0][0] = sum / n;
 }
 
-void quern_hybrid_crowding(const update *d) {
+static void crowd_block(void *arg, uint32_t b, uint32_t worker) {
+	const update *d = arg;
 	quern_real *crowding = d->u[U_CROWDING].real[0], *fullness = d->u[U_FULLNESS].real[0];
-	for (uint32_t c = 0; c < d->n_cells; c++) {
+	(void)worker;
+	for (uint32_t c = b * N; c < (b + 1) * N; c++) {
 		int32_t cell[3];
 		if (!quern_grid_cell_of(d->g, c, cell)) continue;
-		const quern_real now = crowding_of(d, c / QUERN_BLOCK_CELLS, cell);
+		const quern_real now = crowding_of(d, b, cell);
 		crowding[c] += (crowding[c] > 0 ? NEWEST : 1) * (now - crowding[c]);
 		fullness[c] = d->open[c] > least_open ? cell_holds(d, c) / (d->full * d->open[c]) : 0;
 	}
+}
+
+void quern_hybrid_crowding(update *d) {
+	d->s->host->parallel(d->s->run, d->g->n_blocks, crowd_block, d);
 	if (!(d->u[U_FULL].real[0][0] > 0)) measure_full(d);
 }

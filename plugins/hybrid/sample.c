@@ -3,7 +3,23 @@
 #include "../common/symmetric.h"
 #include "contacts.h"
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+
+/* Of a contact: where it is, its force, and the branch that it acts along. */
+typedef struct {
+	quern_vec at, force, branch;
+} sampled;
+
+/* Cells around the contacts of a block, and what these give to each, component by component. */
+typedef struct {
+	int32_t low[3], size[3];
+	size_t cells;
+	quern_real *sum;
+	bool any, failed;
+} window;
+
+enum { MOST_CELLS = 1 << 14 };
 
 typedef struct {
 	const quern_step *s;
@@ -11,6 +27,8 @@ typedef struct {
 	quern_real one_over_volume;
 	quern_grid_cursor last;
 	const body_pose *pose; /* by body */
+	contact_list list;
+	window *window; /* by block of contacts */
 } sampling;
 
 /* Entries of the cells at the corners of a hat, -1 for none. In the midst of a block one is looked for, and the others are
@@ -38,55 +56,161 @@ QUERN_INLINE void corners_of(sampling *p, const int32_t low[3], int32_t entry[8]
 	}
 }
 
-QUERN_INLINE void add_in(sampling *p, quern_vec at, quern_vec f, quern_vec b, const uint32_t dim) {
+/* Where a hat at x begins, in cells, and how far x lies on from the middle of its lowest cell. */
+QUERN_INLINE void hat_at(
+	const quern_grid_view *g, quern_vec at, int32_t low[3], quern_real part[3], const uint32_t dim) {
 	const quern_real x[3] = { at.x, at.y, at.z };
-	const quern_column *stress = &p->s->use[S_STRESS];
-	int32_t low[3] = { 0 }, entry[8];
-	quern_real part[3] = { 0 };
 	for (uint32_t k = 0; k < dim; k++) {
-		const quern_real t = (x[k] - p->g->lower[k]) / p->g->cell - 0.5, below = floor(t);
+		const quern_real t = (x[k] - g->lower[k]) / g->cell - 0.5, below = floor(t);
 		low[k] = (int32_t)below;
 		part[k] = t - below;
 	}
-	corners_of(p, low, entry, dim);
+}
+
+/* -1/V (f b + b f)/2, shared out by hats centred at the cells: to the entries of the corners. */
+QUERN_INLINE void share_out(quern_real *const stress[6], const int32_t entry[8], const quern_real part[3],
+	quern_real one_over_volume, quern_vec f, quern_vec b, const uint32_t dim) {
 	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
-		quern_real w = -p->one_over_volume;
+		quern_real w = -one_over_volume;
 		for (uint32_t k = 0; k < dim; k++) w *= corner >> k & 1 ? part[k] : 1 - part[k];
 		if (entry[corner] < 0) continue;
 		const symmetric share = symmetric_dyad(w, f, b);
-		SYMMETRIC_ADD(stress->real, entry[corner], share, dim);
+		SYMMETRIC_ADD(stress, entry[corner], share, dim);
 	}
 }
 
-/* -1/V (f b + b f)/2, shared out by hats centred at the cells; what would go behind a wall stays before it. */
-static void add(sampling *p, quern_vec at, quern_vec f, quern_vec b) {
-	if (p->s->dim == 2) add_in(p, at, f, b, 2);
-	else add_in(p, at, f, b, 3);
+/* What would go behind a wall stays before it. */
+QUERN_INLINE void add_in(sampling *p, const sampled *c, const uint32_t dim) {
+	int32_t low[3] = { 0 }, entry[8];
+	quern_real part[3] = { 0 };
+	hat_at(p->g, c->at, low, part, dim);
+	corners_of(p, low, entry, dim);
+	share_out(p->s->use[S_STRESS].real, entry, part, p->one_over_volume, c->force, c->branch, dim);
+}
+
+static void add(sampling *p, const sampled *c) {
+	if (p->s->dim == 2) add_in(p, c, 2);
+	else add_in(p, c, 3);
 }
 
 /* The branch goes from centre to centre, or between a centre and the contact where the other grain is fixed: that one
  * is a wall. */
-static void sample_contact(sampling *p, const contact_seen *c) {
+QUERN_INLINE bool sample_of(const sampling *p, uint32_t b, uint32_t q, sampled *out, const uint32_t dim) {
 	const quern_column *u = p->s->use;
 	const int32_t *fixed = u[S_FIXED].index;
-	if (!(c->force2 > 0) || !(c->distance2 > 0)) return;
-	const quern_real ri = u[S_RADIUS].real[0][c->first], rj = u[S_RADIUS].real[0][c->second];
+	contact_seen c;
+	if (!contact_at(&p->list, b, q, &c) || !(c.force2 > 0) || !(c.distance2 > 0)) return false;
+	const quern_real ri = u[S_RADIUS].real[0][c.first], rj = u[S_RADIUS].real[0][c.second];
 	const quern_real share = ri / (ri + rj);
-	const bool held_i = fixed && fixed[c->first], held_j = fixed && fixed[c->second];
+	const bool held_i = fixed && fixed[c.first], held_j = fixed && fixed[c.second];
 	const quern_real branch = held_j ? share : held_i ? 1 - share : 1;
-	const quern_vec centre = QUERN_VEC_AT(u[S_POSITION].real, c->first, p->s->dim);
-	add(p, quern_vec_axpy(-share, c->way, centre), c->force, quern_vec_scale(branch, c->way));
+	const quern_vec centre = QUERN_VEC_AT(u[S_POSITION].real, c.first, dim);
+	*out = (sampled) { quern_vec_axpy(-share, c.way, centre), c.force, quern_vec_scale(branch, c.way) };
+	return true;
 }
 
-static void sample_contacts(sampling *p) {
-	const contact_list list = contacts_of(p->s, S_FORCE, S_FIRST, S_SECOND, S_POSITION);
-	contact_seen c;
-	const uint32_t *by_place = p->s->host->parts(p->s->run, "contact")->by_place;
-	for (uint32_t k = 0; k < list.contacts.n_blocks; k++) {
-		const uint32_t b = quern_nth(by_place, k);
-		for (uint32_t q = list.contacts.block[b]; q < list.contacts.block[b + 1]; q++)
-			if (contact_at(&list, b, q, &c)) sample_contact(p, &c);
+/* ---- the contacts of a block, in a window of cells of their own: sums do not depend on who is at work, and entries are looked for once a cell ---- */
+
+QUERN_INLINE void find_window(const sampling *p, uint32_t b, window *w, const uint32_t dim) {
+	const uint32_t *block = p->list.contacts.block;
+	sampled c;
+	for (uint32_t k = 0; k < dim; k++) w->low[k] = INT32_MAX, w->size[k] = INT32_MIN;
+	for (uint32_t q = block[b]; q < block[b + 1]; q++) {
+		int32_t low[3] = { 0 };
+		quern_real part[3];
+		if (!sample_of(p, b, q, &c, dim)) continue;
+		hat_at(p->g, c.at, low, part, dim);
+		for (uint32_t k = 0; k < dim; k++) {
+			w->low[k] = low[k] < w->low[k] ? low[k] : w->low[k];
+			w->size[k] = low[k] > w->size[k] ? low[k] : w->size[k];
+		}
+		w->any = true;
 	}
+	w->cells = 1;
+	for (uint32_t k = 0; k < dim && w->any; k++) {
+		w->size[k] += 2 - w->low[k];
+		w->cells *= (size_t)w->size[k];
+	}
+}
+
+QUERN_INLINE void fill_window(const sampling *p, uint32_t b, window *w, const uint32_t dim) {
+	const uint32_t *block = p->list.contacts.block;
+	quern_real *stress[6] = { NULL };
+	int32_t way[8];
+	sampled c;
+	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, dim); k++) stress[k] = w->sum + k * w->cells;
+	for (uint32_t corner = 0; corner < 1u << dim; corner++) {
+		way[corner] = 0;
+		for (uint32_t k = dim; k-- > 0;) way[corner] = way[corner] * w->size[k] + (int32_t)(corner >> k & 1);
+	}
+	for (uint32_t q = block[b]; q < block[b + 1]; q++) {
+		int32_t low[3] = { 0 }, entry[8], first = 0;
+		quern_real part[3];
+		if (!sample_of(p, b, q, &c, dim)) continue;
+		hat_at(p->g, c.at, low, part, dim);
+		for (uint32_t k = dim; k-- > 0;) first = first * w->size[k] + low[k] - w->low[k];
+		for (uint32_t corner = 0; corner < 1u << dim; corner++) entry[corner] = first + way[corner];
+		share_out(stress, entry, part, p->one_over_volume, c.force, c.branch, dim);
+	}
+}
+
+QUERN_INLINE void sample_block(const sampling *p, uint32_t b, const uint32_t dim) {
+	window *w = &p->window[b];
+	*w = (window) { .size = { 1, 1, 1 } };
+	find_window(p, b, w, dim);
+	if (!w->any || w->cells > MOST_CELLS) return;
+	w->sum = calloc(w->cells, quern_shape_size(QUERN_SYMMETRIC, dim) * sizeof(quern_real));
+	w->failed = !w->sum;
+	if (w->sum) fill_window(p, b, w, dim);
+}
+
+static void sample_one(void *arg, uint32_t b, uint32_t worker) {
+	const sampling *p = arg;
+	(void)worker;
+	if (p->s->dim == 2) sample_block(p, b, 2);
+	else sample_block(p, b, 3);
+}
+
+static void add_window(sampling *p, const window *w) {
+	const uint32_t dim = p->s->dim, parts = quern_shape_size(QUERN_SYMMETRIC, dim);
+	for (size_t i = 0; i < w->cells; i++) {
+		size_t rest = i;
+		int32_t cell[3] = { 0 };
+		for (uint32_t k = 0; k < dim; k++) {
+			cell[k] = w->low[k] + (int32_t)(rest % (size_t)w->size[k]);
+			rest /= (size_t)w->size[k];
+		}
+		if (!quern_grid_bring_back(p->g, cell)) quern_grid_hold(p->g, cell);
+		const int32_t entry = quern_grid_entry_near(p->g, &p->last, cell);
+		for (uint32_t k = 0; k < parts && entry >= 0; k++)
+			p->s->use[S_STRESS].real[k][entry] += w->sum[k * w->cells + i];
+	}
+}
+
+/* Where the grains of a block lie far from each other, one by one. */
+static void add_block(sampling *p, uint32_t b) {
+	const uint32_t *block = p->list.contacts.block;
+	sampled c;
+	for (uint32_t q = block[b]; q < block[b + 1]; q++)
+		if (sample_of(p, b, q, &c, p->s->dim)) add(p, &c);
+}
+
+static quern_status sample_contacts(sampling *p) {
+	const quern_step *s = p->s;
+	const uint32_t *by_place = s->host->parts(s->run, "contact")->by_place, n = p->list.contacts.n_blocks;
+	bool failed = false;
+	p->window = s->host->memory(s->run, ((size_t)n + 1) * sizeof *p->window);
+	if (!p->window) return QUERN_E_MEMORY;
+	s->host->parallel(s->run, n, sample_one, p);
+	for (uint32_t q = 0; q < n; q++) {
+		const uint32_t b = quern_nth(by_place, q);
+		window *w = &p->window[b];
+		failed = failed || w->failed;
+		if (w->sum) add_window(p, w);
+		else if (w->any) add_block(p, b);
+		free(w->sum);
+	}
+	return failed ? QUERN_E_MEMORY : QUERN_OK;
 }
 
 /* On a body the branch goes from the surface to the grain's centre. */
@@ -105,7 +229,7 @@ static void sample_touch(sampling *p, uint32_t q) {
 	quern_real normal[3];
 	const quern_real gap = quern_body_gap_of(body, &p->pose[k], feature, s->dim, x, radius, normal);
 	const quern_vec branch = quern_vec_scale(radius + gap, QUERN_VEC_OF(normal));
-	add(p, quern_vec_sub(centre, branch), f, branch);
+	add(p, &(sampled) { quern_vec_sub(centre, branch), f, branch });
 }
 
 /* Looks at the grains between two steps write forces of their own. */
@@ -125,7 +249,8 @@ quern_status quern_hybrid_sample(const void *self, const quern_step *s) {
 	p.one_over_volume = 1 / quern_grid_cell_volume(p.g);
 	p.pose = quern_body_poses_now(s, SLOT_BODIES);
 	if (!p.pose) return QUERN_E_MEMORY;
-	sample_contacts(&p);
+	p.list = contacts_of(s, S_FORCE, S_FIRST, S_SECOND, S_POSITION);
+	if (sample_contacts(&p) != QUERN_OK) return QUERN_E_MEMORY;
 	const quern_parts *touches = s->host->parts(s->run, "touch");
 	for (uint32_t q = 0; s->use[S_TOUCH_FORCE].real[0] && q < touches->n; q++)
 		sample_touch(&p, quern_nth(touches->entry, q));

@@ -129,7 +129,7 @@ QUERN_INLINE quern_real cell_room(const update *d, uint32_t c) {
 }
 
 /* ---- crowding.c ---- */
-void quern_hybrid_crowding(const update *);
+void quern_hybrid_crowding(update *);
 
 /* How many of 0.05, 0.1, 0.2, 0.4 ... are passed: whoever warns does so again at each. */
 QUERN_INLINE int steps_passed(quern_real part) {
