@@ -75,13 +75,13 @@ static void add_clouds(render_view *v, const render_frame *f) {
 	free(half);
 }
 
-/* What is occupied, down to the floor unless that is far below. */
+/* What is occupied, down to the floor unless that is far below or nothing falls. */
 static void crop(render_view *v, const render_frame *f) {
 	const int up = f->dimension - 1;
 	double floor = INFINITY, most = 0;
 	add_clouds(v, f);
 	for (int k = 0; k < f->dimension; k++) most = fmax(most, v->high[k] - v->low[k]);
-	if (f->scene) floor = f->scene->general.lower[up];
+	if (f->scene && f->scene->general.gravity[up] != 0) floor = f->scene->general.lower[up];
 	for (size_t i = 0; i < f->grains.n; i++)
 		if (is_fixed(&f->grains, f, i) && quern_render_shown(v, f, &f->grains, i))
 			floor = fmin(floor, f->grains.position[i][up] - f->grains.size[i]);
