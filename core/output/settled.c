@@ -104,12 +104,6 @@ static uint64_t beginning(const quern_run *run) {
 	return hash;
 }
 
-/* Where grains come back through a face as their list is made, and so how their places round, depends on when it is: other sections may ask for that. */
-static bool wraps(const quern_run *run) {
-	const quern_general *general = &run->scene->general;
-	return general->periodic[0] || general->periodic[1] || general->periodic[2];
-}
-
 static bool anything_settles(const quern_scene *scene) {
 	for (size_t i = 0; i < scene->n_sections; i++)
 		if (scene->sections[i].ops->settled) return true;
@@ -133,7 +127,6 @@ char *quern_settled_key(const quern_run *run) {
 	for (size_t i = 0; i < run->scene->n_sections; i++) {
 		const quern_section *section = &run->scene->sections[i];
 		if (concerns(run, section)) add_section(run, section, root, &out);
-		else if (wraps(run)) quern_text_add(&out, "beside %s\n", section->name);
 	}
 	quern_node_destroy(root);
 	quern_text_add(&out, "beginning %016llx\n", (unsigned long long)beginning(run));

@@ -159,6 +159,7 @@ void quern_dem_range(quern_real *column, uint32_t n, quern_real *least, quern_re
 /* A list holds while neither two grains, nor a grain and a body, have used up the skin: this is half of what they have used, by the ways
  * of n parts of the grains, the longest of all ways, and how far bodies have come. Where grains are not `alone`, since a coupling moves
  * them as well, and says how far from where the list was made, or ways are those beside a box's own flow, only the longest counts. */
+bool quern_dem_moves_alone(const quern_step *);
 quern_real quern_dem_used_of_skin(
 	const quern_step *, const ways *, uint32_t n, quern_real farthest, quern_real swept, bool alone);
 

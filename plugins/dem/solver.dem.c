@@ -81,7 +81,7 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 	QUERN_PARAM(
 		dem, source, NULL, "Regions that pour grains.", .rows = source_rows, .item_size = sizeof(dem_source)),
 	QUERN_PARAM(dem, skin, "1",
-		"Verlet skin over the mean diameter; results do not depend on it, but for last digits in a periodic domain; the cost does.",
+		"Verlet skin over the mean diameter; what it changes of results is their last digits, in a periodic domain or a hybrid. The cost depends on it.",
 		.def = 0.1, .planar = 0.4, .min = 0.001, .max = 2, .flags = QUERN_PLANAR | QUERN_ADVANCED),
 	QUERN_PARAM(dem, step, "1",
 		"Recommended step over half the shortest period of a contact; default: the integrator's own.",
