@@ -157,9 +157,9 @@ quern_status quern_dem_judge_grains(const forces_shared *, uint32_t n_blocks);
 /* The least and the largest of n numbers of any order; the column is filled up to a multiple of 32. */
 void quern_dem_range(quern_real *column, uint32_t n, quern_real *least, quern_real *most);
 /* A list holds while neither two grains, nor a grain and a body, have used up the skin: this is half of what they have used, by the ways
- * of n parts of the grains, the longest of all ways, and how far bodies have come. Where grains are not `alone`, since a coupling moves
- * them as well, and says how far from where the list was made, or ways are those beside a box's own flow, only the longest counts. */
-bool quern_dem_moves_alone(const quern_step *);
+ * of n parts of the grains, the longest of all ways, and how far bodies have come. Where grains are not `alone`, since a coupling lends
+ * them motion as well, or ways are those beside a box's own flow, only the longest counts. While grains settle none does: a hybrid and its twin of
+ * grains make their lists at the same steps then, and settle to the same bits. */
 quern_real quern_dem_used_of_skin(
 	const quern_step *, const ways *, uint32_t n, quern_real farthest, quern_real swept, bool alone);
 

@@ -117,7 +117,7 @@ quern_status quern_dem_open(const void *self, const quern_step *s) {
 	/* bodies are on their way through this step as well, which no sum has yet */
 	const quern_real with_this =
 		swept ? *swept + quern_bodies_speed(s, SLOT_BODIES, now, now + s->dt) * s->dt : 0;
-	const bool alone = quern_dem_moves_alone(s) && !o.boxed;
+	const bool alone = (s->settling || !s->use[OPEN_LENT].real[0]) && !o.boxed;
 	*displacement =
 		fmax(*displacement, quern_dem_used_of_skin(s, o.ways, chunks, farthest, with_this, alone));
 	return QUERN_OK;

@@ -42,9 +42,6 @@ static quern_real nearer_by_half(const ways *of, uint32_t n, uint32_t dim) {
 	return square < INFINITY ? 0.5 * sqrt(square) : INFINITY; /* also where one is not a number */
 }
 
-/* While they settle no coupling does: a hybrid and its twin of grains make their lists at the same steps, and settle to the same bits. */
-bool quern_dem_moves_alone(const quern_step *s) { return s->settling || !s->host->has(s->run, "hybrid"); }
-
 quern_real quern_dem_used_of_skin(
 	const quern_step *s, const ways *of, uint32_t n, quern_real farthest, quern_real swept, bool alone) {
 	bool wraps =

@@ -101,6 +101,7 @@ def by_twin_that_wraps(place, _):
     lab.same(place / "wraps_none", place / "wraps_from_twin", "a state kept by grains alone in a periodic domain")
     weight = ["--set=model=grains", "--set=output.fields=[grain.weight]"]
     lab.run("chute", place / "wraps_weight", *options, *weight, QUERN_CACHE=str(cache))
+    assert TAKEN in (place / "wraps_weight/log.txt").read_text()
     lab.run("chute", place / "wraps_weight_none", *options, *weight, "--no-cache")
     lab.same(place / "wraps_weight_none", place / "wraps_weight", "a state kept without weights")
 
