@@ -90,6 +90,7 @@ def pictures(folder):
     picture_of(folder / "h2", folder / "large.png", width=1000)
     lightness_rises(folder / "row")
     comes_back(folder / "periodic")
+    floor_is_shown(folder / "floor")
 
 
 def comes_back(folder):
@@ -102,6 +103,20 @@ def comes_back(folder):
         shutil.copy(SOURCE / "configs/chute.yaml", folder / name / "scene.yaml")
         pictures_of.append(picture_of(folder / name, folder / f"{name}.png"))
     assert (pictures_of[0] == pictures_of[1]).all(), "a point beyond a periodic face is drawn there"
+
+
+def floor_is_shown(folder):
+    """The domain's floor belongs to the picture of what lies above it, and not where nothing falls."""
+    lows = {}
+    for name, gravity in (("falls", "[0, -9.81 m/s^2]"), ("floats", "[0, 0]")):
+        sets = cloud(200, 0.5)
+        sets["grains"]["position"][1][:, 1] += 8e-3
+        write_frame(folder / name, 2, name, sets)
+        scene = (SOURCE / "configs/column.yaml").read_text()
+        assert scene.count("gravity: [0, -9.81 m/s^2]") == 1
+        (folder / name / "scene.yaml").write_text(scene.replace("gravity: [0, -9.81 m/s^2]", f"gravity: {gravity}"))
+        lows[name] = measure(folder / name)["view"][1]
+    assert lows["falls"] <= 0 < 4e-3 < lows["floats"], f"views begin at {lows}"
 
 
 def cloud(n, value, far=None):
