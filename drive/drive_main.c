@@ -4,6 +4,6 @@
 #include "h5.h"
 
 int main(int argc, char **argv) {
-	quern_h5_quiet();
+	quern_h5_begin();
 	return quern_ended(quern_command_drive.run(argc, argv));
 }

@@ -11,7 +11,11 @@
 enum { USER_BLOCK = 512 };
 static const char magic[16] = "quern checksum\n";
 
-void quern_h5_quiet(void) { H5Eset_auto2(H5E_DEFAULT, NULL, NULL); }
+void quern_h5_begin(void) {
+	const int most = 1 << 16, of_a_kind = most / 4; /* unlimited, they hold a megabyte after the first file */
+	H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+	H5set_free_list_limits(most, of_a_kind, most, of_a_kind, most, of_a_kind);
+}
 
 /* ---- the memory that a file is built in ----
  * HDF5 grows it through these functions and gives it back when the file is closed. Then it is kept, not freed, so that

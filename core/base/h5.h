@@ -12,8 +12,9 @@ typedef struct quern_h5 {
 	size_t capacity;
 } quern_h5;
 
-/* Nothing is printed by the library from here on; our own messages name file and cause. */
-void quern_h5_quiet(void);
+/* Nothing is printed by the library from here on; our own messages name file and cause. And of the memory that it has no use for it
+ * keeps little. */
+void quern_h5_begin(void);
 
 /* A file in memory, which stays where it is until it is saved or discarded. `user_block`: 0, or 512 bytes in front that
  * hold a checksum of the rest. */

@@ -79,6 +79,6 @@ static int run(int argc, char **argv) {
 
 int main(int argc, char **argv) {
 	quern_platform_begin();
-	quern_h5_quiet();
+	quern_h5_begin();
 	return quern_ended(run(argc, argv));
 }

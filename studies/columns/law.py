@@ -5,6 +5,7 @@
     studies/columns/law.py [--sweep out/columns]
     studies/columns/law.py --sweep out/collapse     and how the run-out converges with the cell
     studies/columns/law.py --sweep out/affine     that alone: laws take columns of all aspects
+    studies/columns/law.py --sweep out/fine       both, with drucker_prager in cells down to 1 mm
 
 The aspect is a = H/L with the width L of the column before the gate goes and H twice the height below
 which half of its mass lies; the run-out is r = (front - L)/L at the end. Broad columns: r = c a through a <= 2, with R^2 of that line. Slender ones:
@@ -113,13 +114,19 @@ def cases_of(by):
     return {case for seeds in by.values() for columns in seeds.values() for case in columns}
 
 
+def cells_of(by):
+    """Widths of cells in mm, the coarsest first."""
+    return sorted({name.rpartition(", ")[2].removesuffix(" mm") for name in by}, key=float, reverse=True)
+
+
 def convergence(by):
-    """Run-outs of each aspect in cells of 8, 4 and 2 mm, and the order in which the last two are nearer than the first two."""
-    rows = ["| material | aspect | 8 mm | 4 mm | 2 mm | order |", "|---|---|---|---|---|---|"]
+    """Run-outs of each aspect by cell, and the order in which the last two are nearer than the two before."""
+    cells = cells_of(by)
+    rows = [f"| material | aspect | {' | '.join(f'{cell} mm' for cell in cells)} | order |", "|---|---|" + "---|" * len(cells) + "---|"]
     for material in sorted({name.rpartition(", ")[0] for name in by}, reverse=True):
         for case in sorted(cases_of(by), key=float):
-            three = [mean_of([columns[case][1] for columns in by[f"{material}, {cell} mm"].values() if case in columns]) for cell in (8, 4, 2)]
-            rows.append(f"| `{material}` | {case} | {' | '.join(f'{mean:.3f} ± {error:.3f}' for mean, error in three)} | {order_of(three)} |")
+            found = [mean_of([columns[case][1] for columns in by[f"{material}, {cell} mm"].values() if case in columns]) for cell in cells]
+            rows.append(f"| `{material}` | {case} | {' | '.join(f'{mean:.3f} ± {error:.3f}' for mean, error in found)} | {order_of(found[-3:])} |")
     return "\n".join(rows) + "\n"
 
 

@@ -47,7 +47,7 @@ quern_run *kit_run(const char *name, int n) { return kit_run_of(name, kit_open()
 quern_run *kit_run_of(const char *name, quern_run *run, int n) {
 	const char *folder = getenv("TMPDIR");
 	char why[256] = "";
-	quern_h5_quiet();
+	quern_h5_begin();
 	if (quern_run_setup(run) != QUERN_OK) abort();
 	kit_steps(run, n);
 	run->folder = quern_format("%s/%s", folder ? folder : "/tmp", name);

@@ -324,7 +324,7 @@ static void takes_memory_once(void **state) {
 #endif
 
 int main(void) {
-	quern_h5_quiet();
+	quern_h5_begin();
 	const struct CMUnitTest tests[] = { cmocka_unit_test(settled_and_not_released),
 		cmocka_unit_test(refuses_what_cannot_be), cmocka_unit_test(writes_only_what_can_be_read),
 #ifndef SANITIZED
