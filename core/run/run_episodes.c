@@ -117,7 +117,7 @@ static const char *other_start(const quern_scene *a, const quern_scene *b, const
 			*of = use->path;
 			for (size_t j = 0; j < use->n && !name; j++)
 				name = other_value(use->filling[j].instance, two->slots[k].filling[j].instance, dim,
-					is_once(one, use->slot));
+					use->slot->once || is_once(one, use->slot));
 		}
 		if (name) return name;
 	}

@@ -60,7 +60,7 @@ typedef struct quern_slot {
 	const quern_param *rows; /* keys that every entry takes besides the plugin's own */
 	uint32_t item_size;      /* bytes that `rows` fill */
 	uint32_t list, required; /* required: a list that must be given, be it empty */
-	uint32_t pad;
+	uint32_t once;           /* since 2.1: stages of a scene cannot change parameters of plugins here */
 	/* since 2.1: "cases", a list among the solver's parameters whose items take, beside their own rows, keys of the plugins here: what
 	 * they are in that case. A key that several of them have is given under a plugin's name: {linear: {friction: 0.1}} */
 	const char *refine;

@@ -81,8 +81,10 @@ static const quern_set sets[] = {
 };
 static const quern_slot slots[] = { { .name = "",
 										.kind = &quern_body_kind,
-										.doc = "Bodies.",
+										.doc = "Bodies. A stage cannot change their shape or place: they "
+											   "move by motion, and come and go by while.",
 										.list = 1,
+										.once = 1,
 										.stage = { "bodies.place" },
 										.override = "grains.contact",
 										.rows = rows,

@@ -202,6 +202,13 @@ def walls_become_smooth(place):
     assert "stages: continuum.points cannot change in the course of a run" in said, said
 
 
+def bodies_stay(place):
+    """A body moves by its motion: a stage that gave it another place or shape would have it there at once, by nobody's work."""
+    for key, value in (("point", "[0, 4 mm]"), ("normal", "[0.1, 1]")):
+        said = quern("plan", lab.scene("column"), f"--set=stages=[{{for: 1 ms}}, {{set: {{bodies.0.plane.{key}: {value}}}}}]", status=2)
+        assert f"stages: bodies.{key} cannot change in the course of a run" in said, said
+
+
 def substeps_change(place):
     """Another number of substeps from a stage on: bodies are where their time says, in every one of them."""
     text = lab.scene("column")
@@ -222,5 +229,5 @@ if __name__ == "__main__":
     os.environ["QUERN_CACHE"] = ""
     with lab.workplace() as name:
         for test in (gravity_turns, a_block_begins_to_slide, a_gate_opens, stages_of_one_value_change_nothing, courses_lead_on,
-                     walls_become_smooth, keys_that_stay, frames_stand_alone, substeps_change):
+                     walls_become_smooth, keys_that_stay, frames_stand_alone, bodies_stay, substeps_change):
             test(pathlib.Path(name))
