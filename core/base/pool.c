@@ -11,6 +11,7 @@
 #include <stdlib.h>
 
 enum { PAUSES = 2000, YIELDS = 200 }; /* some 50 us of each */
+enum { PARTS = 16 };                  /* of what is left in a share: so much is taken at once */
 
 typedef struct {
 	_Alignas(64) void *memory;
@@ -53,17 +54,19 @@ static uint32_t begin_of(const quern_pool *p, uint32_t n, uint32_t worker) {
 	return (uint32_t)((uint64_t)n * worker / p->workers);
 }
 
-/* Takes indices of one share until there is none left. */
+/* Takes indices of one share until there is none left: several at once while there are many, since two threads that take and count in turn
+ * wait for each other's caches, which for the shortest bodies costs more than the body. */
 static void take_from(quern_pool *p, uint32_t round, uint32_t owner, uint32_t worker) {
 	_Atomic uint64_t *tickets = &p->shares[owner].ticket;
 	uint64_t ticket = atomic_load(tickets);
 	while (ticket >> 32 == round && (uint32_t)ticket) {
-		const uint32_t left = (uint32_t)ticket, n = atomic_load(&p->n);
+		const uint32_t left = (uint32_t)ticket, n = atomic_load(&p->n), taken = left / PARTS + 1;
 		void (*body)(void *, uint32_t, uint32_t) = atomic_load(&p->body);
 		void *arg = atomic_load(&p->arg);
-		if (!atomic_compare_exchange_weak(tickets, &ticket, ticket - 1)) continue;
-		body(arg, begin_of(p, n, owner + 1) - left, worker);
-		if (atomic_fetch_add(&p->done, 1) + 1 == n && atomic_load(&p->caller_waits)) {
+		if (!atomic_compare_exchange_weak(tickets, &ticket, ticket - taken)) continue;
+		const uint32_t end = begin_of(p, n, owner + 1);
+		for (uint32_t i = end - left; i < end - left + taken; i++) body(arg, i, worker);
+		if (atomic_fetch_add(&p->done, taken) + taken == n && atomic_load(&p->caller_waits)) {
 			pthread_mutex_lock(&p->lock);
 			pthread_cond_signal(&p->end);
 			pthread_mutex_unlock(&p->lock);

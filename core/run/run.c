@@ -358,21 +358,52 @@ static quern_status begin_interval(quern_run *run) {
 
 /* ---- stages ---- */
 
+/* ---- what a stage is the first to add to ---- */
+
+enum { ZERO_CHUNK = 1024 };
+
+/* Lanes of rows, or the components of a column. */
+typedef struct {
+	double *row;
+	uint32_t lane[8], n_lanes;
+	bool whole; /* no lane belongs to another field */
+	void *const *data;
+	size_t bytes, n, n_components;
+} zeroed;
+
+static void zero_chunk(void *arg, uint32_t chunk, uint32_t worker) {
+	const zeroed *z = arg;
+	const size_t begin = (size_t)chunk * ZERO_CHUNK, left = z->n - begin,
+				 count = left < ZERO_CHUNK ? left : ZERO_CHUNK;
+	(void)worker;
+	for (size_t c = 0; c < z->n_components; c++)
+		memset((char *)z->data[c] + begin * z->bytes, 0, count * z->bytes);
+	if (z->whole) memset(z->row + 8 * begin, 0, count * 64);
+	for (size_t i = begin; i < begin + count && !z->whole; i++)
+		for (uint32_t k = 0; k < z->n_lanes; k++) z->row[8 * i + z->lane[k]] = 0;
+}
+
+static void zero_all(quern_run *run, zeroed *z) {
+	const size_t chunks = (z->n + ZERO_CHUNK - 1) / ZERO_CHUNK;
+	quern_pool_each(run->pool, (uint32_t)chunks, zero_chunk, z);
+}
+
 /* In rows, lanes of other fields stay as they are; where there are none, the whole is cleared at once. */
-static void zero_lanes(quern_set_store *set, uint32_t lanes) {
-	if (lanes == (1u << set->lanes) - 1 && set->row) memset(set->row, 0, (size_t)set->n * 64);
-	else
-		for (size_t i = 0; i < set->n; i++)
-			for (uint32_t k = 0; k < set->lanes; k++)
-				if (lanes >> k & 1) set->row[8 * i + k] = 0;
+static void zero_lanes(quern_run *run, quern_set_store *set, uint32_t lanes) {
+	zeroed z = { .row = set->row, .n = set->n, .whole = set->row && lanes == (1u << set->lanes) - 1 };
+	for (uint32_t k = 0; k < set->lanes && !z.whole; k++)
+		if (lanes >> k & 1) z.lane[z.n_lanes++] = k;
+	zero_all(run, &z);
 }
 
-static void zero_column(quern_set_store *set, quern_field *field) {
-	for (uint8_t c = 0; c < field->n_components; c++)
-		memset(field->data[field->now][c], 0, (size_t)set->n * quern_field_bytes(field));
+static void zero_column(quern_run *run, const quern_set_store *set, quern_field *field) {
+	zeroed z = { .data = (void *const *)field->data[field->now],
+		.n_components = field->n_components,
+		.bytes = quern_field_bytes(field),
+		.n = set->n };
+	zero_all(run, &z);
 }
 
-/* What this stage is the first to add to. */
 static void zero(quern_run *run, const int *fields) {
 	quern_store *store = &run->plan->store;
 	for (size_t s = 0; *fields >= 0 && s < store->n_sets; s++) {
@@ -381,9 +412,9 @@ static void zero(quern_run *run, const int *fields) {
 			quern_field *field = &store->fields[*k];
 			if (field->set != (int)s) continue;
 			if (store->sets[s].rows) lanes |= ((1u << field->n_components) - 1) << field->lane;
-			else zero_column(&store->sets[s], field);
+			else zero_column(run, &store->sets[s], field);
 		}
-		if (lanes) zero_lanes(&store->sets[s], lanes);
+		if (lanes) zero_lanes(run, &store->sets[s], lanes);
 	}
 }
 
