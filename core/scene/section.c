@@ -74,6 +74,18 @@ typedef struct {
 	quern_mark mark;
 } choice;
 
+/* Two keys side by side are mostly a name and a parameter that belongs below it. */
+static void refuse_entry(quern_scene *s, const char *path, size_t i, const quern_node *item) {
+	if (item->kind == QUERN_NODE_MAP && item->n > 1)
+		quern_report_add(s->report, item->entries[1].mark,
+			"%s: an entry is a name, or one name with its parameters, and here %s stands beside %s; is %s.%zu.%s.%s meant?",
+			path, item->entries[1].key, item->entries[0].key, path, i, item->entries[0].key,
+			item->entries[1].key);
+	else
+		quern_report_add(
+			s->report, item->mark, "%s: an entry is a name, or one name with its parameters", path);
+}
+
 /* A plugin in a scene is a bare name, or a map of one name to its parameters. */
 static size_t choices_of(
 	quern_scene *s, const char *path, quern_node *node, bool list, choice **out, const char *kind) {
@@ -101,8 +113,7 @@ static size_t choices_of(
 			quern_node *item = node->entries[i].value;
 			choice *one = NULL;
 			if (item->kind == QUERN_NODE_LIST || (item->kind == QUERN_NODE_MAP && item->n != 1)) {
-				quern_report_add(
-					s->report, item->mark, "%s: an entry is a name, or one name with its parameters", path);
+				refuse_entry(s, path, i, item);
 				continue;
 			}
 			if (choices_of(s, path, item, false, &one, kind) == 1) {
