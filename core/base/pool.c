@@ -11,7 +11,7 @@
 #include <stdlib.h>
 
 enum { PAUSES = 2000, YIELDS = 200 }; /* some 50 us of each */
-enum { PARTS = 16 };                  /* of what is left in a share: so much is taken at once */
+enum { PARTS = 16 };                  /* one of so many is taken of what is left in a share */
 
 typedef struct {
 	_Alignas(64) void *memory;
@@ -30,7 +30,7 @@ typedef struct {
 } helper;
 
 /* A round is one call of quern_pool_each. Every worker has a share of the indices, the same part of them in every round, so that what it
- * worked on lies in its own cache the next time; who has done his own helps the others. Who takes an index by compare-and-swap has read
+ * worked on lies in its own cache the next time; who has done his own helps the others. Who takes indices by compare-and-swap has read
  * body, arg and n of this round: the caller changes them only while none is left and all are done. So nobody waits for a thread that
  * has taken nothing: others do the work of one that sleeps, or that has to wait for a processor. */
 struct quern_pool {

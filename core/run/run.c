@@ -356,11 +356,10 @@ static quern_status begin_interval(quern_run *run) {
 	return QUERN_OK;
 }
 
-/* ---- stages ---- */
-
 /* ---- what a stage is the first to add to ---- */
 
-enum { ZERO_CHUNK = 1024 };
+/* Entries at a time, and bytes below which one thread is done before another has come. */
+enum { ZERO_CHUNK = 1024, ZERO_ALONE = 1 << 17 };
 
 /* Lanes of rows, or the components of a column. */
 typedef struct {
@@ -379,13 +378,15 @@ static void zero_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 	for (size_t c = 0; c < z->n_components; c++)
 		memset((char *)z->data[c] + begin * z->bytes, 0, count * z->bytes);
 	if (z->whole) memset(z->row + 8 * begin, 0, count * 64);
-	for (size_t i = begin; i < begin + count && !z->whole; i++)
+	for (size_t i = begin; i < begin + count && z->n_lanes; i++)
 		for (uint32_t k = 0; k < z->n_lanes; k++) z->row[8 * i + z->lane[k]] = 0;
 }
 
-static void zero_all(quern_run *run, zeroed *z) {
-	const size_t chunks = (z->n + ZERO_CHUNK - 1) / ZERO_CHUNK;
-	quern_pool_each(run->pool, (uint32_t)chunks, zero_chunk, z);
+static void zero_all(quern_run *run, zeroed *z, size_t bytes_each) {
+	const uint32_t chunks = (uint32_t)((z->n + ZERO_CHUNK - 1) / ZERO_CHUNK);
+	if (z->n * bytes_each >= ZERO_ALONE) quern_pool_each(run->pool, chunks, zero_chunk, z);
+	else
+		for (uint32_t c = 0; c < chunks; c++) zero_chunk(z, c, 0);
 }
 
 /* In rows, lanes of other fields stay as they are; where there are none, the whole is cleared at once. */
@@ -393,7 +394,7 @@ static void zero_lanes(quern_run *run, quern_set_store *set, uint32_t lanes) {
 	zeroed z = { .row = set->row, .n = set->n, .whole = set->row && lanes == (1u << set->lanes) - 1 };
 	for (uint32_t k = 0; k < set->lanes && !z.whole; k++)
 		if (lanes >> k & 1) z.lane[z.n_lanes++] = k;
-	zero_all(run, &z);
+	zero_all(run, &z, 64);
 }
 
 static void zero_column(quern_run *run, const quern_set_store *set, quern_field *field) {
@@ -401,7 +402,7 @@ static void zero_column(quern_run *run, const quern_set_store *set, quern_field 
 		.n_components = field->n_components,
 		.bytes = quern_field_bytes(field),
 		.n = set->n };
-	zero_all(run, &z);
+	zero_all(run, &z, z.bytes * z.n_components);
 }
 
 static void zero(quern_run *run, const int *fields) {
@@ -417,6 +418,8 @@ static void zero(quern_run *run, const int *fields) {
 		if (lanes) zero_lanes(run, &store->sets[s], lanes);
 	}
 }
+
+/* ---- stages ---- */
 
 static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt) {
 	if (!stage->stage) return QUERN_OK;

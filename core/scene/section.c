@@ -75,12 +75,14 @@ typedef struct {
 } choice;
 
 /* Two keys side by side are mostly a name and a parameter that belongs below it. */
-static void refuse_entry(quern_scene *s, const char *path, size_t i, const quern_node *item) {
+static void refuse_entry(
+	quern_scene *s, const char *path, size_t i, const quern_node *item, const char *kind) {
+	const quern_entry *keys = item->entries;
 	if (item->kind == QUERN_NODE_MAP && item->n > 1)
-		quern_report_add(s->report, item->entries[1].mark,
-			"%s: an entry is a name, or one name with its parameters, and here %s stands beside %s; is %s.%zu.%s.%s meant?",
-			path, item->entries[1].key, item->entries[0].key, path, i, item->entries[0].key,
-			item->entries[1].key);
+		quern_report_add(s->report, keys[1].mark,
+			"%s: an entry is a name, or one name with its parameters, and here '%.40s' stands beside '%.40s'; a parameter belongs below "
+			"its name (%s.%zu.%.40s.%.40s), and another %s is an entry of its own",
+			path, keys[1].key, keys[0].key, path, i, keys[0].key, keys[1].key, kind);
 	else
 		quern_report_add(
 			s->report, item->mark, "%s: an entry is a name, or one name with its parameters", path);
@@ -113,7 +115,7 @@ static size_t choices_of(
 			quern_node *item = node->entries[i].value;
 			choice *one = NULL;
 			if (item->kind == QUERN_NODE_LIST || (item->kind == QUERN_NODE_MAP && item->n != 1)) {
-				refuse_entry(s, path, i, item);
+				refuse_entry(s, path, i, item, kind);
 				continue;
 			}
 			if (choices_of(s, path, item, false, &one, kind) == 1) {

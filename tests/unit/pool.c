@@ -63,6 +63,11 @@ static void count_one(void *arg, uint32_t i, uint32_t worker) {
 	atomic_fetch_add(&((counts *)arg)->count[i], 1);
 }
 
+static void add_one(void *arg, uint32_t i, uint32_t worker) {
+	(void)worker;
+	atomic_fetch_add(&((_Atomic int *)arg)[i], 1);
+}
+
 /* Threads that come late, sleep, or are woken in between take no index of another round: short rounds of changing
  * length, each with counts of its own, some after a pause that lets all of them fall asleep. */
 static void rounds_do_not_mix(void **state) {
@@ -77,6 +82,24 @@ static void rounds_do_not_mix(void **state) {
 	}
 	for (uint32_t r = 0; r < ROUNDS; r++)
 		for (uint32_t i = 0; i < 16; i++) assert_int_equal(all[r].count[i], i < 2 + r * 7 % 13);
+	free(all);
+	quern_pool_destroy(pool);
+}
+
+/* The same where several indices are taken at once. */
+static void batches_do_not_mix(void **state) {
+	enum { ROUNDS = 2000, MOST = 400 };
+	(void)state;
+	quern_pool *pool = quern_pool_create(4);
+	_Atomic int *all = calloc((size_t)ROUNDS * MOST, sizeof *all);
+	assert_non_null(all);
+	for (uint32_t r = 0; r < ROUNDS; r++) {
+		quern_pool_each(pool, 100 + r * 7 % 300, add_one, all + (size_t)r * MOST);
+		if (r % 400 == 0) nanosleep(&(struct timespec) { .tv_nsec = 3000000 }, NULL);
+	}
+	for (uint32_t r = 0; r < ROUNDS; r++)
+		for (uint32_t i = 0; i < MOST; i++)
+			assert_int_equal(all[(size_t)r * MOST + i], i < 100 + r * 7 % 300);
 	free(all);
 	quern_pool_destroy(pool);
 }
@@ -208,7 +231,8 @@ static void tree_sums(void **state) {
 
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(every_index_once),
-		cmocka_unit_test(rounds_do_not_mix), cmocka_unit_test(caller_does_it_alone),
+		cmocka_unit_test(rounds_do_not_mix), cmocka_unit_test(batches_do_not_mix),
+		cmocka_unit_test(caller_does_it_alone),
 #ifndef QUERN_SANITIZED
 		cmocka_unit_test(crash_has_a_stack),
 #endif
