@@ -55,7 +55,7 @@ static uint32_t begin_of(const quern_pool *p, uint32_t n, uint32_t worker) {
 }
 
 /* Takes indices of one share until there is none left: several at once while there are many, since two threads that take and count in turn
- * wait for each other's caches, which for the shortest bodies costs more than the body. */
+ * wait for each other's caches, which costs more than the shortest work. */
 static void take_from(quern_pool *p, uint32_t round, uint32_t owner, uint32_t worker) {
 	_Atomic uint64_t *tickets = &p->shares[owner].ticket;
 	uint64_t ticket = atomic_load(tickets);
