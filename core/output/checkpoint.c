@@ -85,6 +85,7 @@ static void write_run(quern_h5 *h, quern_run *run, int64_t rows) {
 quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 	quern_h5 h;
 	char why[256] = "out of memory";
+	const double wall = quern_wall(), used = quern_processor();
 	if (!run->folder) return QUERN_OK;
 	for (size_t k = 0; k < run->plan->store.n_fields; k++) {
 		const char *fault = quern_state_fault(run, &run->plan->store.fields[k]);
@@ -103,8 +104,14 @@ quern_status quern_checkpoint_write(quern_run *run, int64_t rows) {
 	quern_run_rest(run);
 	bool good = quern_h5_create(&h, run->scene->general.compress, 512);
 	if (good) {
-		write_run(&h, run, rows);
 		for (int s = 0; s < (int)run->plan->store.n_sets; s++) quern_state_write(&h, run, s, kept);
+		/* what that has cost is a part of the run to whoever goes on from here; this process books it later */
+		const double wall_before = run->wall_before, processor = run->processor;
+		run->wall_before += quern_wall() - wall;
+		run->processor += quern_processor() - used;
+		write_run(&h, run, rows);
+		run->wall_before = wall_before;
+		run->processor = processor;
 		good = quern_h5_save(&h, path, why);
 	}
 	free(path);

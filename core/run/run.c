@@ -361,13 +361,12 @@ static quern_status begin_interval(quern_run *run) {
 /* Entries at a time, and bytes below which one thread is done before another has come. */
 enum { ZERO_CHUNK = 1024, ZERO_ALONE = 1 << 17 };
 
-/* Lanes of rows, or the components of a column. */
+/* Components one after the other, or lanes of rows. */
 typedef struct {
-	double *row;
-	uint32_t lane[8], n_lanes;
-	bool whole; /* no lane belongs to another field */
 	void *const *data;
 	size_t bytes, n, n_components;
+	double *row;
+	uint32_t lane[8], n_lanes;
 } zeroed;
 
 static void zero_chunk(void *arg, uint32_t chunk, uint32_t worker) {
@@ -377,32 +376,35 @@ static void zero_chunk(void *arg, uint32_t chunk, uint32_t worker) {
 	(void)worker;
 	for (size_t c = 0; c < z->n_components; c++)
 		memset((char *)z->data[c] + begin * z->bytes, 0, count * z->bytes);
-	if (z->whole) memset(z->row + 8 * begin, 0, count * 64);
 	for (size_t i = begin; i < begin + count && z->n_lanes; i++)
 		for (uint32_t k = 0; k < z->n_lanes; k++) z->row[8 * i + z->lane[k]] = 0;
 }
 
-static void zero_all(quern_run *run, zeroed *z, size_t bytes_each) {
+static void zero_all(quern_run *run, zeroed *z) {
 	const uint32_t chunks = (uint32_t)((z->n + ZERO_CHUNK - 1) / ZERO_CHUNK);
-	if (z->n * bytes_each >= ZERO_ALONE) quern_pool_each(run->pool, chunks, zero_chunk, z);
+	const size_t bytes = z->n * (z->n_lanes ? 64 : z->bytes * z->n_components);
+	if (bytes >= ZERO_ALONE) quern_pool_each(run->pool, chunks, zero_chunk, z);
 	else
 		for (uint32_t c = 0; c < chunks; c++) zero_chunk(z, c, 0);
 }
 
-/* In rows, lanes of other fields stay as they are; where there are none, the whole is cleared at once. */
-static void zero_lanes(quern_run *run, quern_set_store *set, uint32_t lanes) {
-	zeroed z = { .row = set->row, .n = set->n, .whole = set->row && lanes == (1u << set->lanes) - 1 };
-	for (uint32_t k = 0; k < set->lanes && !z.whole; k++)
-		if (lanes >> k & 1) z.lane[z.n_lanes++] = k;
-	zero_all(run, &z, 64);
+/* In rows, lanes of other fields stay as they are; where there are none, a row is cleared at once. */
+static void zero_lanes(quern_run *run, const quern_set_store *set, uint32_t lanes) {
+	void *const whole[] = { set->row };
+	zeroed z = { .n = set->n, .row = set->row };
+	if (lanes == (1u << set->lanes) - 1) z.data = whole, z.bytes = 64, z.n_components = 1;
+	else
+		for (uint32_t k = 0; k < set->lanes; k++)
+			if (lanes >> k & 1) z.lane[z.n_lanes++] = k;
+	zero_all(run, &z);
 }
 
-static void zero_column(quern_run *run, const quern_set_store *set, quern_field *field) {
-	zeroed z = { .data = (void *const *)field->data[field->now],
-		.n_components = field->n_components,
+static void zero_column(quern_run *run, const quern_set_store *set, const quern_field *field) {
+	zeroed z = { .data = field->data[field->now],
 		.bytes = quern_field_bytes(field),
-		.n = set->n };
-	zero_all(run, &z, z.bytes * z.n_components);
+		.n = set->n,
+		.n_components = field->n_components };
+	zero_all(run, &z);
 }
 
 static void zero(quern_run *run, const int *fields) {
