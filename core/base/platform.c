@@ -77,6 +77,7 @@ void quern_platform_forget(void *memory, size_t bytes) {
 void quern_platform_begin(void) {
 #ifdef M_MMAP_THRESHOLD
 	mallopt(M_MMAP_THRESHOLD, 1 << 20);
+	mallopt(M_TRIM_THRESHOLD, 1 << 23);
 #endif
 }
 

@@ -24,8 +24,9 @@ char *quern_platform_program(void);
 void *quern_platform_memory(size_t bytes);
 /* What lies in these bytes is not needed any more, and may be anything when it is read: whole pages go back to the system. */
 void quern_platform_forget(void *memory, size_t bytes);
-/* Before memory is taken: that blocks of a megabyte and more go back to the system when they are freed. Left to itself, malloc would keep
- * the size of all that has been freed so far, and what fills a scene would stay for as long as it runs. */
+/* Before memory is taken: that blocks of a megabyte and more go back to the system when they are freed, and of smaller ones what is over
+ * eight megabytes. Left to itself, malloc would keep the size of all that has been freed so far, and what fills a scene would stay for as
+ * long as it runs; or it would give back each of a file's buffers, whose pages the system clears anew for the next. */
 void quern_platform_begin(void);
 /* Bytes that were resident at most since the program began: what had started it does not count. 0: it cannot be known. */
 int64_t quern_platform_peak_memory(void);

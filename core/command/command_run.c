@@ -32,7 +32,7 @@ typedef struct {
 	quern_run *run;
 	quern_run_folder folder;
 	quern_series series;
-	double start, saved; /* on the clock */
+	double start, saved; /* on the clock; `saved`: when the last checkpoint was written */
 	double used;         /* s of the processor, of this process, that the run has booked */
 	double until;        /* s; negative: to the end */
 	bool begun;          /* the folder is this run's: what happens is noted there */
@@ -126,11 +126,12 @@ static void book_time(session *s) {
 
 static quern_status checkpoint(session *s) {
 	book_time(s);
-	s->saved = s->start;
 	/* rows that a checkpoint counts must be there after a power cut too */
 	if (quern_series_flush(&s->series, s->run) != QUERN_OK) return s->run->status;
 	const quern_status status = quern_checkpoint_write(s->run, s->series.rows);
 	if (status == QUERN_OK) s->saved_step = s->run->clock.step;
+	s->saved =
+		quern_wall(); /* what takes longer to write than until the next would be written at every step */
 	tell_what_stays(s);
 	return status;
 }

@@ -77,8 +77,9 @@ def summary(folder):
     return json.loads((pathlib.Path(folder) / "summary.json").read_text())
 
 
-def plan(name, *options):
-    done = subprocess.run([QUERN, "plan", "--json", scene(name), *options], capture_output=True, text=True, timeout=120)
+def plan(name, *options, **environment):
+    words = [QUERN, "plan", "--json", scene(name), *options]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, env={**os.environ, **environment})
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 

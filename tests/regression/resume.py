@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""kill -9 at any moment: what is there is whole, and the run goes on to the same end.
+"""kill -9 at any moment: what is there is whole, and the run goes on to the same end. Checkpoints that take long to write do not take
+the place of the run.
 
 `resume.py [KILLS]`, 50 by default.
 """
@@ -80,6 +81,43 @@ def check(kills, place):
           f"{len({s for s in steps if s > 0})} different steps after; each went on to the same bits")
 
 
+MANY = """
+quern: 1
+dimension: 3
+gravity: [0, 0, -10]
+domain: {lower: [0, 0, 0], upper: [0.2, 0.2, 0.4]}
+time: {end: 6 ms}
+grains:
+  material: {density: 2500, radius: {mean: 4 mm}}
+  contact: {linear: {stiffness: 1e4, friction: 0.5}}
+  fill: {region: {box: {lower: [0.004, 0.004, 0.004], upper: [0.196, 0.196, 0.396]}}, packer: {random: {trials: 100}}}
+bodies: [{plane: {point: [0, 0, 0], normal: [0, 0, 1]}}]
+output: {every: 6 ms}
+"""
+
+
+def are_apart(place):
+    """Between two checkpoints there is `checkpoint.every`, however long one takes to write: not one at each step."""
+    scene, out = place / "many.yaml", place / "many"
+    scene.write_text(MANY)
+    # the first is there at the release, the second at the end
+    lab.run(scene, out, "--set=checkpoint.every=0")
+    summary = lab.summary(out)
+    every = summary["wall_seconds"] / 50  # about what it takes to write the file, and some steps
+    shutil.rmtree(out)
+    process, seen = lab.start(scene, out, f"--set=checkpoint.every={every}"), set()
+    while process.poll() is None:
+        try:
+            seen.add((out / "checkpoint.h5").stat().st_mtime_ns)
+        except FileNotFoundError:
+            pass
+        time.sleep(0.001)
+    assert process.returncode == 0
+    print(f"{len(seen)} checkpoints in {summary['steps']} steps of {summary['grains']} grains, {summary['wall_seconds']:.2f} s without them")
+    assert 2 < len(seen) <= 2 + 50 and summary["steps"] > 200
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
+        are_apart(pathlib.Path(name))
         check(int(sys.argv[1]) if len(sys.argv) > 1 else 50, pathlib.Path(name))
