@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "h5.h"
+#include "platform.h"
 #include "text.h"
 #include <errno.h>
 #include <stdio.h>
@@ -103,6 +104,7 @@ bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
 	if (good && h->user_block) quern_h5_seal(h->image, size);
 	good = good && quern_save_bytes(path, h->image, size, why);
 	discard(h);
+	if (size >> 20) quern_platform_trim(); /* a small file leaves little */
 	return good;
 }
 

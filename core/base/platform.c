@@ -81,6 +81,12 @@ void quern_platform_begin(void) {
 #endif
 }
 
+void quern_platform_trim(void) {
+#ifdef M_TRIM_THRESHOLD
+	malloc_trim(0);
+#endif
+}
+
 int64_t quern_platform_peak_memory(void) {
 	/* getrusage would tell that of the process that has forked this one, if it was more */
 	FILE *file = fopen("/proc/self/status", "r");

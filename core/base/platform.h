@@ -28,5 +28,7 @@ void quern_platform_forget(void *memory, size_t bytes);
  * eight megabytes. Left to itself, malloc would keep the size of all that has been freed so far, and what fills a scene would stay for as
  * long as it runs; or it would give back each of a file's buffers, whose pages the system clears anew for the next. */
 void quern_platform_begin(void);
+/* When much has been freed for long: what is kept for the next block goes back to the system. */
+void quern_platform_trim(void);
 /* Bytes that were resident at most since the program began: what had started it does not count. 0: it cannot be known. */
 int64_t quern_platform_peak_memory(void);

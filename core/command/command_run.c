@@ -130,8 +130,8 @@ static quern_status checkpoint(session *s) {
 	if (quern_series_flush(&s->series, s->run) != QUERN_OK) return s->run->status;
 	const quern_status status = quern_checkpoint_write(s->run, s->series.rows);
 	if (status == QUERN_OK) s->saved_step = s->run->clock.step;
-	s->saved =
-		quern_wall(); /* what takes longer to write than until the next would be written at every step */
+	/* from now: else what takes that long to write would be written after every step */
+	s->saved = quern_wall();
 	tell_what_stays(s);
 	return status;
 }

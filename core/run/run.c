@@ -461,6 +461,7 @@ quern_status quern_run_setup(quern_run *run) {
 	if (status == QUERN_OK) status = quern_start_read_rest(run);
 	free(run->taken);
 	run->taken = NULL;
+	quern_platform_trim();
 	if (status == QUERN_OK) run->mass_initial = quern_run_carries(run, "mass");
 	return status;
 }
