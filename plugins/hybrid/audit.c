@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* audit - the ledger's two invariants, asserted after every step: docs/theory/hybrid.md, section 5 */
 #include "../common/outlets.h"
+#include "../common/tally.h"
 #include "hybrid.h"
 #include <math.h>
 
@@ -12,67 +13,41 @@ typedef struct {
 	quern_real left, poured;   /* kg so far, through faces and by sources */
 } sums;
 
-/* ---- what a cloud carries, all sums in one pass over its blocks ---- */
+/* ---- what a cloud carries ---- */
 
-enum { CARRIED, SPEED, KINETIC, MOMENTUM, LANES = MOMENTUM + 3, LEAF = 256 };
+enum { CARRIED, SPEED, KINETIC, MOMENTUM, N_CARRIED = MOMENTUM + 3 };
 
 typedef struct {
 	const cloud *of;
 	const quern_column *velocity;
-	const quern_parts *parts;
-	uint32_t dim, n_blocks;
-	quern_real *lane[LANES]; /* by block, in the order of places */
-} adding;
+	uint32_t dim;
+} carrying;
 
-QUERN_INLINE void add_leaf(
-	const adding *a, uint32_t begin, uint32_t n, const uint32_t dim, quern_real out[LANES]) {
+QUERN_INLINE void add_carried(
+	const carrying *c, uint32_t begin, uint32_t n, const uint32_t dim, quern_real out[TALLY_SUMS]) {
 	for (uint32_t i = begin; i < begin + n; i++) {
-		const quern_real mass = cloud_mass(a->of, i), square = cloud_square(a->velocity, i, dim);
+		const quern_real mass = cloud_mass(c->of, i), square = cloud_square(c->velocity, i, dim);
 		out[CARRIED] += mass;
 		out[SPEED] += mass * sqrt(square);
 		out[KINETIC] += mass * (0.5 * square);
-		for (uint32_t k = 0; k < dim; k++) out[MOMENTUM + k] += mass * a->velocity->real[k][i];
+		for (uint32_t k = 0; k < dim; k++) out[MOMENTUM + k] += mass * c->velocity->real[k][i];
 	}
 }
 
-/* In halves, as the host's sums: the round-off of many entries stays small. */
-static void add_entries(const adding *a, uint32_t begin, uint32_t n, quern_real out[LANES]) {
-	quern_real upper[LANES] = { 0 };
-	uint32_t half = LEAF;
-	if (n <= LEAF) {
-		if (a->dim == 2) add_leaf(a, begin, n, 2, out);
-		else add_leaf(a, begin, n, 3, out);
-		return;
-	}
-	while (half * 2 < n) half *= 2;
-	add_entries(a, begin, half, out);
-	add_entries(a, begin + half, n - half, upper);
-	for (uint32_t k = 0; k < LANES; k++) out[k] += upper[k];
-}
-
-static void add_block(void *arg, uint32_t q, uint32_t worker) {
-	const adding *a = arg;
-	const uint32_t b = quern_nth(a->parts->by_place, q), *block = a->parts->block;
-	quern_real out[LANES] = { 0 };
-	(void)worker;
-	add_entries(a, block ? block[b] : 0, block ? block[b + 1] - block[b] : a->of->n, out);
-	for (uint32_t k = 0; k < LANES; k++) a->lane[k][q] = out[k];
+static void add_leaf(const void *what, uint32_t begin, uint32_t n, quern_real out[TALLY_SUMS]) {
+	const carrying *c = what;
+	if (c->dim == 2) add_carried(c, begin, n, 2, out);
+	else add_carried(c, begin, n, 3, out);
 }
 
 static bool add_cloud(const quern_step *s, const cloud *of, const quern_column *velocity, sums *out) {
-	adding a = { .of = of, .velocity = velocity, .dim = s->dim };
-	a.parts = s->host->parts(s->run, of->set);
-	a.n_blocks = a.parts->block ? a.parts->n_blocks : 1;
-	for (uint32_t k = 0; k < LANES; k++) {
-		a.lane[k] = s->host->memory(s->run, ((size_t)a.n_blocks + 1) * sizeof(quern_real));
-		if (!a.lane[k]) return false;
-	}
-	s->host->parallel(s->run, a.n_blocks, add_block, &a);
-	out->carried += s->host->sum(s->run, a.n_blocks, a.lane[CARRIED]);
-	out->speed += s->host->sum(s->run, a.n_blocks, a.lane[SPEED]);
-	out->kinetic += s->host->sum(s->run, a.n_blocks, a.lane[KINETIC]);
-	for (uint32_t k = 0; k < s->dim; k++)
-		out->momentum[k] += s->host->sum(s->run, a.n_blocks, a.lane[MOMENTUM + k]);
+	const carrying c = { of, velocity, s->dim };
+	quern_real all[N_CARRIED] = { 0 };
+	if (!tally_set(s, of->set, add_leaf, &c, N_CARRIED, all)) return false;
+	out->carried += all[CARRIED];
+	out->speed += all[SPEED];
+	out->kinetic += all[KINETIC];
+	for (uint32_t k = 0; k < s->dim; k++) out->momentum[k] += all[MOMENTUM + k];
 	return true;
 }
 

@@ -2,6 +2,7 @@
 /* watch - energy that nobody has given, of a continuum alone: docs/theory/mpm.md, section 5 */
 #include "../common/outlets.h"
 #include "../common/rotation.h"
+#include "../common/tally.h"
 #include "mpm.h"
 
 /* Steps from one look to the next: what explodes grows over many, and looks cost next to nothing. */
@@ -20,24 +21,49 @@ static quern_vec gravity_along(const quern_step *s, bool periodic) {
 		s->dim == 3 && s->periodic[2] == periodic ? g[2] : 0 };
 }
 
+typedef struct {
+	const quern_step *s;
+	cloud points;
+	quern_vec down, along; /* gravity, as above */
+	quern_real softness, shear_softness;
+} looking;
+
+enum { MASS, KINETIC, HELD, HEIGHT, POWER, N_LOOKED };
+
+QUERN_INLINE void look_at(const looking *l, uint32_t begin, uint32_t n, const int dim, quern_real *out) {
+	const quern_column *u = l->s->use;
+	for (uint32_t i = begin; i < begin + n; i++) {
+		const quern_real mass = cloud_mass(&l->points, i);
+		const quern_vec x = QUERN_VEC_AT(u[WATCH_POSITION].real, i, dim),
+						v = QUERN_VEC_AT(u[WATCH_VELOCITY].real, i, dim);
+		const symmetric stress = SYMMETRIC_AT(u[WATCH_STRESS].real, i, dim);
+		out[MASS] += mass;
+		out[KINETIC] += mass * (0.5 * quern_vec_dot(v, v, dim));
+		out[HELD] += mass * (u[WATCH_VOLUME].real[0][i] / u[WATCH_MASS].real[0][i] *
+								symmetric_held(dim, l->softness, l->shear_softness, stress));
+		out[HEIGHT] -= mass * quern_vec_dot(l->down, x, dim);
+		out[POWER] += mass * quern_vec_dot(l->along, v, dim);
+	}
+}
+
+static void look_at_leaf(const void *what, uint32_t begin, uint32_t n, quern_real out[TALLY_SUMS]) {
+	const looking *l = what;
+	if (l->s->dim == 2) look_at(l, begin, n, 2, out);
+	else look_at(l, begin, n, 3, out);
+}
+
 static bool look(const mpm *p, const quern_step *s, looked *out) {
-	const quern_column *u = s->use, *velocity = &u[WATCH_VELOCITY];
-	const cloud points = { u[WATCH_MASS].real[0], u[WATCH_WEIGHT].real[0], NULL,
-		s->host->set(s->run, "point").n, "point" };
-	const int dim = (int)s->dim;
-	const quern_real softness = 0.5 / p->bulk, shear_softness = p->shear > 0 ? 0.5 / p->shear : 0;
-	const quern_vec down = gravity_along(s, false), along = gravity_along(s, true);
-	cloud_sums c;
-	if (!cloud_open(&c, s->host, s->run, &points)) return false;
-	out->mass = cloud_total(&c);
-	CLOUD_ADD(&c, i, 0.5 * cloud_square(velocity, i, s->dim), out->kinetic);
-	CLOUD_ADD(&c, i, -quern_vec_dot(down, QUERN_VEC_AT(u[WATCH_POSITION].real, i, dim), dim), out->height);
-	if (quern_vec_dot(along, along, dim) > 0)
-		CLOUD_ADD(&c, i, quern_vec_dot(along, QUERN_VEC_AT(velocity->real, i, dim), dim), out->power);
-	CLOUD_ADD(&c, i,
-		u[WATCH_VOLUME].real[0][i] / u[WATCH_MASS].real[0][i] *
-			symmetric_held(dim, softness, shear_softness, SYMMETRIC_AT(u[WATCH_STRESS].real, i, dim)),
-		out->held);
+	const quern_column *u = s->use;
+	const looking l = { .s = s,
+		.points = { u[WATCH_MASS].real[0], u[WATCH_WEIGHT].real[0], NULL, s->host->set(s->run, "point").n,
+			"point" },
+		.down = gravity_along(s, false),
+		.along = gravity_along(s, true),
+		.softness = 0.5 / p->bulk,
+		.shear_softness = p->shear > 0 ? 0.5 / p->shear : 0 };
+	quern_real all[N_LOOKED] = { 0 };
+	if (!tally_set(s, "point", look_at_leaf, &l, N_LOOKED, all)) return false;
+	*out = (looked) { all[MASS], all[KINETIC], all[HELD], all[HEIGHT], all[POWER] };
 	return true;
 }
 
