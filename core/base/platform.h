@@ -17,6 +17,8 @@
 uint32_t quern_platform_processors(void);
 /* Tells the processor that this thread waits in a loop. */
 void quern_platform_pause(void);
+/* A clock that is quick to read: of even ticks, of no length that anybody knows. */
+uint64_t quern_platform_ticks(void);
 /* The file of the running program; free(). NULL: it cannot be known. */
 char *quern_platform_program(void);
 /* Memory of that many bytes, more than none, that begins with a line of the cache; free(). Where the system has large pages, a large

@@ -2,6 +2,7 @@
 /* pool - threads that wait for work a short while, then sleep. docs/decisions/0018-threads.md */
 #include "pool.h"
 #include "platform.h"
+#include "split.h"
 #include "text.h"
 #include <pthread.h>
 #include <sched.h>
@@ -18,9 +19,11 @@ typedef struct {
 	size_t bytes;
 } scratch;
 
-/* A worker's share of a round: the round's number in the high 32 bits, how many indices are left in the low ones. */
+/* A worker's share of a round: the round's number in the high 32 bits of the ticket, how many indices are left in the low ones. */
 typedef struct {
 	_Alignas(64) _Atomic uint64_t ticket;
+	_Atomic uint64_t took; /* of the processor's ticks, whoever did it */
+	_Atomic uint32_t end;
 } share;
 
 typedef struct {
@@ -30,8 +33,9 @@ typedef struct {
 } helper;
 
 /* A round is one call of quern_pool_each. Every worker has a share of the indices, the same part of them in every round, so that what it
- * worked on lies in its own cache the next time; who has done his own helps the others. Who takes indices by compare-and-swap has read
- * body, arg and n of this round: the caller changes them only while none is left and all are done. So nobody waits for a thread that
+ * worked on lies in its own cache the next time; who has done his own helps the others. What others did has to come back from their caches,
+ * so shares are made to take as long as each other (split.h). Who takes indices by compare-and-swap has read
+ * body, arg, n and the share's end of this round: the caller changes them only while none is left and all are done. So nobody waits for a thread that
  * has taken nothing: others do the work of one that sleeps, or that has to wait for a processor. */
 struct quern_pool {
 	_Alignas(64) _Atomic uint32_t round;
@@ -47,31 +51,29 @@ struct quern_pool {
 	helper *helpers;
 	scratch *scratch;
 	share *shares;
+	quern_splits *splits;
 };
-
-/* The first index of a worker's share; that of the one behind the last is n. */
-static uint32_t begin_of(const quern_pool *p, uint32_t n, uint32_t worker) {
-	return (uint32_t)((uint64_t)n * worker / p->workers);
-}
 
 /* Takes indices of one share until there is none left: several at once while there are many, since two threads that take and count in turn
  * wait for each other's caches, which costs more than the shortest work. */
 static void take_from(quern_pool *p, uint32_t round, uint32_t owner, uint32_t worker) {
-	_Atomic uint64_t *tickets = &p->shares[owner].ticket;
-	uint64_t ticket = atomic_load(tickets);
+	share *own = &p->shares[owner];
+	uint64_t ticket = atomic_load(&own->ticket);
 	while (ticket >> 32 == round && (uint32_t)ticket) {
 		const uint32_t left = (uint32_t)ticket, n = atomic_load(&p->n), taken = left / PARTS + 1;
 		void (*body)(void *, uint32_t, uint32_t) = atomic_load(&p->body);
 		void *arg = atomic_load(&p->arg);
-		if (!atomic_compare_exchange_weak(tickets, &ticket, ticket - taken)) continue;
-		const uint32_t end = begin_of(p, n, owner + 1);
-		for (uint32_t i = end - left; i < end - left + taken; i++) body(arg, i, worker);
+		const uint32_t begin = atomic_load(&own->end) - left;
+		if (!atomic_compare_exchange_weak(&own->ticket, &ticket, ticket - taken)) continue;
+		const uint64_t began = quern_platform_ticks();
+		for (uint32_t i = begin; i < begin + taken; i++) body(arg, i, worker);
+		atomic_fetch_add(&own->took, quern_platform_ticks() - began);
 		if (atomic_fetch_add(&p->done, taken) + taken == n && atomic_load(&p->caller_waits)) {
 			pthread_mutex_lock(&p->lock);
 			pthread_cond_signal(&p->end);
 			pthread_mutex_unlock(&p->lock);
 		}
-		ticket = atomic_load(tickets);
+		ticket = atomic_load(&own->ticket);
 	}
 }
 
@@ -144,9 +146,10 @@ static uint32_t wished(uint32_t workers) {
 	const char *text = getenv("OMP_NUM_THREADS");
 	char *end = NULL;
 	const long asked = text ? strtol(text, &end, 10) : 0;
-	if (!workers && asked > 0 && (!*end || *end == ',')) workers = asked < 256 ? (uint32_t)asked : 256;
+	if (!workers && asked > 0 && (!*end || *end == ','))
+		workers = asked < QUERN_SPLIT_WORKERS ? (uint32_t)asked : QUERN_SPLIT_WORKERS;
 	if (!workers) workers = quern_platform_processors();
-	return workers < 256 ? workers : 256;
+	return workers < QUERN_SPLIT_WORKERS ? workers : QUERN_SPLIT_WORKERS;
 }
 
 quern_pool *quern_pool_create(uint32_t workers) {
@@ -160,13 +163,16 @@ quern_pool *quern_pool_create(uint32_t workers) {
 		return free(p->scratch), free(p->shares), free(p->helpers), free(p), NULL;
 	for (uint32_t i = 0; i < p->workers; i++) {
 		p->scratch[i] = (scratch) { 0 };
-		atomic_init(&p->shares[i].ticket, 0);
+		p->shares[i] = (share) { 0 };
 	}
 	pthread_mutex_init(&p->lock, NULL);
 	pthread_cond_init(&p->work, NULL);
 	pthread_cond_init(&p->end, NULL);
 	start(p);
-	return p;
+	p->splits = quern_splits_create(p->workers);
+	if (p->splits) return p;
+	quern_pool_destroy(p);
+	return NULL;
 }
 
 void quern_pool_destroy(quern_pool *p) {
@@ -181,6 +187,7 @@ void quern_pool_destroy(quern_pool *p) {
 	free(p->scratch);
 	free(p->shares);
 	free(p->helpers);
+	quern_splits_destroy(p->splits);
 	free(p);
 }
 
@@ -197,19 +204,30 @@ static void wait_for_all(quern_pool *p, uint32_t n) {
 	pthread_mutex_unlock(&p->lock);
 }
 
+static void share_out(quern_pool *p, uint32_t round, uint32_t n) {
+	const uint32_t *begin = quern_splits_begin(p->splits, n);
+	for (uint32_t w = 0; w < p->workers; w++) {
+		share *own = &p->shares[w];
+		atomic_store(&own->took, 0);
+		atomic_store(&own->end, begin[w + 1]);
+		atomic_store(&own->ticket, (uint64_t)round << 32 | (begin[w + 1] - begin[w]));
+	}
+}
+
 static void run_round(quern_pool *p, uint32_t n, void (*body)(void *, uint32_t, uint32_t), void *arg) {
 	const uint32_t round = atomic_load(&p->round) + 1;
+	uint64_t took[QUERN_SPLIT_WORKERS];
 	atomic_store(&p->done, 0);
 	atomic_store(&p->body, body);
 	atomic_store(&p->arg, arg);
 	atomic_store(&p->n, n);
-	for (uint32_t w = 0; w < p->workers; w++)
-		atomic_store(
-			&p->shares[w].ticket, (uint64_t)round << 32 | (begin_of(p, n, w + 1) - begin_of(p, n, w)));
+	share_out(p, round, n);
 	atomic_store(&p->round, round);
 	wake(p);
 	take_part(p, round, 0);
 	wait_for_all(p, n);
+	for (uint32_t w = 0; w < p->workers; w++) took[w] = atomic_load(&p->shares[w].took);
+	quern_splits_took(p->splits, took);
 }
 
 /* A call within a call would do its work on one thread, and wait for ever on more: nobody shall rely on it. */
