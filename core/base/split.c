@@ -5,7 +5,7 @@
 enum {
 	LENGTHS = 16, /* so many lengths of rounds are known at once */
 	ROUNDS = 16,  /* shares change after so many rounds, in which short ones count for little */
-	WORST = 3     /* times the mean: a thread that has lost its processor is no work */
+	WORST = 4 /* times what the others took in the mean: a thread that has lost its processor is no work */
 };
 
 typedef struct {
@@ -100,9 +100,9 @@ void quern_splits_took(quern_splits *s, const uint64_t *took) {
 	split *one = s->now;
 	double all = 0;
 	for (uint32_t w = 0; w < s->workers; w++) all += (double)took[w];
-	for (uint32_t w = 0; w < s->workers; w++) {
-		const double most = WORST * all / s->workers;
-		one->took[w] += (double)took[w] < most ? (double)took[w] : most;
+	for (uint32_t w = 0; w < s->workers && s->workers > 1; w++) {
+		const double own = (double)took[w], most = WORST * (all - own) / (s->workers - 1);
+		one->took[w] += own > most && most > 0 ? most : own;
 	}
 	if (++one->rounds < ROUNDS) return;
 	move(s, one);
