@@ -32,8 +32,8 @@ typedef struct {
 	uint32_t number;
 } helper;
 
-/* A round is one call of quern_pool_each. Every worker has a share of the indices, the same part of them in every round, so that what it
- * worked on lies in its own cache the next time; who has done his own helps the others. What others did has to come back from their caches,
+/* A round is one call of quern_pool_each. Every worker has a share of the indices, nearly the same part of them in every round of as many, so that
+ * what it worked on lies in its own cache the next time; who has done his own helps the others. What others did has to come back from their caches,
  * so shares are made to take as long as each other (split.h). Who takes indices by compare-and-swap has read
  * body, arg, n and the share's end of this round: the caller changes them only while none is left and all are done. So nobody waits for a thread that
  * has taken nothing: others do the work of one that sleeps, or that has to wait for a processor. */
@@ -67,7 +67,8 @@ static void take_from(quern_pool *p, uint32_t round, uint32_t owner, uint32_t wo
 		if (!atomic_compare_exchange_weak(&own->ticket, &ticket, ticket - taken)) continue;
 		const uint64_t began = quern_platform_ticks();
 		for (uint32_t i = begin; i < begin + taken; i++) body(arg, i, worker);
-		atomic_fetch_add(&own->took, quern_platform_ticks() - began);
+		const uint64_t took = quern_platform_ticks() - began;
+		atomic_fetch_add(&own->took, took >> 63 ? 0 : took); /* clocks of two processors may differ */
 		if (atomic_fetch_add(&p->done, taken) + taken == n && atomic_load(&p->caller_waits)) {
 			pthread_mutex_lock(&p->lock);
 			pthread_cond_signal(&p->end);

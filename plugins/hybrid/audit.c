@@ -16,6 +16,7 @@ typedef struct {
 /* ---- what a cloud carries ---- */
 
 enum { CARRIED, SPEED, KINETIC, MOMENTUM, N_CARRIED = MOMENTUM + 3 };
+_Static_assert((int)N_CARRIED <= (int)TALLY_SUMS, "");
 
 typedef struct {
 	const cloud *of;
@@ -42,7 +43,7 @@ static void add_leaf(const void *what, uint32_t begin, uint32_t n, quern_real ou
 
 static bool add_cloud(const quern_step *s, const cloud *of, const quern_column *velocity, sums *out) {
 	const carrying c = { of, velocity, s->dim };
-	quern_real all[N_CARRIED] = { 0 };
+	quern_real all[TALLY_SUMS] = { 0 };
 	if (!tally_set(s, of->set, add_leaf, &c, N_CARRIED, all)) return false;
 	out->carried += all[CARRIED];
 	out->speed += all[SPEED];

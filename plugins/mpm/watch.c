@@ -29,6 +29,7 @@ typedef struct {
 } looking;
 
 enum { MASS, KINETIC, HELD, HEIGHT, POWER, N_LOOKED };
+_Static_assert((int)N_LOOKED <= (int)TALLY_SUMS, "");
 
 QUERN_INLINE void look_at(const looking *l, uint32_t begin, uint32_t n, const int dim, quern_real *out) {
 	const quern_column *u = l->s->use;
@@ -61,7 +62,7 @@ static bool look(const mpm *p, const quern_step *s, looked *out) {
 		.along = gravity_along(s, true),
 		.softness = 0.5 / p->bulk,
 		.shear_softness = p->shear > 0 ? 0.5 / p->shear : 0 };
-	quern_real all[N_LOOKED] = { 0 };
+	quern_real all[TALLY_SUMS] = { 0 };
 	if (!tally_set(s, "point", look_at_leaf, &l, N_LOOKED, all)) return false;
 	*out = (looked) { all[MASS], all[KINETIC], all[HELD], all[HEIGHT], all[POWER] };
 	return true;
