@@ -11,8 +11,8 @@ typedef struct quern_splits quern_splits;
 quern_splits *quern_splits_create(uint32_t workers);
 void quern_splits_destroy(quern_splits *);
 
-/* Where shares begin in a round of n indices, one more for the end: `workers` + 1 numbers, until the next call. Shares are equal in the first
- * rounds of as many, and stay as they are where that is good enough. */
+/* Where shares begin in a round of n indices, one more for the end: `workers` + 1 numbers, until the next call. In the first rounds of as
+ * many shares are equal, or as those of a length much like it; they stay as they are where that is good enough. */
 const uint32_t *quern_splits_begin(quern_splits *, uint32_t n);
 
 /* What each share of that round took, in any unit. */
