@@ -10,6 +10,8 @@
 
 /* Of a file with a checksum: what stands in its first 512 bytes. */
 enum { USER_BLOCK = 512 };
+/* Bytes by which a file in memory grows, and what is too much to lie among other memory. */
+enum { PIECE = 1 << 18, APART = 1 << 24 };
 static const char magic[16] = "quern checksum\n";
 
 void quern_h5_begin(void) {
@@ -32,10 +34,15 @@ static void *image_copy(void *to, const void *from, size_t size, H5FD_file_image
 	return memcpy(to, from, size);
 }
 
-static void *image_realloc(void *image, size_t size, H5FD_file_image_op_t op, void *h) {
+/* What is more than one piece gets more than is asked for, which costs nothing until it is written: so it lies in pages of its own. Grown piece by
+ * piece among other memory, it would leave a hole of a megabyte or two there. */
+static void *image_realloc(void *image, size_t size, H5FD_file_image_op_t op, void *owner) {
+	quern_h5 *h = owner;
 	(void)op;
+	if (image && size <= h->capacity) return image;
+	if (size > PIECE) size = size < APART ? APART : size + size / 2;
 	void *grown = realloc(image, size);
-	if (grown) ((quern_h5 *)h)->capacity = size;
+	if (grown) h->capacity = size;
 	return grown;
 }
 
@@ -63,7 +70,7 @@ bool quern_h5_create(quern_h5 *h, bool compress, size_t user_block) {
 	H5FD_file_image_callbacks_t own = { image_malloc, image_copy, image_realloc, image_free, same_owner,
 		keep_owner, h };
 	const hid_t access = H5Pcreate(H5P_FILE_ACCESS), create = without_times(H5P_FILE_CREATE);
-	H5Pset_fapl_core(access, 1 << 18, 0);
+	H5Pset_fapl_core(access, PIECE, 0);
 	H5Pset_file_image_callbacks(access, &own);
 	if (user_block) H5Pset_userblock(create, user_block);
 	h->file = H5Fcreate("memory", H5F_ACC_TRUNC, create, access);
@@ -104,7 +111,7 @@ bool quern_h5_save(quern_h5 *h, const char *path, char why[256]) {
 	if (good && h->user_block) quern_h5_seal(h->image, size);
 	good = good && quern_save_bytes(path, h->image, size, why);
 	discard(h);
-	if (size >> 20) quern_platform_trim(); /* a small file leaves little */
+	if (h->bytes >> 20) quern_platform_trim(); /* few leave little */
 	return good;
 }
 
@@ -125,12 +132,12 @@ static size_t rows_at_once(size_t columns) {
 	return rows;
 }
 
-static hid_t new_set(
-	const quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns) {
+static hid_t new_set(quern_h5 *h, hid_t group, const char *name, hid_t type, size_t rows, size_t columns) {
 	const int rank = columns > 1 ? 2 : 1;
 	const size_t most = rows_at_once(columns);
 	const hsize_t size[2] = { rows, columns }, chunk[2] = { rows < most ? rows : most, columns };
 	const hid_t space = H5Screate_simple(rank, size, NULL), create = without_times(H5P_DATASET_CREATE);
+	h->bytes += rows * columns * H5Tget_size(type);
 	if (h->compress && rows > 64) {
 		H5Pset_chunk(create, rank, chunk);
 		H5Pset_shuffle(create);

@@ -10,6 +10,7 @@ typedef struct quern_h5 {
 	size_t user_block; /* bytes before the HDF5 data, 0 or 512 */
 	void *image;       /* the file in memory, once HDF5 has let go of it */
 	size_t capacity;
+	size_t bytes; /* of all sets, before they are compressed */
 } quern_h5;
 
 /* Nothing is printed by the library from here on; our own messages name file and cause. And of the memory that it has no use for it
