@@ -190,7 +190,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	sh->means = sh->predicts && asks_for_means(s);
 	sh->spin = s->use[FORCE_OLD_SPIN].real[0] != NULL;
 	sh->books = !sh->looks && !s->settling && (s->use[FORCE_DAMPED].real[0] || s->use[FORCE_RUBBED].real[0]);
-	if (sh->books && !quern_dem_find_history(sh)) return false;
+	if (!quern_dem_find_history(sh)) return false;
 	sh->material = sh->d->pairs.n ? s->use[FORCE_MATERIAL].index : NULL;
 	sh->grain = grains.block;
 	sh->by_place = s->host->parts(s->run, "grain")->by_place;

@@ -72,7 +72,7 @@ typedef struct forces_shared {
 	quern_real dt;                 /* s, by which springs move */
 	bool books;                    /* losses of this step are booked */
 	bool looks;                    /* nothing moves: forces and energies of the state as it is */
-	const history_column *history; /* where losses are booked: what laws remember of contacts */
+	const history_column *history; /* what laws remember of contacts */
 	uint32_t n_history;
 	bool boxed;            /* the domain is strained */
 	dem_box box, box_then; /* where forces are looked at, and after the step */

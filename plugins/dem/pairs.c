@@ -139,7 +139,7 @@ QUERN_INLINE uint32_t compact(
 		const quern_real most = both[k] + reach;
 		near[k] = (quern_vec_dot(d, d, dim) < most * most);
 	}
-	for (uint32_t h = 0; h < sh->n_history; h++) {
+	for (uint32_t h = 0; h < sh->n_history && sh->books; h++) {
 		const quern_real *restrict was = sh->history[h].column + begin, initial = sh->history[h].initial;
 		QUERN_SIMD
 		for (uint32_t k = 0; k < n; k++)
@@ -305,6 +305,13 @@ static void foresee(const forces_shared *sh, uint32_t b) {
 	for (uint32_t i = sh->grain[b]; i < sh->grain[b + 1]; i += AT_ONCE) __builtin_prefetch(&sh->place[i]);
 }
 
+/* What laws remember of n slots is written whole in every step, and is on its way while distances are found. */
+static void foresee_history(const forces_shared *sh, uint32_t begin, uint32_t n) {
+	enum { AT_ONCE = 64 / sizeof(quern_real) };
+	for (uint32_t h = 0; h < sh->n_history; h++)
+		for (uint32_t k = 0; k < n; k += AT_ONCE) __builtin_prefetch(&sh->history[h].column[begin + k]);
+}
+
 QUERN_INLINE void block(
 	const forces_shared *sh, forces_work *w, uint32_t b, quern_real *sums, const int dim, const bool spin) {
 	foresee(sh, b);
@@ -313,6 +320,7 @@ QUERN_INLINE void block(
 		contact_chunk c = {
 			.block = b, .body = -1, .item = item_at(sh, begin), .begin = begin, .n_slots = n, .near = w->near
 		};
+		foresee_history(sh, begin, c.n_slots);
 		c.n = compact(sh, w, begin, c.n_slots, dim);
 		geometry(sh, w, c.n, dim);
 		motion(sh->motion, w, w->velocity, w->spin, c.n, dim, spin);
