@@ -40,9 +40,11 @@ static void *image_realloc(void *image, size_t size, H5FD_file_image_op_t op, vo
 	quern_h5 *h = owner;
 	(void)op;
 	if (image && size <= h->capacity) return image;
-	if (size > PIECE) size = size < APART ? APART : size + size / 2;
-	void *grown = realloc(image, size);
-	if (grown) h->capacity = size;
+	size_t given = size;
+	if (size > PIECE && size < SIZE_MAX / 2) given = size < APART ? APART : size + size / 2;
+	void *grown = realloc(image, given);
+	if (!grown) grown = realloc(image, given = size); /* where not even an address is free of charge */
+	if (grown) h->capacity = given;
 	return grown;
 }
 
@@ -73,7 +75,8 @@ bool quern_h5_create(quern_h5 *h, bool compress, size_t user_block) {
 	H5Pset_fapl_core(access, PIECE, 0);
 	H5Pset_file_image_callbacks(access, &own);
 	if (user_block) H5Pset_userblock(create, user_block);
-	h->file = H5Fcreate("memory", H5F_ACC_TRUNC, create, access);
+	/* of a file of this name, were there one, HDF5 would read all before it makes its own */
+	h->file = H5Fcreate("/dev/null/memory", H5F_ACC_TRUNC, create, access);
 	H5Pclose(access);
 	H5Pclose(create);
 	h->failed = h->file < 0;

@@ -170,7 +170,16 @@ def log(place):
     assert "log.txt cannot be written: No space left on device" in said, said
 
 
+def where_it_is_called(place):
+    """A run reads nothing there but what its scene names: not the file by whose name another is built in memory, either."""
+    here = place / "here"
+    here.mkdir()
+    os.mkfifo(here / "memory")  # who opens it waits for ever
+    run(SCENE, "out", "--until", "5 ms", cwd=here)
+    assert sorted(path.name for path in here.iterdir()) == ["memory", "out"]
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
-        for test in (refuses, forces, own_scene, resumed, fault_found_late, one_at_a_time, log):
+        for test in (refuses, forces, own_scene, resumed, fault_found_late, one_at_a_time, log, where_it_is_called):
             test(pathlib.Path(name))
