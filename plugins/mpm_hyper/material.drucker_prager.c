@@ -2,8 +2,8 @@
 /* material.drucker_prager - hyperelastic up to a Coulomb-like yield stress, flow without change of volume, no
  * tension. docs/theory/materials.md, section 4
  *
- * What is kept is small where strains are, J - 1 and dev b of the isochoric strain b, so that the yield stress is met to
- * round-off at any pressure; b = dev b + t I follows from det b = 1. */
+ * What is kept is small where strains are, J - 1 and the stress, whose deviator is G/J times dev b of the isochoric strain b, so that
+ * the yield stress is met to round-off at any pressure; b = dev b + t I follows from det b = 1. */
 #include "../common/rotation.h"
 #include <quern/material.h>
 #include <quern/math.h>
@@ -28,11 +28,7 @@ static const quern_param params[] = { QUERN_PARAM(drucker_prager, bulk_modulus, 
 #define USES(X) \
 	X(VOLUME, "point.volume_strain", "1", QUERN_UPDATE, QUERN_SCALAR, .rule = QUERN_MEANS, \
 		.doc = "J - 1, elastic; positive while the point is open.") \
-	X(DEVIATOR, "point.deviator", "1", QUERN_UPDATE, QUERN_SYMMETRIC, .rule = QUERN_MEANS, \
-		.doc = "Deviator of the isochoric elastic left Cauchy-Green strain.") \
 	X(ASSIGNED_VOLUME, "point.volume_strain", "1", QUERN_WRITE, QUERN_SCALAR, .hook = QUERN_MATERIAL_ASSIGN, \
-		.doc = "From stress.") \
-	X(ASSIGNED_DEVIATOR, "point.deviator", "1", QUERN_WRITE, QUERN_SYMMETRIC, .hook = QUERN_MATERIAL_ASSIGN, \
 		.doc = "From stress.")
 /* clang-format on */
 QUERN_USE_ENUM(USES);
@@ -93,18 +89,24 @@ QUERN_INLINE quern_real volume_energy(quern_real e) {
 	return quern_abs(e) < 0.125 ? near : far;
 }
 
+/* dev b of the isochoric strain, from what is kept: J/G dev sigma */
+QUERN_INLINE symmetric isochoric_deviator(
+	const int dim, symmetric stress, quern_real e, quern_real softness) {
+	return symmetric_scale_shift(dim, (1 + e) * softness, symmetric_deviator(dim, stress), 0);
+}
+
 /* W = K/2 ((J^2 - 1)/2 - ln J) + G/2 (tr b - d), of a unit of volume without stress */
-QUERN_INLINE void put_outputs(const int dim, const drucker_prager *law, quern_real *const *volume,
-	quern_real *const *deviator, const quern_material_batch *b) {
+QUERN_INLINE void put_outputs(const int dim, const drucker_prager *law, const quern_real *restrict strain,
+	const quern_material_batch *b) {
 	put_wave_speeds(dim, law->bulk_modulus, law->shear, law->density, b);
 	const quern_real bulk = 0.5 * law->bulk_modulus / law->density,
 					 shear = 0.5 * dim * law->shear / law->density;
-	const quern_real *restrict strain = volume[0];
+	const quern_real softness = 1 / law->shear;
 	quern_real *restrict energy = b->energy;
 	if (!energy) return;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
-		const symmetric s = SYMMETRIC_AT(deviator, i, dim);
+		const symmetric s = isochoric_deviator(dim, SYMMETRIC_AT(b->stress, i, dim), strain[i], softness);
 		const quern_real e = strain[i] < 0 ? strain[i] : 0;
 		energy[i] = bulk * volume_energy(e) + shear * isochoric_excess(dim, s);
 	}
@@ -112,17 +114,17 @@ QUERN_INLINE void put_outputs(const int dim, const drucker_prager *law, quern_re
 
 QUERN_INLINE void update(const int dim, const void *self, const quern_material_batch *b) {
 	const drucker_prager law = *(const drucker_prager *)self;
-	const quern_real dt = b->dt, shear = law.shear, half_bulk = 0.5 * law.bulk_modulus, full = law.density;
+	const quern_real dt = b->dt, shear = law.shear, softness = 1 / shear, half_bulk = 0.5 * law.bulk_modulus,
+					 full = law.density;
 	const quern_real *restrict grid_density = b->grid_density;
-	quern_real *const *volume = b->use[VOLUME].real, *const *deviator = b->use[DEVIATOR].real;
-	quern_real *restrict strain = volume[0], *restrict density = b->density;
+	quern_real *restrict strain = b->use[VOLUME].real[0], *restrict density = b->density;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
 		/* f = 1 + A; J* = J det f, b* = f b f^T/det(f)^(2/d) */
 		const tensor l = TENSOR_AT(b->gradient, i, dim);
 		const tensor a = { dt * l.xx, dt * l.xy, dt * l.xz, dt * l.yx, dt * l.yy, dt * l.yz, dt * l.zx,
 			dt * l.zy, dt * l.zz };
-		const symmetric was = SYMMETRIC_AT(deviator, i, dim);
+		const symmetric was = isochoric_deviator(dim, SYMMETRIC_AT(b->stress, i, dim), strain[i], softness);
 		const quern_real change = volume_change(dim, a);
 		const symmetric whole = symmetric_scale_shift(dim, 1, was, isochoric_mean(dim, was));
 		const quern_real edge = dim == 2 ? 1 : quern_cbrt(1 + change);
@@ -137,7 +139,6 @@ QUERN_INLINE void update(const int dim, const void *self, const quern_material_b
 		const quern_real left = (yields ? limit : 1) / (yields ? wide_tau : wide);
 		const symmetric back = symmetric_scale_shift(dim, left, trial, 0);
 		const symmetric now = symmetric_select(open, (symmetric) { 0, 0, 0, 0, 0, 0 }, back);
-		SYMMETRIC_PUT(deviator, i, now, dim);
 		/* an open point's volume is the grid's: J = max(1, rho_0/rho_g) */
 		const quern_real rho = grid_density[i], loose = rho < full ? rho : full;
 		const quern_real quotient = (open ? full - loose : 1) / (open ? loose : 1 + e);
@@ -147,7 +148,7 @@ QUERN_INLINE void update(const int dim, const void *self, const quern_material_b
 		const symmetric stress = symmetric_scale_shift(dim, shear * one_over_j, now, -p * one_over_j);
 		SYMMETRIC_PUT(b->stress, i, stress, dim);
 	}
-	put_outputs(dim, &law, volume, deviator, b);
+	put_outputs(dim, &law, strain, b);
 }
 static void update_2d(const void *self, const quern_material_batch *b) { update(2, self, b); }
 static void update_3d(const void *self, const quern_material_batch *b) { update(3, self, b); }
@@ -155,10 +156,8 @@ static void update_3d(const void *self, const quern_material_batch *b) { update(
 /* tr sigma/d = K/2 (J - 1/J), dev sigma = G/J dev b */
 QUERN_INLINE void assign(const int dim, const void *self, const quern_material_batch *b) {
 	const drucker_prager law = *(const drucker_prager *)self;
-	const quern_real softness = 1 / law.bulk_modulus, shear_softness = 1 / law.shear;
-	quern_real *const *volume = b->use[ASSIGNED_VOLUME].real, *const *deviator =
-																  b->use[ASSIGNED_DEVIATOR].real;
-	quern_real *restrict strain = volume[0], *restrict density = b->density;
+	const quern_real softness = 1 / law.bulk_modulus;
+	quern_real *restrict strain = b->use[ASSIGNED_VOLUME].real[0], *restrict density = b->density;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < b->n; i++) {
 		const symmetric given = SYMMETRIC_AT(b->stress, i, dim), s = symmetric_deviator(dim, given);
@@ -169,13 +168,11 @@ QUERN_INLINE void assign(const int dim, const void *self, const quern_material_b
 		const quern_real kept = pressed ? p : 0, x = kept * softness;
 		const quern_real e = x * x / (1 + __builtin_sqrt(1 + x * x)) - x; /* J = sqrt(1 + x^2) - x */
 		const symmetric stress = symmetric_scale_shift(dim, share, s, -kept);
-		const symmetric now = symmetric_scale_shift(dim, share * shear_softness * (1 + e), s, 0);
 		SYMMETRIC_PUT(b->stress, i, stress, dim);
-		SYMMETRIC_PUT(deviator, i, now, dim);
 		strain[i] = e;
 		density[i] = law.density / (1 + e);
 	}
-	put_outputs(dim, &law, volume, deviator, b);
+	put_outputs(dim, &law, strain, b);
 }
 static void assign_2d(const void *self, const quern_material_batch *b) { assign(2, self, b); }
 static void assign_3d(const void *self, const quern_material_batch *b) { assign(3, self, b); }
@@ -203,7 +200,7 @@ static const quern_material_ops ops = { .size = sizeof ops,
 	.moduli = moduli,
 	.friction = friction };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 3,
+	.revision = 4,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "material.drucker_prager",
 	.brief = "Hyperelastic with Drucker and Prager's yield stress, one friction for every rate.",

@@ -58,7 +58,6 @@ static void crowd(quern_run *run, int dim, bool hyper, bool open) {
 					   m = harness_field(run, "point.mass"), volume = harness_field(run, "point.volume"),
 					   s = harness_field(run, "point.stress"), w = harness_field(run, "point.weight");
 	const quern_column j = hyper ? harness_field(run, "point.volume_strain") : m;
-	const quern_column b = hyper ? harness_field(run, "point.deviator") : m;
 	const char *const owed[] = { "cell.owed", "cell.owed_momentum" };
 	int first = 1 << 20;
 	for (uint32_t i = 0; i < harness_count(run, "point"); i++)
@@ -70,10 +69,8 @@ static void crowd(quern_run *run, int dim, bool hyper, bool open) {
 			(0.8 + 0.4 * uniform()) * (w.real[0][i] < 1 ? 0.5 : 1); /* no grains are lacking there */
 		const double p = open ? 0 : 100 * uniform(), strain = open ? 0.3 * uniform() : -p / 1e5;
 		volume.real[0][i] = m.real[0][i] / density * (1 + strain);
-		for (int k = 0; k < (dim == 2 ? 3 : 6); k++) {
+		for (int k = 0; k < (dim == 2 ? 3 : 6); k++)
 			s.real[k][i] = k < dim ? -p : 0.1 * p * (uniform() - 0.5);
-			if (hyper) b.real[k][i] = k < dim || open ? 0 : 1e-4 * (uniform() - 0.5);
-		}
 		if (hyper) j.real[0][i] = strain;
 		for (int k = 0; k < dim; k++) v.real[k][i] = uniform() - 0.5;
 	}

@@ -130,7 +130,7 @@ BROKEN = [
     ("never yields", "mpm_hypo/material.mu_i.c", [("symmetric_scale_shift(dim, grown * (flow / tau), s, -(grown * p)), trial)",
                                                    "symmetric_scale_shift(dim, 1, s, -p), trial)")], "yield"),
     ("forgets", "mpm_hyper/material.drucker_prager.c", [
-        ("SYMMETRIC_PUT(deviator, i, now, dim);\n\t\tstrain[i] = e;", "strain[i] = e;")], "assign and read back"),
+        ("\t\tstrain[i] = e;\n", "")], "assign and read back"),
     ("sums to more", "mpm/shape.gimp.c", [("w0[i] = folded ? 1 - hat : a0;", "w0[i] = folded ? 1 - hat : 1.001 * a0;")],
      "partition of unity"),
     ("ignores walls", "mpm/shape.gimp.c", [("folded = at_low | at_high", "folded = at_low & at_high")],
