@@ -111,6 +111,30 @@ def continuum_alone():
     print(f"elastic bar: {len(bar.ids)} objects, no grains, no cells; a point has {bar.bytes('point')} bytes")
 
 
+SAND = {"point.following": 1, "point.around": 1, "point.spreading": 2}  # what flows keeps its room
+MATERIALS = {
+    "mu_i": ("{bulk_modulus: 1e5, diameter: 2 mm, grain_density: 2500, critical_density: 2000}", SAND),
+    "drucker_prager": ("{bulk_modulus: 1e5, density: 2000}", {**SAND, "point.volume_strain": 1}),
+    "elastic": ("{bulk_modulus: 1e5, density: 2000}", {})}
+
+
+def materials():
+    """In two dimensions nothing of a point has a third component, and a material adds what it remembers and no more."""
+    found = {}
+    for material, (keys, _) in MATERIALS.items():
+        scene = Scene("column", *lab.SMALL["column"], "--set=model=continuum", "--set=output.fields=[]",
+                      *(f"--set=bodies.{k}.plane.boundary=sticky" for k in range(2)), f"--set=continuum.material={{{material}: {keys}}}")
+        found[material] = {field["name"]: field["components"] for field in scene.sets["point"]["fields"]}
+        # a symmetric tensor has three components in a plane
+        assert all(n <= (3 if field in ("point.stress", "point.dashpot") else 2) for field, n in found[material].items()), found[material]
+        assert found[material]["point.stress"] == 3 and found[material]["point.position"] == 2
+    common = set.intersection(*map(set, found.values()))
+    for material, fields in found.items():
+        own = {field: n for field, n in fields.items() if field not in common}
+        assert own == MATERIALS[material][1], f"{material} adds {own}"
+        print(f"column of {material}: adds {own or 'nothing'}")
+
+
 def hybrid():
     whole = Scene("column", *lab.SMALL["column"])
     books = {field for field in whole.fields if "owed" in field or field.endswith((".weight", ".zone"))}
@@ -145,5 +169,6 @@ if __name__ == "__main__":
     grains_alone()
     friction()
     continuum_alone()
+    materials()
     hybrid()
     while_it_runs()

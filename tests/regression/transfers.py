@@ -8,6 +8,7 @@ import lab
 SCENES = {
     "apic, shares on a ramp": ["--set=continuum.transfer=apic", "--set=hybrid.weights=ramp"],
     "xpic for both, half shares": ["--set=continuum.transfer={xpic: {order: 3}}", "--set=hybrid.transfer={xpic: {order: 2}}"],
+    "mixed for both": ["--set=continuum.transfer=mixed", "--set=hybrid.transfer=mixed"],
     "volume averaged over cells": ["--set=continuum.strain=averaged"],
     "zones that are drawn": ["--set=continuum.transfer=apic", "--set=hybrid.oracle=[{fixed: {boxes: [{lower: [0.02, -1], "
                              "upper: [1, 1]}], ramp: 12 mm}}, {near_bodies: {distance: 5 mm, width: 8 mm, bodies: [{body: 0}]}}]"]}
