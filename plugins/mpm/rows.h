@@ -87,7 +87,8 @@ QUERN_USE_ENUM(OUTLET_USES);
 	X(WATCH_WORK, "total.watch_work", "J", QUERN_UPDATE, QUERN_SCALAR, .doc = "By gravity along periodic axes since.") \
 	X(WATCH_GIVEN, "total.watch_given", "J", QUERN_UPDATE, QUERN_SCALAR, .doc = "Otherwise, until then.") \
 	X(WATCH_POWER, "total.watch_power", "W", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of gravity along periodic axes at the last look.") \
-	X(WATCH_TIME, "total.watch_time", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of the last look.")
+	X(WATCH_TIME, "total.watch_time", "s", QUERN_UPDATE, QUERN_SCALAR, .doc = "Of the last look.") \
+	X(WATCH_PRESSED, "total.watch_pressed", "1", QUERN_UPDATE, QUERN_INDEX, .doc = "1: it was said that material is pressed too far.")
 QUERN_USE_ENUM(WATCH_USES);
 
 #define HOLD_USES(X) \

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* watch - energy that nobody has given, of a continuum alone: docs/theory/mpm.md, section 5 */
+/* watch - energy that nobody has given, and material that is pressed too far, of a continuum alone: docs/theory/mpm.md, section 5 */
 #include "../common/outlets.h"
 #include "../common/rotation.h"
 #include "../common/tally.h"
@@ -8,10 +8,14 @@
 /* Steps from one look to the next: what explodes grows over many, and looks cost next to nothing. */
 enum { WATCH_EVERY = 20 };
 
+/* Over the density without stress: from the loosest packing of grains to the densest it is less. Single points may be off by noise. */
+static const quern_real pressed_to = 1.2, pressed_share = 0.01;
+
 typedef struct looked {
 	quern_real mass, kinetic, held; /* kg, J, J */
 	quern_real height,
 		power; /* J and W of gravity: along axes that end, and along periodic ones, where no height is known */
+	quern_real pressed; /* kg of those that are denser than pressed_to */
 } looked;
 
 /* Gravity along the axes that are periodic, or along those that are not. */
@@ -26,9 +30,10 @@ typedef struct {
 	cloud points;
 	quern_vec down, along; /* gravity, as above */
 	quern_real softness, shear_softness;
+	quern_real dense; /* kg/m^3 */
 } looking;
 
-enum { MASS, KINETIC, HELD, HEIGHT, POWER, N_LOOKED };
+enum { MASS, KINETIC, HELD, HEIGHT, POWER, PRESSED, N_LOOKED };
 _Static_assert((int)N_LOOKED <= (int)TALLY_SUMS, "");
 
 QUERN_INLINE void look_at(const looking *l, uint32_t begin, uint32_t n, const int dim, quern_real *out) {
@@ -44,6 +49,7 @@ QUERN_INLINE void look_at(const looking *l, uint32_t begin, uint32_t n, const in
 								symmetric_held(dim, l->softness, l->shear_softness, stress));
 		out[HEIGHT] -= mass * quern_vec_dot(l->down, x, dim);
 		out[POWER] += mass * quern_vec_dot(l->along, v, dim);
+		out[PRESSED] += u[WATCH_MASS].real[0][i] > l->dense * u[WATCH_VOLUME].real[0][i] ? mass : 0;
 	}
 }
 
@@ -61,10 +67,11 @@ static bool look(const mpm *p, const quern_step *s, looked *out) {
 		.down = gravity_along(s, false),
 		.along = gravity_along(s, true),
 		.softness = 0.5 / p->bulk,
-		.shear_softness = p->shear > 0 ? 0.5 / p->shear : 0 };
+		.shear_softness = p->shear > 0 ? 0.5 / p->shear : 0,
+		.dense = pressed_to * p->density };
 	quern_real all[TALLY_SUMS] = { 0 };
 	if (!tally_set(s, "point", look_at_leaf, &l, N_LOOKED, all)) return false;
-	*out = (looked) { all[MASS], all[KINETIC], all[HELD], all[HEIGHT], all[POWER] };
+	*out = (looked) { all[MASS], all[KINETIC], all[HELD], all[HEIGHT], all[POWER], all[PRESSED] };
 	return true;
 }
 
@@ -126,13 +133,26 @@ static quern_status judge(const mpm *p, const quern_step *s, const looked *now) 
 		there, made);
 }
 
+/* Stress grows with the strain alone, so that nothing keeps sand from becoming denser than its grains. */
+static void tell_of_pressed(const mpm *p, const quern_step *s, const looked *now) {
+	int32_t *said = s->use[WATCH_PRESSED].index;
+	if (*said || !(now->pressed > pressed_share * now->mass)) return;
+	*said = 1;
+	s->host->log(s->run, 2,
+		"%.2g %% of the continuum is more than %g times as dense as it is without stress, %.4g kg/m^3, which no packing of grains "
+		"becomes: give continuum.material a greater bulk_modulus, or do not trust what hits so hard",
+		100 * now->pressed / now->mass, pressed_to, p->density);
+}
+
 quern_status quern_mpm_watch(const void *self, const quern_step *s) {
 	const mpm *p = self;
 	const quern_column *u = s->use;
 	const bool anew = !u[WATCH_BEGUN].index[0] || s->step == s->stage_step;
-	if (!(p->gain > 0) || (!anew && s->step % WATCH_EVERY) || cannot_tell(s)) return QUERN_OK;
+	if (!(p->gain > 0) || (!anew && s->step % WATCH_EVERY)) return QUERN_OK;
 	looked now = { .mass = 0 };
 	if (!look(p, s, &now)) return QUERN_E_MEMORY;
+	tell_of_pressed(p, s, &now);
+	if (cannot_tell(s)) return QUERN_OK;
 	quern_real *power = u[WATCH_POWER].real[0], *time = u[WATCH_TIME].real[0];
 	if (anew) begin(s, now.kinetic + now.held + now.height);
 	else u[WATCH_WORK].real[0][0] += 0.5 * (*power + now.power) * (s->time - *time);
