@@ -8,8 +8,8 @@
 /* Steps from one look to the next: what explodes grows over many, and looks cost next to nothing. */
 enum { WATCH_EVERY = 20 };
 
-/* Over the density without stress: from the loosest packing of grains to the densest it is less. Single points may be off by noise. */
-static const quern_real pressed_to = 1.2, pressed_share = 0.01;
+/* Over the density without stress: from the loosest packing of spheres to the densest one there is. Single points may be off by noise. */
+static const quern_real pressed_to = 1.3, pressed_share = 0.01;
 
 typedef struct looked {
 	quern_real mass, kinetic, held; /* kg, J, J */
@@ -139,20 +139,22 @@ static void tell_of_pressed(const mpm *p, const quern_step *s, const looked *now
 	if (*said || !(now->pressed > pressed_share * now->mass)) return;
 	*said = 1;
 	s->host->log(s->run, 2,
-		"%.2g %% of the continuum is more than %g times as dense as it is without stress, %.4g kg/m^3, which no packing of grains "
-		"becomes: give continuum.material a greater bulk_modulus, or do not trust what hits so hard",
-		100 * now->pressed / now->mass, pressed_to, p->density);
+		"at t = %.6g s %.3g %% of the continuum is more than %g times as dense as without stress, %.4g kg/m^3: no packing of grains "
+		"is so dense, and stress that grows with the strain alone does not hold there; give continuum.material a greater "
+		"bulk_modulus, or a gentler load",
+		s->time, 100 * now->pressed / now->mass, pressed_to, p->density);
 }
 
 quern_status quern_mpm_watch(const void *self, const quern_step *s) {
 	const mpm *p = self;
 	const quern_column *u = s->use;
-	const bool anew = !u[WATCH_BEGUN].index[0] || s->step == s->stage_step;
+	const bool tells = !cannot_tell(s),
+			   anew = tells && (!u[WATCH_BEGUN].index[0] || s->step == s->stage_step);
 	if (!(p->gain > 0) || (!anew && s->step % WATCH_EVERY)) return QUERN_OK;
 	looked now = { .mass = 0 };
 	if (!look(p, s, &now)) return QUERN_E_MEMORY;
 	tell_of_pressed(p, s, &now);
-	if (cannot_tell(s)) return QUERN_OK;
+	if (!tells) return QUERN_OK;
 	quern_real *power = u[WATCH_POWER].real[0], *time = u[WATCH_TIME].real[0];
 	if (anew) begin(s, now.kinetic + now.held + now.height);
 	else u[WATCH_WORK].real[0][0] += 0.5 * (*power + now.power) * (s->time - *time);
