@@ -17,11 +17,12 @@ def rows(folder):
                 yield row
 
 
-def write(doc, study, mark, table):
-    """Prints what `table` makes of the folder of a sweep, and puts it between <!-- mark --> and <!-- end of mark --> of the study's page."""
+def write(doc, study, mark, table, page=None):
+    """Prints what `table` makes of the folder of a sweep, and puts it between <!-- mark --> and <!-- end of mark --> of the study's page, or of
+    that other one."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out" / study)
-    parser.add_argument("--page", type=pathlib.Path, default=ROOT / f"docs/validation/{study}.md")
+    parser.add_argument("--page", type=pathlib.Path, default=ROOT / f"docs/validation/{page or study}.md")
     args = parser.parse_args()
     begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"
     before, found, rest = args.page.read_text().partition(begin)
