@@ -5,7 +5,11 @@
 #include <math.h>
 #include <string.h>
 
-enum { N = QUERN_BLOCK_CELLS };
+enum {
+	N = QUERN_BLOCK_CELLS,
+	FAR = 2,     /* cells */
+	ENOUGH = 30, /* cells; one by itself is off by some percent */
+};
 
 /* A cell that bodies leave less of has too little in it to be measured. */
 static const quern_real least_open = 0.5;
@@ -35,17 +39,55 @@ static quern_real crowding_of(const update *d, uint32_t block, const int32_t cel
 	return room > 0 ? holds / room : 0;
 }
 
-/* Grains settle more densely or more loosely than the scene's continuum: what they were like at first is what is full. */
-static void measure_full(const update *d) {
+/* Whether material is all around a cell, two cells far: its surface, or spray, says nothing of how densely it lies. What is beyond a face, or in a
+ * body, does not count. */
+static bool is_within(const update *d, uint32_t c) {
+	const int depth = d->s->dim == 3 ? FAR : 0;
+	int32_t cell[3];
+	if (!(d->mass[c] > 0) || d->open[c] < 1 || !quern_grid_cell_of(d->g, c, cell)) return false;
+	for (int z = -depth; z <= depth; z++)
+		for (int y = -FAR; y <= FAR; y++)
+			for (int x = -FAR; x <= FAR; x++) {
+				int32_t at[3] = { cell[0] + x, cell[1] + y, cell[2] + z };
+				if (!quern_grid_bring_back(d->g, at)) continue;
+				const int32_t i = quern_grid_entry(d->g, at);
+				if (i < 0 || (d->open[i] > 0 && !(d->mass[i] > 0))) return false;
+			}
+	return true;
+}
+
+static bool is_continuum(const update *d, uint32_t c) {
+	return d->zone[c] == QUERN_CONTINUUM && d->mass[c] > 0;
+}
+
+/* Mean crowding within the material, of the continuum or of all; returns of how many cells. */
+static uint32_t mean_within(const update *d, bool of_all, quern_real *mean) {
 	quern_real sum = 0;
 	uint32_t n = 0;
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		const uint32_t c = nth_cell(d, q);
-		if (d->zone[c] != QUERN_CONTINUUM || !(d->mass[c] > 0) || d->open[c] < 1) continue;
+		if (!(of_all || is_continuum(d, c)) || !is_within(d, c)) continue;
 		sum += d->u[U_CROWDING].real[0][c];
 		n++;
 	}
-	if (n) d->u[U_FULL].real[0][0] = sum / n;
+	*mean = n ? sum / n : 0;
+	return n;
+}
+
+/* Grains settle more densely or more loosely than the scene's continuum: what they were like when there first was one is full. As long as there is little of it sand
+ * may still be falling: then full is the densest that all of it has been, no less than the continuum without stress. */
+static void measure_full(const update *d) {
+	quern_real *full = d->u[U_FULL].real[0], mean;
+	int32_t *rising = d->u[U_FULL_RISING].index;
+	bool any = false;
+	for (uint32_t c = 0; c < d->n_cells; c++) any = any || is_continuum(d, c);
+	if (!any) return;
+	const bool known = mean_within(d, false, &mean) >= ENOUGH;
+	if (known && !*rising) *full = mean;
+	*rising = !known;
+	if (known) return;
+	*full = fmax(1, *full);
+	if (mean_within(d, true, &mean) >= ENOUGH) *full = fmax(mean, *full);
 }
 
 static void crowd_block(void *arg, uint32_t b, uint32_t worker) {
@@ -63,5 +105,5 @@ static void crowd_block(void *arg, uint32_t b, uint32_t worker) {
 
 void quern_hybrid_crowding(update *d) {
 	d->s->host->parallel(d->s->run, d->g->n_blocks, crowd_block, d);
-	if (!(d->u[U_FULL].real[0][0] > 0)) measure_full(d);
+	if (!(d->u[U_FULL].real[0][0] > 0) || d->u[U_FULL_RISING].index[0]) measure_full(d);
 }
