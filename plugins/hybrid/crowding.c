@@ -13,6 +13,8 @@ enum {
 
 /* A cell that bodies leave less of has too little in it to be measured. */
 static const quern_real least_open = 0.5;
+/* Crowding that is more comes of what waits for room. */
+static const quern_real most_told = 1.2;
 
 static quern_real crowding_of(const update *d, uint32_t block, const int32_t cell[3]) {
 	const quern_grid_view *g = d->g;
@@ -39,55 +41,82 @@ static quern_real crowding_of(const update *d, uint32_t block, const int32_t cel
 	return room > 0 ? holds / room : 0;
 }
 
-/* Whether material is all around a cell, two cells far: its surface, or spray, says nothing of how densely it lies. What is beyond a face, or in a
- * body, does not count. */
-static bool is_within(const update *d, uint32_t c) {
-	const int depth = d->s->dim == 3 ? FAR : 0;
+/* ---- what is full ---- */
+
+/* Whether material is all around a cell, two cells far: its surface, or spray, says nothing of how densely it lies. What is beyond a face, or behind the surface of
+ * a body, does not count. */
+static bool is_within(const update *d, uint32_t block, uint32_t c) {
+	const quern_grid_view *g = d->g;
+	quern_grid_cursor home = { .block = (int32_t)block };
+	const int depth = g->dim == 3 ? FAR : 0;
 	int32_t cell[3];
-	if (!(d->mass[c] > 0) || d->open[c] < 1 || !quern_grid_cell_of(d->g, c, cell)) return false;
+	if (!(d->mass[c] > 0) || d->open[c] < 1 || !quern_grid_cell_of(g, c, cell)) return false;
+	memcpy(home.at, g->at[block], sizeof home.at);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -FAR; y <= FAR; y++)
 			for (int x = -FAR; x <= FAR; x++) {
 				int32_t at[3] = { cell[0] + x, cell[1] + y, cell[2] + z };
-				if (!quern_grid_bring_back(d->g, at)) continue;
-				const int32_t i = quern_grid_entry(d->g, at);
-				if (i < 0 || (d->open[i] > 0 && !(d->mass[i] > 0))) return false;
+				quern_grid_cursor near = home;
+				if (!quern_grid_bring_back(g, at)) continue;
+				const int32_t i = quern_grid_entry_near(g, &near, at);
+				if (i < 0 || (d->open[i] > least_open && !(d->mass[i] > 0))) return false;
 			}
 	return true;
+}
+
+typedef struct {
+	const update *d;
+	bool *within; /* by cell */
+} looking;
+
+static void look_at_block(void *arg, uint32_t b, uint32_t worker) {
+	const looking *w = arg;
+	(void)worker;
+	for (uint32_t c = b * N; c < (b + 1) * N; c++) w->within[c] = is_within(w->d, b, c);
 }
 
 static bool is_continuum(const update *d, uint32_t c) {
 	return d->zone[c] == QUERN_CONTINUUM && d->mass[c] > 0;
 }
 
-/* Mean crowding within the material, of the continuum or of all; returns of how many cells. */
-static uint32_t mean_within(const update *d, bool of_all, quern_real *mean) {
-	quern_real sum = 0;
-	uint32_t n = 0;
-	for (uint32_t q = 0; q < d->n_cells; q++) {
-		const uint32_t c = nth_cell(d, q);
-		if (!(of_all || is_continuum(d, c)) || !is_within(d, c)) continue;
-		sum += d->u[U_CROWDING].real[0][c];
-		n++;
-	}
-	*mean = n ? sum / n : 0;
-	return n;
+typedef struct {
+	bed bed;
+	quern_real crowding; /* sum over its cells */
+} bulk;
+
+static void add_to_bulk(const update *d, uint32_t c, bulk *sum) {
+	quern_hybrid_add_to_bed(d, c, &sum->bed);
+	sum->crowding += fmin(d->u[U_CROWDING].real[0][c], most_told);
 }
 
-/* Grains settle more densely or more loosely than the scene's continuum: what they were like when there first was one is full. As long as there is little of it sand
- * may still be falling: then full is the densest that all of it has been, no less than the continuum without stress. */
-static void measure_full(const update *d) {
-	quern_real *full = d->u[U_FULL].real[0], mean;
-	int32_t *rising = d->u[U_FULL_RISING].index;
+/* Where sand moves or falls it may be looser than it will be: then no less than the continuum without stress, and as long as there is little continuum the densest that all
+ * of it has been. */
+static void set_full(const update *d, const bulk *continuum, const bulk *all) {
+	quern_real *full = d->u[U_FULL].real[0];
+	const bool known = continuum->bed.cells >= ENOUGH, first = !(*full > 0);
+	const bulk *found = known ? continuum : all;
+	const quern_real mean = found->bed.cells >= ENOUGH ? found->crowding / found->bed.cells : 1;
+	*full = known && first && quern_hybrid_is_at_rest(d, &found->bed) ? mean : fmax(1, fmax(*full, mean));
+	d->u[U_FULL_RISING].index[0] = !known;
+}
+
+/* Grains settle more densely or more loosely than the scene's continuum: what they were like when there first was one is full. */
+static quern_status measure_full(const update *d) {
+	bulk continuum = { .crowding = 0 }, all = { .crowding = 0 };
+	looking w = { d, d->s->host->memory(d->s->run, (size_t)d->n_cells + 1) };
 	bool any = false;
 	for (uint32_t c = 0; c < d->n_cells; c++) any = any || is_continuum(d, c);
-	if (!any) return;
-	const bool known = mean_within(d, false, &mean) >= ENOUGH;
-	if (known && !*rising) *full = mean;
-	*rising = !known;
-	if (known) return;
-	*full = fmax(1, *full);
-	if (mean_within(d, true, &mean) >= ENOUGH) *full = fmax(mean, *full);
+	if (!any) return QUERN_OK;
+	if (!w.within) return QUERN_E_MEMORY;
+	d->s->host->parallel(d->s->run, d->g->n_blocks, look_at_block, &w);
+	for (uint32_t q = 0; q < d->n_cells; q++) {
+		const uint32_t c = nth_cell(d, q);
+		if (!w.within[c]) continue;
+		add_to_bulk(d, c, &all);
+		if (is_continuum(d, c)) add_to_bulk(d, c, &continuum);
+	}
+	set_full(d, &continuum, &all);
+	return QUERN_OK;
 }
 
 static void crowd_block(void *arg, uint32_t b, uint32_t worker) {
@@ -103,7 +132,8 @@ static void crowd_block(void *arg, uint32_t b, uint32_t worker) {
 	}
 }
 
-void quern_hybrid_crowding(update *d) {
+quern_status quern_hybrid_crowding(update *d) {
 	d->s->host->parallel(d->s->run, d->g->n_blocks, crowd_block, d);
-	if (!(d->u[U_FULL].real[0][0] > 0) || d->u[U_FULL_RISING].index[0]) measure_full(d);
+	const bool asked = !(d->u[U_FULL].real[0][0] > 0) || d->u[U_FULL_RISING].index[0];
+	return asked ? measure_full(d) : QUERN_OK;
 }

@@ -11,11 +11,8 @@ enum { MANY = 50, FEWEST = 10 };
 #define MOST_COMPRESSED                                                                                      \
 	0.05 /* a continuum that gives way more is softer than grains, and its modulus says nothing of them */
 #define AT_REST 1e-3 /* kinetic energy over m g d, above what settling leaves */
-
-typedef struct bed {
-	quern_real mass, volume, pressure, kinetic;
-	uint32_t cells;
-} bed;
+#define BORNE                                                                                                \
+	1 /* pressure over rho g d: a second layer of grains bears more, and what has been let go bears nothing */
 
 /* What is deep in the grains: neither near the surface, where oracles keep them, nor near a body. */
 static bool is_bulk(const update *d, uint32_t c) {
@@ -23,7 +20,7 @@ static bool is_bulk(const update *d, uint32_t c) {
 		   d->wall[c] > AWAY * d->h->diameter + d->g->cell;
 }
 
-static void add_cell(const update *d, uint32_t c, bed *sum) {
+void quern_hybrid_add_to_bed(const update *d, uint32_t c, bed *sum) {
 	quern_real stress[6], v2 = d->spread[c] * d->spread[c];
 	quern_hybrid_contact_stress(d, c, stress);
 	for (uint32_t k = 0; k < d->s->dim; k++) {
@@ -35,21 +32,26 @@ static void add_cell(const update *d, uint32_t c, bed *sum) {
 	sum->cells++;
 }
 
+bool quern_hybrid_is_at_rest(const update *d, const bed *sum) {
+	quern_real g2 = 0;
+	for (uint32_t k = 0; k < d->s->dim; k++) g2 += d->s->gravity[k] * d->s->gravity[k];
+	const quern_real weight = sqrt(g2) * d->h->diameter;
+	return sum->kinetic <= AT_REST * sum->mass * weight &&
+		   sum->pressure >= BORNE * sum->cells * d->h->packed * weight;
+}
+
 /* Grains under their weight are a little denser than the continuum without stress: by p/K. Where they still move, or
  * there are few of them, nobody knows. */
 void quern_hybrid_packing(const update *d) {
 	const hybrid *h = d->h;
 	const quern_bound *material = d->s->slot[SLOT_MATERIAL];
-	quern_real g2 = 0, bulk, shear, density;
+	quern_real bulk, shear, density;
 	bed sum = { 0 };
 	for (uint32_t q = 0; q < d->n_cells; q++) {
 		const uint32_t c = nth_cell(d, q);
-		if (is_bulk(d, c)) add_cell(d, c, &sum);
+		if (is_bulk(d, c)) quern_hybrid_add_to_bed(d, c, &sum);
 	}
-	for (uint32_t k = 0; k < d->s->dim; k++) g2 += d->s->gravity[k] * d->s->gravity[k];
-	if (sum.cells < FEWEST || cells_are_narrow(h) ||
-		sum.kinetic > AT_REST * sum.mass * sqrt(g2) * h->diameter)
-		return;
+	if (sum.cells < FEWEST || cells_are_narrow(h) || !quern_hybrid_is_at_rest(d, &sum)) return;
 	((const quern_material_ops *)material->ops)->moduli(material->self, d->s->dim, &bulk, &shear, &density);
 	const quern_real compressed = fmax(0, sum.pressure / sum.cells) / bulk;
 	if (compressed > MOST_COMPRESSED) return;

@@ -24,8 +24,8 @@ static quern_status reckon(update *d) {
 	if (status == QUERN_OK) status = quern_hybrid_shares(d);
 	if (status == QUERN_OK) status = quern_hybrid_weigh(d);
 	if (status != QUERN_OK) return status;
-	quern_hybrid_crowding(d);
-	status = quern_hybrid_hand_over(d);
+	status = quern_hybrid_crowding(d);
+	if (status == QUERN_OK) status = quern_hybrid_hand_over(d);
 	if (status == QUERN_OK) status = quern_hybrid_grains(d);
 	if (status == QUERN_OK) status = quern_hybrid_points(d);
 	return d->failed ? QUERN_E_MEMORY : status;

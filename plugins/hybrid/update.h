@@ -105,6 +105,14 @@ quern_status quern_hybrid_distance(update *, const bool *source, const bool *thr
 quern_status quern_hybrid_limit_changes(update *);
 
 /* ---- packing.c ---- */
+/* What grains in some cells have: kg, J, and the sum over cells of their pressures, Pa. */
+typedef struct bed {
+	uint32_t cells;
+	quern_real mass, kinetic, pressure;
+} bed;
+void quern_hybrid_add_to_bed(const update *, uint32_t cell, bed *);
+/* Whether they lie on each other, and move with no more energy than settling leaves. */
+bool quern_hybrid_is_at_rest(const update *, const bed *);
 /* Of the first update, once there are zones: warns if settled grains have another density than the continuum. */
 void quern_hybrid_packing(const update *);
 
@@ -129,7 +137,7 @@ QUERN_INLINE quern_real cell_room(const update *d, uint32_t c) {
 }
 
 /* ---- crowding.c ---- */
-void quern_hybrid_crowding(update *);
+quern_status quern_hybrid_crowding(update *);
 
 /* How many of 0.05, 0.1, 0.2, 0.4 ... are passed: whoever warns does so again at each. */
 QUERN_INLINE int steps_passed(quern_real part) {
