@@ -16,26 +16,26 @@ static const quern_real least_open = 0.5;
 /* Crowding that is more comes of what waits for room. */
 static const quern_real most_told = 1.2;
 
+/* Entry of the cell that lies `step` from one of that block, -1 for none; false beyond a face. */
+static bool find_around(
+	const update *d, uint32_t block, const int32_t cell[3], const int step[3], int32_t *entry) {
+	quern_grid_cursor near = { .block = (int32_t)block };
+	int32_t at[3] = { cell[0] + step[0], cell[1] + step[1], cell[2] + step[2] };
+	if (!quern_grid_bring_back(d->g, at)) return false;
+	memcpy(near.at, d->g->at[block], sizeof near.at);
+	*entry = quern_grid_entry_near(d->g, &near, at);
+	return true;
+}
+
 static quern_real crowding_of(const update *d, uint32_t block, const int32_t cell[3]) {
-	const quern_grid_view *g = d->g;
-	quern_grid_cursor home = { .block = (int32_t)block };
-	const int depth = g->dim == 3 ? 1 : 0;
+	const int depth = d->s->dim == 3 ? 1 : 0;
 	quern_real holds = 0, room = 0;
-	memcpy(home.at, g->at[block], sizeof home.at);
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -1; y <= 1; y++)
 			for (int x = -1; x <= 1; x++) {
-				const int step[3] = { x, y, z };
-				int32_t at[3] = { 0 };
-				bool beyond = false;
-				for (uint32_t k = 0; k < g->dim; k++) {
-					at[k] = cell[k] + step[k];
-					beyond = beyond || (!g->periodic[k] && (at[k] < 0 || at[k] >= g->cells[k]));
-				}
-				quern_grid_cursor near = home;
-				const int32_t c =
-					beyond || !quern_grid_bring_back(g, at) ? -1 : quern_grid_entry_near(g, &near, at);
-				if (!beyond) room += d->full * (c >= 0 ? d->open[c] : 1);
+				int32_t c;
+				if (!find_around(d, block, cell, (int[3]) { x, y, z }, &c)) continue;
+				room += d->full * (c >= 0 ? d->open[c] : 1);
 				if (c >= 0) holds += cell_holds(d, (uint32_t)c);
 			}
 	return room > 0 ? holds / room : 0;
@@ -46,21 +46,15 @@ static quern_real crowding_of(const update *d, uint32_t block, const int32_t cel
 /* Whether material is all around a cell, two cells far: its surface, or spray, says nothing of how densely it lies. What is beyond a face, or behind the surface of
  * a body, does not count. */
 static bool is_within(const update *d, uint32_t block, uint32_t c) {
-	const quern_grid_view *g = d->g;
-	quern_grid_cursor home = { .block = (int32_t)block };
-	const int depth = g->dim == 3 ? FAR : 0;
-	int32_t cell[3];
-	if (!(d->mass[c] > 0) || d->open[c] < 1 || !quern_grid_cell_of(g, c, cell)) return false;
-	memcpy(home.at, g->at[block], sizeof home.at);
+	const int depth = d->s->dim == 3 ? FAR : 0;
+	int32_t cell[3], i;
+	if (!(d->mass[c] > 0) || d->open[c] < 1 || !quern_grid_cell_of(d->g, c, cell)) return false;
 	for (int z = -depth; z <= depth; z++)
 		for (int y = -FAR; y <= FAR; y++)
-			for (int x = -FAR; x <= FAR; x++) {
-				int32_t at[3] = { cell[0] + x, cell[1] + y, cell[2] + z };
-				quern_grid_cursor near = home;
-				if (!quern_grid_bring_back(g, at)) continue;
-				const int32_t i = quern_grid_entry_near(g, &near, at);
-				if (i < 0 || (d->open[i] > least_open && !(d->mass[i] > 0))) return false;
-			}
+			for (int x = -FAR; x <= FAR; x++)
+				if (find_around(d, block, cell, (int[3]) { x, y, z }, &i) &&
+					(i < 0 || (d->open[i] > least_open && !(d->mass[i] > 0))))
+					return false;
 	return true;
 }
 
@@ -103,10 +97,10 @@ static void set_full(const update *d, const bulk *continuum, const bulk *all) {
 /* Grains settle more densely or more loosely than the scene's continuum: what they were like when there first was one is full. */
 static quern_status measure_full(const update *d) {
 	bulk continuum = { .crowding = 0 }, all = { .crowding = 0 };
-	looking w = { d, d->s->host->memory(d->s->run, (size_t)d->n_cells + 1) };
 	bool any = false;
 	for (uint32_t c = 0; c < d->n_cells; c++) any = any || is_continuum(d, c);
 	if (!any) return QUERN_OK;
+	looking w = { d, d->s->host->memory(d->s->run, (size_t)d->n_cells + 1) };
 	if (!w.within) return QUERN_E_MEMORY;
 	d->s->host->parallel(d->s->run, d->g->n_blocks, look_at_block, &w);
 	for (uint32_t q = 0; q < d->n_cells; q++) {
