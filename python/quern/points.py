@@ -42,7 +42,7 @@ def combinations(study: Study, names: list[str] | None = None) -> list[dict[str,
 
 
 def jobs_of(study: Study) -> list[Job]:
-    """The runs of the reference, then those of the points, seeds innermost: they settle for those that come after."""
+    """The runs of the reference, then those of the points, seeds innermost."""
     scene = scene_digest(study.base)
     found = []
     parts = [(study.reference, combinations(study, list(study.follows)))] if study.reference and not study.closed else []
@@ -54,6 +54,13 @@ def jobs_of(study: Study) -> list[Job]:
                 values = tuple((name, value.label) for name, value in point.items())
                 found.append(Job(number, model, seed, values, tuple(sets), key_of(study, scene, sets)))
     return found
+
+
+def in_turn(jobs: list[Job]) -> list[int]:
+    """Which is begun when, counted from 0. The reference comes first, since it may settle for the others; then all points with one seed, all
+    with the next. What the machine does for a minute then does not fall on one point alone."""
+    seeds = {seed: turn for turn, seed in enumerate(dict.fromkeys(job.seed for job in jobs))}
+    return sorted(range(len(jobs)), key=lambda k: -1 if jobs[k].model else seeds[jobs[k].seed])
 
 
 # ---- keys ----

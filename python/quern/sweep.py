@@ -16,7 +16,7 @@ import sys
 from typing import NoReturn
 
 from . import workers
-from .points import Job, jobs_of, program_digests
+from .points import Job, in_turn, jobs_of, program_digests
 from .program import QuernError, sentence_of
 from .reader import StudyError
 from .study import Study, read
@@ -56,7 +56,7 @@ def program() -> list[str]:
     return [os.path.abspath(sys.argv[0])]
 
 
-def emit(study: Study, folder: pathlib.Path, count: int, form: str) -> str:
+def emit(study: Study, folder: pathlib.Path, jobs: list[Job], form: str) -> str:
     """The study as work for another program: a command for each run, then `--table` gathers."""
     paths = [*program(), str(study.path.resolve()), str(folder.resolve())]
     for path in paths:
@@ -64,10 +64,10 @@ def emit(study: Study, folder: pathlib.Path, count: int, form: str) -> str:
             raise QuernError(f"--emit: the path {path!r} has a character that a line of commands cannot hold; give files and folder other names")
     command = shlex.join(program() + [str(study.path.resolve()), "-o", str(folder.resolve())])
     if form == "parallel":
-        return "".join(f"{command} --quiet --only {k + 1}\n" for k in range(count))
+        return "".join(f"{command} --quiet --only {k + 1}\n" for k in in_turn(jobs))
     minutes = [f"#SBATCH --time={math.ceil(study.limit / 60) + 1}"] if math.isfinite(study.limit) else []
     most = f"%{study.jobs}" if study.jobs else ""
-    return "\n".join(["#!/bin/sh", f"#SBATCH --job-name={shlex.quote(study.name)}", f"#SBATCH --array=1-{count}{most}",
+    return "\n".join(["#!/bin/sh", f"#SBATCH --job-name={shlex.quote(study.name)}", f"#SBATCH --array=1-{len(jobs)}{most}",
                       f"#SBATCH --cpus-per-task={study.threads}", *minutes, f"# when all are done: {command} --table",
                       f'exec {command} --quiet --only "$SLURM_ARRAY_TASK_ID"', ""])
 
@@ -100,7 +100,7 @@ def held(folder: pathlib.Path, key: str = ""):
 def make(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.Namespace, stop: int) -> bool:
     """Makes what is not recorded; False if somebody interrupted it."""
     digests = program_digests()
-    left = {job.key: job for job in jobs if not workers.is_recorded(folder, job, study, digests, options.retry)}
+    left = {job.key: job for job in (jobs[k] for k in in_turn(jobs)) if not workers.is_recorded(folder, job, study, digests, options.retry)}
     if not options.quiet and len(left) < len(jobs):
         print(f"{len(jobs) - len(left)} of {len(jobs)} runs are there already", file=sys.stderr)
 
@@ -118,7 +118,7 @@ def sweep(study: Study, options: argparse.Namespace, stop: int) -> int:
     jobs = jobs_of(study)
     folder = pathlib.Path(options.output or pathlib.Path("out") / study.name).resolve()
     if options.emit:
-        print(emit(study, folder, len(jobs), options.emit), end="")
+        print(emit(study, folder, jobs, options.emit), end="")
         return 0
     if options.only is not None:
         if not 1 <= options.only <= len(jobs):

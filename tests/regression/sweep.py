@@ -217,6 +217,19 @@ def check_samples(here):
     print(f"ok  samples: mean of the logarithm {logs.mean():.3f} of 6, spread {logs.std():.3f} of {4 / 12 ** 0.5:.3f}")
 
 
+def check_order(here):
+    """No point has its costs measured in one stretch of time: all points are made with one seed, then all with the next, for GNU parallel too."""
+    path = write(here, "order", set={"time.end": "1 ms"}, repeats={"seeds": [7, 4]}, jobs=1, reference={"name": "hard", "set": {}},
+                 axes={"restitution": {"key": "grains.contact.linear.restitution", "list": [0.5, 0.7, 0.9]}},
+                 measure=[{"name": "mass", "summary": "sums.mass"}])
+    lines = subprocess.run(words_of(path, here / "order", "--emit", "parallel"), capture_output=True, text=True, check=True).stdout.splitlines()
+    begun = [line.split(": ")[1] for line in sweep(path, here / "order").splitlines() if "] done: " in line]
+    points = [f"restitution {e}, seed {seed}" for seed in (7, 4) for e in (0.5, 0.7, 0.9)]
+    assert begun == ["hard, seed 7", "hard, seed 4", *points], begun
+    assert [int(line.split()[-1]) for line in lines] == [1, 2, 3, 5, 7, 4, 6, 8], lines
+    print("ok  the reference is made first, then all points with one seed, then with the next")
+
+
 def check_emit(here):
     path = write(here, "emit", set={"time.end": "1 ms"}, repeats={"seeds": 3}, limit="10 min", jobs=2)
     sweep(path, here / "own")
@@ -434,7 +447,7 @@ def check_names(here):
 
 # those that mostly wait go on beside the others; what a sweep costs is measured alone
 WAITING = (check_ends, check_slurm, check_lock)
-OTHERS = (check_physics, check_kills, check_again, check_samples, check_emit, check_only, check_full, check_memory, check_names, check_settled)
+OTHERS = (check_physics, check_kills, check_again, check_samples, check_order, check_emit, check_only, check_full, check_memory, check_names, check_settled)
 
 
 def check_all(place, checks):
