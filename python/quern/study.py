@@ -47,6 +47,7 @@ class Study:
     sets: Sets = ()
     axes: list[Axis] = field(default_factory=list)
     seeds: list[int] = field(default_factory=list)
+    timings: int = 1  # how often each run is made, for what it costs
     reference: str = ""
     reference_sets: Sets = ()
     follows: tuple[str, ...] = ()
@@ -166,12 +167,16 @@ def read_axes(reader: Reader, node: yaml.Node) -> list[Axis]:
     return axes
 
 
-def read_seeds(reader: Reader, node: yaml.Node) -> list[int]:
-    found = reader.mapping(node, "repeats", ("seeds",))
-    reader.require(node, found, "repeats: ", {"seeds": "how many or which: 3 or [1, 2, 3]"})
-    if "seeds" not in found:
-        return []
-    value = found["seeds"][1]
+def read_repeats(reader: Reader, node: yaml.Node, study: Study) -> None:
+    found = reader.mapping(node, "repeats", ("seeds", "timings"))
+    if "timings" in found:
+        study.timings = reader.whole(found["timings"][1], "repeats.timings", 1, 100)
+    else:
+        reader.require(node, found, "repeats: ", {"seeds": "how many or which: 3 or [1, 2, 3]"})
+    study.seeds = read_seeds(reader, found["seeds"][1]) if "seeds" in found else []
+
+
+def read_seeds(reader: Reader, value: yaml.Node) -> list[int]:
     if not isinstance(value, yaml.SequenceNode):
         return list(range(1, reader.whole(value, "repeats.seeds", 1, 10_000) + 1))
     seeds = [reader.whole(item, "repeats.seeds", 0, 2**53) for item in reader.items(value, "repeats.seeds", "whole numbers")]
@@ -238,7 +243,8 @@ def read_tree(reader: Reader, root: yaml.Node, path: pathlib.Path) -> Study:
     study.measures = read_measures(reader, parts["measure"], [axis.name for axis in study.axes]) if "measure" in parts else []
     if "reference" in parts:
         read_reference(reader, parts["reference"], study, len(reader.faults) == before)
-    study.seeds = read_seeds(reader, parts["repeats"]) if "repeats" in parts else []
+    if "repeats" in parts:
+        read_repeats(reader, parts["repeats"], study)
     if "front" in parts:
         study.front = reader.choice(parts["front"], "front", FRONTS)
     study.jobs = reader.whole(parts["jobs"], "jobs", 1, 10_000) if "jobs" in parts else 0

@@ -98,20 +98,27 @@ def held(folder: pathlib.Path, key: str = ""):
 
 
 def make(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.Namespace, stop: int) -> bool:
-    """Makes what is not recorded; False if somebody interrupted it."""
-    digests = program_digests()
-    left = {job.key: job for job in (jobs[k] for k in in_turn(jobs)) if not workers.is_recorded(folder, job, study, digests, options.retry)}
-    if not options.quiet and len(left) < len(jobs):
+    """Makes what is not recorded, then all again as often as costs are timed; False if somebody interrupted it."""
+    digests, at_once = program_digests(), at_a_time(study, options.jobs)
+    return all(make_round(study, jobs, folder, options, stop, digests, at_once, times) for times in range(1, study.timings + 1))
+
+
+def make_round(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.Namespace, stop: int, digests: dict[str, str],
+               at_once: int, times: int) -> bool:
+    """Makes each run that has not been made so many times."""
+    order = [jobs[k] for k in in_turn(jobs)]
+    left = {job.key: job for job in order if not workers.is_timed(folder, job, study, digests, options.retry and times == 1, times)}
+    if not options.quiet and len(left) < len(jobs) and times == 1:
         print(f"{len(jobs) - len(left)} of {len(jobs)} runs are there already", file=sys.stderr)
 
     def say(job: Job, record: dict) -> None:
         say.done += 1
         if not options.quiet:
             word = record["message"].splitlines()[0] if record["message"] else f"{record['cost']['wall']:.1f} s"
+            word += f", timing {times} of {study.timings}" * (times > 1)
             print(f"[{say.done}/{len(left)}] {record['status']}: {job}: {word}", file=sys.stderr, flush=True)
     say.done = 0
-    return workers.run_all(study, list(left.values()), folder, at_a_time(study, options.jobs), digests, say, stop,
-                           workers.largest_known(jobs, folder))
+    return workers.run_all(study, list(left.values()), folder, at_once, digests, say, stop, workers.largest_known(jobs, folder), times > 1)
 
 
 def sweep(study: Study, options: argparse.Namespace, stop: int) -> int:

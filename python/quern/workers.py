@@ -29,6 +29,7 @@ class Active:
     began: float
     ends: float  # when the next signal is due
     asked: bool = False  # it was asked to end
+    earlier: dict | None = None  # the record of the same run, made before
 
 
 def record_path(folder: pathlib.Path, key: str) -> pathlib.Path:
@@ -43,6 +44,8 @@ def recorded(folder: pathlib.Path, key: str) -> dict | None:
     record = read_json(record_path(folder, key))
     if not all(isinstance(record.get(name, ()), kind) for name, kind in RECORD.items()):
         return None
+    if not isinstance(record.get("timings"), int):
+        record["timings"] = 1  # as before they were counted
     whole = all(isinstance(cost, (int, float)) for cost in record["cost"].values())
     return record if whole and all(isinstance(one, str) for one in record["made_by"].values()) else None
 
@@ -59,13 +62,26 @@ def is_recorded(folder: pathlib.Path, job: Job, study: Study, digests: dict[str,
     return not retry and record["exit"] != NO_FILES
 
 
+def timings_wanted(study: Study, job: Job) -> int:
+    """The reference is timed as often as points only where costs are shown beside its own: it may take longer than all of them."""
+    return study.timings if not job.model or any(chart.relative_cost for chart in study.charts) else 1
+
+
+def is_timed(folder: pathlib.Path, job: Job, study: Study, digests: dict[str, str], retry: bool, times: int) -> bool:
+    """True if nothing is to be done so that the run has been made `times` times, or as often as it is wanted."""
+    if not is_recorded(folder, job, study, digests, retry):
+        return False
+    record = recorded(folder, job.key)
+    return record["status"] != "done" or record["timings"] >= min(times, timings_wanted(study, job))
+
+
 def end_with_parent() -> None:
     """In the child, before the program takes its place: a sweep that is killed leaves no runs behind that hold their folders."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
-def start(study: Study, job: Job, folder: pathlib.Path) -> Active:
-    runs = folder / "runs"
+def start(study: Study, job: Job, folder: pathlib.Path, again: bool) -> Active:
+    runs, earlier = folder / "runs", recorded(folder, job.key) if again else None
     record_path(folder, job.key).unlink(missing_ok=True)  # what it says will not be true of what stands there
     command = [find(), "run", str(study.base.resolve()), "--quiet", "--force", "--threads", str(study.threads),
                "-o", str(runs / job.key), *set_options(job.sets)]
@@ -73,7 +89,7 @@ def start(study: Study, job: Job, folder: pathlib.Path) -> Active:
         process = subprocess.Popen(command, cwd=study.path.parent.resolve(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                    stderr=said, preexec_fn=end_with_parent)
     now = time.monotonic()
-    return Active(job, process, now, now + study.limit)
+    return Active(job, process, now, now + study.limit, earlier=earlier)
 
 
 def remind(fd: int, active: Active) -> None:
@@ -126,10 +142,13 @@ def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str
     note.unlink()
     summary = read_json(folder / "runs" / key / "summary.json") if word == "done" else {}
     processor = usage.ru_utime + usage.ru_stime
+    cost = {"wall": wall, "processor": processor, "running": running_of(summary, processor), "memory": usage.ru_maxrss * 1024}
+    earlier = active.earlier if word == "done" else None
+    if earlier:  # the same work: what it took longer was other programs'
+        cost = {name: min(value, earlier["cost"].get(name, value)) for name, value in cost.items()}
     record = {"status": word, "exit": "" if active.asked else code if code >= 0 else 128 - code, "message": message,
               "limit": None if math.isinf(study.limit) else study.limit, "job": str(active.job), "sets": active.job.sets,
-              "cost": {"wall": wall, "processor": processor, "running": running_of(summary, processor), "memory": usage.ru_maxrss * 1024},
-              "machine": machine(),
+              "cost": cost, "timings": 1 + (earlier["timings"] if earlier else 0), "machine": machine(),
               "made_by": {path: digests.get(path) or digest(pathlib.Path(path).read_bytes()) for path in sorted(used_by(summary, digests))}}
     if word != "interrupted":
         save(record_path(folder, key), json.dumps(record, indent=1))
@@ -177,15 +196,15 @@ def wait(active: dict[int, Active], stop: int) -> list[int]:
 
 
 def run_all(study: Study, jobs: list[Job], folder: pathlib.Path, at_a_time: int, digests: dict[str, str],
-            say: Callable[[Job, dict], None], stop: int, largest: float = 0) -> bool:
+            say: Callable[[Job, dict], None], stop: int, largest: float = 0, again: bool = False) -> bool:
     """Makes the runs; False if they were interrupted, as they are once `stop` can be read. Another one is started while cores are free,
-    and while memory is left for the largest that there was, `largest` bytes in earlier ones."""
+    and while memory is left for the largest that there was, `largest` bytes in earlier ones. `again`: for their costs alone."""
     (folder / "runs").mkdir(exist_ok=True)
     waiting, active, whole = list(reversed(jobs)), {}, True
     try:
         while waiting or active:
             while waiting and len(active) < at_a_time and (not active or has_room(active, largest)):
-                one = start(study, waiting.pop(), folder)
+                one = start(study, waiting.pop(), folder, again)
                 active[os.pidfd_open(one.process.pid)] = one
             over = wait(active, stop)
             if stop in over:

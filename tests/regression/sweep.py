@@ -4,6 +4,7 @@ made again and what is not; sampled axes; errors against a reference; the same w
 import contextlib
 import concurrent.futures
 import csv
+import json
 import math
 import os
 import pathlib
@@ -230,6 +231,27 @@ def check_order(here):
     print("ok  the reference is made first, then all points with one seed, then with the next")
 
 
+def check_timings(here):
+    """A run is made as often as costs are timed, all of them in turn, and costs what it did when it took least; it may be timed once more later."""
+    study = {"set": {"time.end": "1 ms"}, "repeats": {"seeds": 2, "timings": 3}, "axes": {"restitution": {"key": "grains.contact.linear.restitution", "list": [0, 0.5]}},
+             "reference": {"name": "hard", "set": {}}, "measure": [{"name": "mass", "summary": "sums.mass"}], "jobs": 2}
+    out = here / "timings"
+    said = sweep(write(here, "timings", **study), out, status=0)
+    # a restitution of 0 is refused: two references once, two points three times, two points once
+    assert made(said) == 2 + 2 * 3 and said.count("] refused: ") == 2 and said.count("timing 3 of 3") == 2, said
+    rows = [row for row in table(out) if row["status"] == "done"]
+    records = {row["run"]: json.loads((out / "runs" / f"{row['run']}.json").read_text()) for row in rows}
+    assert [records[row["run"]]["timings"] for row in rows] == [1, 1, 3, 3], records
+    points = [row["run"] for row in rows if not row["model"]]
+    for run, seconds in zip(points, (1e-9, 1e9)):
+        (out / "runs" / f"{run}.json").write_text(json.dumps(records[run] | {"cost": {name: seconds for name in records[run]["cost"]}}))
+    before = results(out)
+    assert made(sweep(write(here, "timings", **study | {"repeats": {"seeds": 2, "timings": 4}}), out)) == 2
+    cheap, dear = (float(row["cost.processor"]) for row in table(out) if row["run"] in points)
+    assert cheap == 1e-9 and 0 < dear < 60 and results(out) == before, (cheap, dear)
+    print("ok  runs are timed as often as is asked, all in turn, and cost the least that they took")
+
+
 def check_emit(here):
     path = write(here, "emit", set={"time.end": "1 ms"}, repeats={"seeds": 3}, limit="10 min", jobs=2)
     sweep(path, here / "own")
@@ -447,7 +469,7 @@ def check_names(here):
 
 # those that mostly wait go on beside the others; what a sweep costs is measured alone
 WAITING = (check_ends, check_slurm, check_lock)
-OTHERS = (check_physics, check_kills, check_again, check_samples, check_order, check_emit, check_only, check_full, check_memory, check_names, check_settled)
+OTHERS = (check_physics, check_kills, check_again, check_samples, check_order, check_timings, check_emit, check_only, check_full, check_memory, check_names, check_settled)
 
 
 def check_all(place, checks):
