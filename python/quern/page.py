@@ -222,7 +222,8 @@ def about_cost(made: Made) -> str:
     known = [cost for cost in made.runs["cost.processor"][one_each(made.runs["run"])] if math.isfinite(cost)]
     spent = math.fsum(known)
     took = f"{short(spent / 3600)} hours" if spent >= 360 else f"{short(spent)} s"
-    said = [f"{len(known)} run{'s' * (len(known) != 1)} took {took} of processor time."] if known else []
+    least = f", each counted at the least of {made.study.timings} times" * (made.study.timings > 1)
+    said = [f"{len(known)} run{'s' * (len(known) != 1)} took {took} of processor time{least}."] if known else []
     programs, machines = {}, {}
     for key in dict.fromkeys(made.runs["run"]):
         told = read_json(made.folder / "runs" / key / "summary.json").get("provenance")

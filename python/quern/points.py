@@ -57,10 +57,10 @@ def jobs_of(study: Study) -> list[Job]:
 
 
 def in_turn(jobs: list[Job]) -> list[int]:
-    """Which is begun when, counted from 0. The reference comes first, since it may settle for the others; then all points with one seed, all
-    with the next. What the machine does for a minute then does not fall on one point alone."""
+    """The places of jobs in the order in which they are begun: all with one seed, all with the next, the reference before the points, since it
+    may settle for them. What the machine does for a minute then does not fall on all seeds of one point."""
     seeds = {seed: turn for turn, seed in enumerate(dict.fromkeys(job.seed for job in jobs))}
-    return sorted(range(len(jobs)), key=lambda k: -1 if jobs[k].model else seeds[jobs[k].seed])
+    return sorted(range(len(jobs)), key=lambda k: (seeds[jobs[k].seed], not jobs[k].model))
 
 
 # ---- keys ----

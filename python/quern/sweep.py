@@ -65,7 +65,7 @@ def emit(study: Study, folder: pathlib.Path, jobs: list[Job], form: str) -> str:
     command = shlex.join(program() + [str(study.path.resolve()), "-o", str(folder.resolve())])
     if form == "parallel":
         return "".join(f"{command} --quiet --only {k + 1}\n" for k in in_turn(jobs))
-    minutes = [f"#SBATCH --time={math.ceil(study.limit / 60) + 1}"] if math.isfinite(study.limit) else []
+    minutes = [f"#SBATCH --time={math.ceil(study.limit * study.timings / 60) + 1}"] if math.isfinite(study.limit) else []
     most = f"%{study.jobs}" if study.jobs else ""
     return "\n".join(["#!/bin/sh", f"#SBATCH --job-name={shlex.quote(study.name)}", f"#SBATCH --array=1-{len(jobs)}{most}",
                       f"#SBATCH --cpus-per-task={study.threads}", *minutes, f"# when all are done: {command} --table",
@@ -98,7 +98,7 @@ def held(folder: pathlib.Path, key: str = ""):
 
 
 def make(study: Study, jobs: list[Job], folder: pathlib.Path, options: argparse.Namespace, stop: int) -> bool:
-    """Makes what is not recorded, then all again as often as costs are timed; False if somebody interrupted it."""
+    """Makes what is not recorded, then all again until each has been timed as often as is asked; False if somebody interrupted it."""
     digests, at_once = program_digests(), at_a_time(study, options.jobs)
     return all(make_round(study, jobs, folder, options, stop, digests, at_once, times) for times in range(1, study.timings + 1))
 

@@ -7,6 +7,7 @@ import math
 import os
 import pathlib
 import select
+import shutil
 import signal
 import subprocess
 import time
@@ -28,24 +29,23 @@ class Active:
     process: subprocess.Popen
     began: float
     ends: float  # when the next signal is due
+    place: pathlib.Path = pathlib.Path()  # its folder
+    earlier: dict | None = None  # the record of the same run, which is made again for its cost alone
     asked: bool = False  # it was asked to end
-    earlier: dict | None = None  # the record of the same run, made before
 
 
 def record_path(folder: pathlib.Path, key: str) -> pathlib.Path:
     return folder / "runs" / f"{key}.json"
 
 
-RECORD = {"status": str, "exit": (int, str), "message": str, "cost": dict, "made_by": dict, "limit": (int, float, type(None))}
+RECORD = {"status": str, "exit": (int, str), "message": str, "cost": dict, "timings": int, "made_by": dict, "limit": (int, float, type(None))}
 
 
 def recorded(folder: pathlib.Path, key: str) -> dict | None:
     """What is known of a run that is over; None if there is no record, or one that is damaged."""
-    record = read_json(record_path(folder, key))
+    record = {"timings": 1} | read_json(record_path(folder, key))
     if not all(isinstance(record.get(name, ()), kind) for name, kind in RECORD.items()):
         return None
-    if not isinstance(record.get("timings"), int):
-        record["timings"] = 1  # as before they were counted
     whole = all(isinstance(cost, (int, float)) for cost in record["cost"].values())
     return record if whole and all(isinstance(one, str) for one in record["made_by"].values()) else None
 
@@ -68,11 +68,13 @@ def timings_wanted(study: Study, job: Job) -> int:
 
 
 def is_timed(folder: pathlib.Path, job: Job, study: Study, digests: dict[str, str], retry: bool, times: int) -> bool:
-    """True if nothing is to be done so that the run has been made `times` times, or as often as it is wanted."""
-    if not is_recorded(folder, job, study, digests, retry):
-        return False
+    """True if the run has been made `times` times, or as often as is wanted of it. Beyond the first time none is made again that did not come to
+    its end, or that another machine has made."""
+    if times == 1:
+        return is_recorded(folder, job, study, digests, retry)
     record = recorded(folder, job.key)
-    return record["status"] != "done" or record["timings"] >= min(times, timings_wanted(study, job))
+    here = record and record["status"] == "done" and record.get("machine") == machine()
+    return not here or record["timings"] >= min(times, timings_wanted(study, job))
 
 
 def end_with_parent() -> None:
@@ -81,15 +83,17 @@ def end_with_parent() -> None:
 
 
 def start(study: Study, job: Job, folder: pathlib.Path, again: bool) -> Active:
-    runs, earlier = folder / "runs", recorded(folder, job.key) if again else None
-    record_path(folder, job.key).unlink(missing_ok=True)  # what it says will not be true of what stands there
+    earlier = recorded(folder, job.key) if again else None
+    place = folder / "runs" / (job.key + ".again" * bool(earlier))
+    if not earlier:
+        record_path(folder, job.key).unlink(missing_ok=True)  # what it says will not be true of what stands there
     command = [find(), "run", str(study.base.resolve()), "--quiet", "--force", "--threads", str(study.threads),
-               "-o", str(runs / job.key), *set_options(job.sets)]
-    with open(runs / f"{job.key}.err", "wb") as said:
+               "-o", str(place), *set_options(job.sets)]
+    with open(f"{place}.err", "wb") as said:
         process = subprocess.Popen(command, cwd=study.path.parent.resolve(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                    stderr=said, preexec_fn=end_with_parent)
     now = time.monotonic()
-    return Active(job, process, now, now + study.limit, earlier=earlier)
+    return Active(job, process, now, now + study.limit, place, earlier)
 
 
 def remind(fd: int, active: Active) -> None:
@@ -136,23 +140,30 @@ def finish(study: Study, active: Active, folder: pathlib.Path, digests: dict[str
     """Waits for a run that has ended and records it; one that somebody has interrupted is not recorded."""
     _, status, usage = os.wait4(active.process.pid, 0)
     code = active.process.returncode = os.waitstatus_to_exitcode(status)
-    wall, key = time.monotonic() - active.began, active.job.key
-    note = folder / "runs" / f"{key}.err"
+    wall, note = time.monotonic() - active.began, pathlib.Path(f"{active.place}.err")
     word, message = message_of(active, code, note.read_text(encoding="utf-8", errors="replace"), study)
     note.unlink()
-    summary = read_json(folder / "runs" / key / "summary.json") if word == "done" else {}
+    summary = read_json(active.place / "summary.json") if word == "done" else {}
     processor = usage.ru_utime + usage.ru_stime
-    cost = {"wall": wall, "processor": processor, "running": running_of(summary, processor), "memory": usage.ru_maxrss * 1024}
-    earlier = active.earlier if word == "done" else None
-    if earlier:  # the same work: what it took longer was other programs'
-        cost = {name: min(value, earlier["cost"].get(name, value)) for name, value in cost.items()}
     record = {"status": word, "exit": "" if active.asked else code if code >= 0 else 128 - code, "message": message,
               "limit": None if math.isinf(study.limit) else study.limit, "job": str(active.job), "sets": active.job.sets,
-              "cost": cost, "timings": 1 + (earlier["timings"] if earlier else 0), "machine": machine(),
+              "cost": {"wall": wall, "processor": processor, "running": running_of(summary, processor), "memory": usage.ru_maxrss * 1024},
+              "timings": 1, "machine": machine(),
               "made_by": {path: digests.get(path) or digest(pathlib.Path(path).read_bytes()) for path in sorted(used_by(summary, digests))}}
+    if active.earlier:
+        shutil.rmtree(active.place, ignore_errors=True)
     if word != "interrupted":
-        save(record_path(folder, key), json.dumps(record, indent=1))
+        save(record_path(folder, active.job.key), json.dumps(timed(active.earlier, record) if active.earlier else record, indent=1))
     return record
+
+
+def timed(earlier: dict, again: dict) -> dict:
+    """The earlier record, once the same run was made again: other programs make it take longer, and push it out of memory. One that does not come
+    to its end this time says nothing."""
+    found = earlier | {"timings": earlier["timings"] + 1}
+    if again["status"] == "done":
+        found["cost"] = {name: (max if name == "memory" else min)(cost, again["cost"].get(name, cost)) for name, cost in earlier["cost"].items()}
+    return found
 
 
 def save(path: pathlib.Path, text: str) -> None:

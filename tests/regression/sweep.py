@@ -225,30 +225,44 @@ def check_order(here):
                  measure=[{"name": "mass", "summary": "sums.mass"}])
     lines = subprocess.run(words_of(path, here / "order", "--emit", "parallel"), capture_output=True, text=True, check=True).stdout.splitlines()
     begun = [line.split(": ")[1] for line in sweep(path, here / "order").splitlines() if "] done: " in line]
-    points = [f"restitution {e}, seed {seed}" for seed in (7, 4) for e in (0.5, 0.7, 0.9)]
-    assert begun == ["hard, seed 7", "hard, seed 4", *points], begun
-    assert [int(line.split()[-1]) for line in lines] == [1, 2, 3, 5, 7, 4, 6, 8], lines
-    print("ok  the reference is made first, then all points with one seed, then with the next")
+    assert begun == [f"{one}, seed {seed}" for seed in (7, 4) for one in ("hard", *(f"restitution {e}" for e in (0.5, 0.7, 0.9)))], begun
+    assert [int(line.split()[-1]) for line in lines] == [1, 3, 5, 7, 2, 4, 6, 8], lines
+    print("ok  all points are made with one seed, then with the next, the reference before them")
 
 
 def check_timings(here):
-    """A run is made as often as costs are timed, all of them in turn, and costs what it did when it took least; it may be timed once more later."""
+    """A run is made as often as costs are timed, all of them in turn, and costs the least that it took; it may be timed once more later. What a
+    timing meets takes no result away."""
     study = {"set": {"time.end": "1 ms"}, "repeats": {"seeds": 2, "timings": 3}, "axes": {"restitution": {"key": "grains.contact.linear.restitution", "list": [0, 0.5]}},
-             "reference": {"name": "hard", "set": {}}, "measure": [{"name": "mass", "summary": "sums.mass"}], "jobs": 2}
-    out = here / "timings"
-    said = sweep(write(here, "timings", **study), out, status=0)
+             "reference": {"name": "as it is", "set": {"grains.contact.linear.restitution": 0.3}}, "measure": [{"name": "mass", "summary": "sums.mass"}], "jobs": 2}
+    (here / "wrapped").write_text(f'#!/bin/sh\n[ "$1" = run ] && [ -e {here}/full ] && echo "quern: error: no space left" >&2 && exit 4\nexec {lab.QUERN} "$@"\n')
+    (here / "wrapped").chmod(0o755)
+    out, env = here / "timings", {**os.environ, "QUERN": str(here / "wrapped")}
+    said = sweep(write(here, "timings", **study), out, env=env)
     # a restitution of 0 is refused: two references once, two points three times, two points once
     assert made(said) == 2 + 2 * 3 and said.count("] refused: ") == 2 and said.count("timing 3 of 3") == 2, said
+    turns = [line[-6] for line in said.splitlines() if line.endswith(" of 3")]
+    assert turns == ["2", "2", "3", "3"], said
     rows = [row for row in table(out) if row["status"] == "done"]
     records = {row["run"]: json.loads((out / "runs" / f"{row['run']}.json").read_text()) for row in rows}
     assert [records[row["run"]]["timings"] for row in rows] == [1, 1, 3, 3], records
     points = [row["run"] for row in rows if not row["model"]]
     for run, seconds in zip(points, (1e-9, 1e9)):
         (out / "runs" / f"{run}.json").write_text(json.dumps(records[run] | {"cost": {name: seconds for name in records[run]["cost"]}}))
+    del records[rows[0]["run"]]["timings"]  # as records of before have none
+    (out / "runs" / f"{rows[0]['run']}.json").write_text(json.dumps(records[rows[0]["run"]]))
     before = results(out)
-    assert made(sweep(write(here, "timings", **study | {"repeats": {"seeds": 2, "timings": 4}}), out)) == 2
-    cheap, dear = (float(row["cost.processor"]) for row in table(out) if row["run"] in points)
-    assert cheap == 1e-9 and 0 < dear < 60 and results(out) == before, (cheap, dear)
+    assert made(sweep(write(here, "timings", **study | {"repeats": {"seeds": 2, "timings": 4}}), out, env=env)) == 2
+    cheap, dear = ([float(row[f"cost.{name}"]) for name in ("processor", "memory")] for row in table(out) if row["run"] in points)
+    assert cheap[0] == 1e-9 and cheap[1] > 1e6 and 0 < dear[0] < 60 and dear[1] == 1e9 and results(out) == before, (cheap, dear)
+    (here / "full").touch()
+    chart = {"charts": [{"name": "front", "kind": "front", "measure": "mass", "relative_cost": True}]}
+    said = sweep(write(here, "timings", **study | {"repeats": {"seeds": 2, "timings": 5}}, **chart), out, env=env)
+    assert said.count("] failed: ") == 2 * 4 + 2 and results(out) == before, said  # the reference counts now, and is timed four times
+    (here / "full").unlink()
+    single = sweep(write(here, "single", **study | {"axes": {}, "repeats": {"timings": 2}}), here / "single", "--only", "2", env=env)
+    assert made(single) == 2 and "timing 2 of 2" in single, single
+    assert not list(out.rglob("*.again")) and not list(out.rglob("*.err"))
     print("ok  runs are timed as often as is asked, all in turn, and cost the least that they took")
 
 
