@@ -218,6 +218,13 @@ def check_samples(here):
     print(f"ok  samples: mean of the logarithm {logs.mean():.3f} of 6, spread {logs.std():.3f} of {4 / 12 ** 0.5:.3f}")
 
 
+def disk_of(here):
+    """The environment of a sweep whose runs find the disk full while there is a file `full`."""
+    (here / "wrapped").write_text(f'#!/bin/sh\n[ "$1" = run ] && [ -e {here}/full ] && echo "quern: error: no space left" >&2 && exit 4\nexec {lab.QUERN} "$@"\n')
+    (here / "wrapped").chmod(0o755)
+    return {**os.environ, "QUERN": str(here / "wrapped")}
+
+
 def check_order(here):
     """No point has its costs measured in one stretch of time: all points are made with one seed, then all with the next, for GNU parallel too."""
     path = write(here, "order", set={"time.end": "1 ms"}, repeats={"seeds": [7, 4]}, jobs=1, reference={"name": "hard", "set": {}},
@@ -235,9 +242,7 @@ def check_timings(here):
     timing meets takes no result away."""
     study = {"set": {"time.end": "1 ms"}, "repeats": {"seeds": 2, "timings": 3}, "axes": {"restitution": {"key": "grains.contact.linear.restitution", "list": [0, 0.5]}},
              "reference": {"name": "as it is", "set": {"grains.contact.linear.restitution": 0.3}}, "measure": [{"name": "mass", "summary": "sums.mass"}], "jobs": 2}
-    (here / "wrapped").write_text(f'#!/bin/sh\n[ "$1" = run ] && [ -e {here}/full ] && echo "quern: error: no space left" >&2 && exit 4\nexec {lab.QUERN} "$@"\n')
-    (here / "wrapped").chmod(0o755)
-    out, env = here / "timings", {**os.environ, "QUERN": str(here / "wrapped")}
+    out, env = here / "timings", disk_of(here)
     said = sweep(write(here, "timings", **study), out, env=env)
     # a restitution of 0 is refused: two references once, two points three times, two points once
     assert made(said) == 2 + 2 * 3 and said.count("] refused: ") == 2 and said.count("timing 3 of 3") == 2, said
@@ -420,10 +425,8 @@ def check_only(here):
 
 def check_full(here):
     """A run that a full disk ended is made again by the next sweep."""
-    (here / "wrapped").write_text(f'#!/bin/sh\n[ "$1" = run ] && [ -e {here}/full ] && echo "quern: error: no space left" >&2 && exit 4\nexec {lab.QUERN} "$@"\n')
-    (here / "wrapped").chmod(0o755)
     (here / "full").touch()
-    path, env = write(here, "disk", set={"time.end": "1 ms"}, repeats={"seeds": 2}), {**os.environ, "QUERN": str(here / "wrapped")}
+    path, env = write(here, "disk", set={"time.end": "1 ms"}, repeats={"seeds": 2}), disk_of(here)
     sweep(path, here / "disk", env=env)
     assert [(row["status"], row["exit"], row["message"]) for row in table(here / "disk")] == [("failed", "4", "no space left")] * 2
     (here / "full").unlink()
