@@ -13,8 +13,6 @@ enum {
 
 /* A cell that bodies leave less of has too little in it to be measured. */
 static const quern_real least_open = 0.5;
-/* Crowding that is more comes of what waits for room. */
-static const quern_real most_told = 1.2;
 
 /* Entry of the cell that lies `step` from one of that block, -1 for none; false beyond a face. */
 static bool find_around(
@@ -80,21 +78,17 @@ typedef struct {
 
 static void add_to_bulk(const update *d, uint32_t c, bulk *sum) {
 	quern_hybrid_add_to_bed(d, c, &sum->bed);
-	sum->crowding += fmin(d->u[U_CROWDING].real[0][c], most_told);
+	sum->crowding += d->u[U_CROWDING].real[0][c];
 }
 
-/* Where sand moves or falls it may be looser than it will be: then no less than the continuum without stress, and as long as there is little continuum the densest that all
- * of it has been. */
-static void set_full(const update *d, const bulk *continuum, const bulk *all) {
-	quern_real *full = d->u[U_FULL].real[0];
-	const bool known = continuum->bed.cells >= ENOUGH, first = !(*full > 0);
-	const bulk *found = known ? continuum : all;
-	const quern_real mean = found->bed.cells >= ENOUGH ? found->crowding / found->bed.cells : 1;
-	*full = known && first && quern_hybrid_is_at_rest(d, &found->bed) ? mean : fmax(1, fmax(*full, mean));
-	d->u[U_FULL_RISING].index[0] = !known;
+/* How densely sand has settled says nothing of sand that moves, falls or is poured: for that it is the continuum without stress. */
+static quern_real full_of(const update *d, const bulk *found) {
+	const bool settled = found->bed.cells >= ENOUGH && quern_hybrid_is_at_rest(d, &found->bed);
+	return settled ? found->crowding / found->bed.cells : 1;
 }
 
-/* Grains settle more densely or more loosely than the scene's continuum: what they were like when there first was one is full. */
+/* Grains settle more densely or more loosely than the scene's continuum: what they were like when there first was one is full. Where that is of few cells, of one splash
+ * perhaps, all that lies within the material are asked. */
 static quern_status measure_full(const update *d) {
 	bulk continuum = { .crowding = 0 }, all = { .crowding = 0 };
 	bool any = false;
@@ -109,7 +103,7 @@ static quern_status measure_full(const update *d) {
 		add_to_bulk(d, c, &all);
 		if (is_continuum(d, c)) add_to_bulk(d, c, &continuum);
 	}
-	set_full(d, &continuum, &all);
+	d->u[U_FULL].real[0][0] = full_of(d, continuum.bed.cells >= ENOUGH ? &continuum : &all);
 	return QUERN_OK;
 }
 
@@ -128,6 +122,5 @@ static void crowd_block(void *arg, uint32_t b, uint32_t worker) {
 
 quern_status quern_hybrid_crowding(update *d) {
 	d->s->host->parallel(d->s->run, d->g->n_blocks, crowd_block, d);
-	const bool asked = !(d->u[U_FULL].real[0][0] > 0) || d->u[U_FULL_RISING].index[0];
-	return asked ? measure_full(d) : QUERN_OK;
+	return d->u[U_FULL].real[0][0] > 0 ? QUERN_OK : measure_full(d);
 }

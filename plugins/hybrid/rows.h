@@ -65,9 +65,7 @@
 	X(U_FULLNESS, "cell.fullness", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "What a cell itself held at the last update, over what fills its open room.") \
 	X(U_FULL, "total.full", "1", QUERN_UPDATE, QUERN_SCALAR, \
-		.doc = "Crowding within the material, when there first was a continuum, or the largest so far.") \
-	X(U_FULL_RISING, "total.full_rising", "1", QUERN_UPDATE, QUERN_INDEX, \
-		.doc = "1: little of the continuum has been within the material so far, and full may still rise.") \
+		.doc = "Crowding within the material, when there first was a continuum; 1 if that had not settled.") \
 	X(U_CARRIED, "cell.carried", "kg", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "What both clouds carry in a cell, mean over the last updates.") \
 	X(U_ROOM, "cell.room", "kg", QUERN_UPDATE, QUERN_SCALAR, \
