@@ -81,7 +81,7 @@ static void add_to_bulk(const update *d, uint32_t c, bulk *sum) {
 	sum->crowding += d->u[U_CROWDING].real[0][c];
 }
 
-/* How densely sand has settled says nothing of sand that moves, falls or is poured: for that it is the continuum without stress. */
+/* Sand that moves or falls, and a few cells, do not say how densely sand has settled: then it is the continuum without stress. */
 static quern_real full_of(const update *d, const bulk *found) {
 	const bool settled = found->bed.cells >= ENOUGH && quern_hybrid_is_at_rest(d, &found->bed);
 	return settled ? found->crowding / found->bed.cells : 1;

@@ -65,7 +65,7 @@
 	X(U_FULLNESS, "cell.fullness", "1", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "What a cell itself held at the last update, over what fills its open room.") \
 	X(U_FULL, "total.full", "1", QUERN_UPDATE, QUERN_SCALAR, \
-		.doc = "Crowding within the material, when there first was a continuum; 1 if that had not settled.") \
+		.doc = "Crowding within the material, when there first was a continuum; 1 if that had not settled, or was little.") \
 	X(U_CARRIED, "cell.carried", "kg", QUERN_UPDATE, QUERN_SCALAR, \
 		.doc = "What both clouds carry in a cell, mean over the last updates.") \
 	X(U_ROOM, "cell.room", "kg", QUERN_UPDATE, QUERN_SCALAR, \

@@ -62,7 +62,7 @@ def falling_is_not_full(place):
 
 
 def poured_is_not_full(place):
-    """Sand of a heap lies as it came to rest, a little denser than sand that flows."""
+    """Sand of a heap has not settled when its continuum begins. Once it lies, its cells are a little denser than the continuum without stress."""
     lab.run("pile", place / "poured", *lab.sets(time__end="0.95 s", output__fields="[total.full]"))
     value = full(place / "poured")
     print(f"full, of a heap: {value:.4f}")
