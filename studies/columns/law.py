@@ -11,7 +11,7 @@ The aspect is a = H/L with the width L of the column before the gate goes and H 
 which half of its mass lies; the run-out is r = (front - L)/L at the end. Broad columns: r = c a through a <= 2, with R^2 of that line. Slender ones:
 r = k a^n through a >= 4, by least squares of the logarithms. Errors are those over seeds, by leaving out one at a time (jackknife). `meet` is the aspect at
 which both laws say the same, `time` when the front has come 95 % of its way, in sqrt(H/g), for aspects
-of 1 and more."""
+of 1 and more. Seeds of which a column is missing, as where a sweep was stopped, are left out of the laws."""
 import argparse
 import csv
 import math
@@ -114,6 +114,12 @@ def cases_of(by):
     return {case for seeds in by.values() for columns in seeds.values() for case in columns}
 
 
+def whole_seeds(by):
+    """Methods and their seeds of which all columns are there."""
+    whole = {method: {seed: columns for seed, columns in seeds.items() if set(columns) == set(WIDTH)} for method, seeds in by.items()}
+    return {method: seeds for method, seeds in whole.items() if seeds}
+
+
 def cells_of(by):
     """Widths of cells in mm, the coarsest first."""
     return sorted({name.rpartition(", ")[2].removesuffix(" mm") for name in by}, key=float, reverse=True)
@@ -134,8 +140,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/columns")
     by = found(parser.parse_args().sweep)
-    if cases_of(by) == set(WIDTH):
-        print(table(by), end="")
+    if whole_seeds(by):
+        print(table(whole_seeds(by)), end="")
     if all(" mm" in name for name in by):
         print(f"\n{convergence(by)}", end="")
 
