@@ -76,6 +76,12 @@ typedef struct {
 	int stages, previous;
 } history;
 
+/* Each of a list's plugins takes what it changes for its own. */
+static bool share_state(const quern_plan_use *a, const quern_plan_use *b) {
+	return a->stage == b->stage && a->slot && a->slot == b->slot && a->slot->list && a->bound != b->bound &&
+		   a->row->access == QUERN_UPDATE && b->row->access == QUERN_UPDATE;
+}
+
 static void conflicts(quern_plan *p, const quern_field *field, const quern_plan_use *u, history *h) {
 	const quern_plan_use *last = h->last;
 	if (last && last->stage != u->stage) {
@@ -89,6 +95,10 @@ static void conflicts(quern_plan *p, const quern_field *field, const quern_plan_
 				"%s: %s and %s both change it and nothing says which comes first", field->name, last->owner,
 				u->owner);
 	}
+	if (last && share_state(last, u))
+		quern_report_add(p->scene->report, u->mark,
+			"%s: %s and %s are in one list and both change it, each as if it were its own", field->name,
+			last->owner, u->owner);
 	if (u->row->access == QUERN_ADD && h->fresh)
 		quern_report_add(p->scene->report, u->mark, "%s: %s adds to it after %s has read it", field->name,
 			u->owner, last->owner);

@@ -173,6 +173,7 @@ static quern_plan_bound *add_bound(quern_plan *p, const quern_slot *slot, const 
 		quern_plan_use *u =
 			add_use(p, row, slot ? stage_named(p, called) : stage, it->file->plugin.id, it->mark);
 		u->counts = u->stage >= 0 && (holds(it, row->when) || holds_refined(f, row->when, false));
+		u->slot = slot, u->bound = (int)p->n_bounds;
 		if (slot && slot->particle) rename_set(u, "particle", slot->particle);
 	}
 	if (slot && slot->repeat) {
@@ -184,6 +185,7 @@ static quern_plan_bound *add_bound(quern_plan *p, const quern_slot *slot, const 
 			const char *called = row->hook < 3 ? slot->stage[row->hook] : NULL;
 			quern_plan_use *u = add_use(p, row, stage_named(p, called), it->file->plugin.id, it->mark);
 			u->counts = u->stage >= 0 && holds_anywhere(f, row->when);
+			u->slot = slot, u->bound = (int)p->n_bounds;
 			rename_set(u, slot->repeat, slot->again);
 		}
 	}

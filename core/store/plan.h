@@ -9,8 +9,10 @@ typedef struct quern_plan_use {
 	char field[56];    /* "particle." and repeated sets resolved */
 	const char *owner; /* a stage, or a plugin in its slot */
 	quern_mark mark;
-	int stage;  /* -1: called by nobody here */
-	int target; /* index of its field in the store; -1: the row does not count */
+	int stage;              /* -1: called by nobody here */
+	int target;             /* index of its field in the store; -1: the row does not count */
+	const quern_slot *slot; /* in which its plugin sits; NULL: a stage's own, or an observer's */
+	int bound;              /* of the plan's plugins, the one that has it */
 	bool counts;
 } quern_plan_use;
 
