@@ -10,23 +10,32 @@
 enum { MOST_COLUMNS = 16, MOST_BYTES = 1 << 30 };
 static const char *const names[] = { "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "radius", "fixed",
 	"w", "material" };
-enum { COLUMN_RADIUS = 9, COLUMN_FIXED = 10, COLUMN_W = 11, COLUMN_MATERIAL = 12, N_NAMES = 13 };
+enum { COLUMN_WZ = 8, COLUMN_RADIUS, COLUMN_FIXED, COLUMN_W, COLUMN_MATERIAL, N_NAMES };
+/* By dimension, as bits: in the plane a grain turns about z alone, which may be called w. */
+static const uint32_t unknown[] = { 1u << 2 | 1u << 5 | 1u << 6 | 1u << 7, 1u << COLUMN_W };
 
 typedef struct {
 	const char *at, *end;
 	size_t line;
 } cursor;
 
-/* The next word of this line, or false at its end. */
+/* The next word of this line, or false at its end. What is too long is neither a number nor a name: it ends in "..". */
 static bool word(cursor *c, char out[64]) {
 	while (c->at < c->end && (*c->at == ' ' || *c->at == '\t' || *c->at == ',' || *c->at == '\r')) c->at++;
 	size_t n = 0;
 	while (c->at < c->end && !strchr(" \t,\r\n", *c->at) && *c->at) {
 		if (n < 63) out[n++] = *c->at;
+		else out[61] = out[62] = '.';
 		c->at++;
 	}
 	out[n] = 0;
 	return n > 0;
+}
+
+static bool holds_something(const cursor *c) {
+	const char *p = c->at;
+	while (p < c->end && (*p == ' ' || *p == '\t' || *p == '\r' || *p == ',')) p++;
+	return p < c->end && *p != '\n' && *p != '#';
 }
 
 /* Goes to the next line that holds something; false at the end. Whatever a word does not take ends the line. */
@@ -36,9 +45,7 @@ static bool next_line(cursor *c) {
 		if (c->at >= c->end) return false;
 		c->at++;
 		c->line++;
-		const char *p = c->at;
-		while (p < c->end && (*p == ' ' || *p == '\t' || *p == '\r' || *p == ',')) p++;
-		if (p < c->end && *p != '\n' && *p != '#') return true;
+		if (holds_something(c)) return true;
 	}
 }
 
@@ -49,12 +56,12 @@ static bool header(cursor *c, uint32_t dim, int column[MOST_COLUMNS], int *n, ch
 	while (word(c, text)) {
 		int k = 0;
 		while (k < N_NAMES && strcmp(names[k], text) != 0) k++;
-		if (k == N_NAMES || *n == MOST_COLUMNS) {
-			snprintf(why, 200,
-				"line %zu: unknown column '%.40s'; known: x y z vx vy vz wx wy wz w radius fixed material",
-				c->line, text);
+		if (k == N_NAMES || *n == MOST_COLUMNS || unknown[dim - 2] >> k & 1) {
+			snprintf(why, 200, "line %zu: unknown column '%.40s'; known: %s radius fixed material", c->line,
+				text, dim == 2 ? "x y vx vy w" : "x y z vx vy vz wx wy wz");
 			return false;
 		}
+		k = dim == 2 && k == COLUMN_WZ ? COLUMN_W : k;
 		if (seen & 1u << k) {
 			snprintf(why, 200, "line %zu: column '%s' stands twice", c->line, text);
 			return false;
@@ -108,7 +115,7 @@ static bool row(cursor *c, const dem *d, const int *column, int n, dem_place *g,
 bool quern_grain_table_read(const char *data, size_t length, const dem *d, grain_table *t, char why[200]) {
 	cursor c = { data, data + length, 1 };
 	int column[MOST_COLUMNS], n;
-	if (length && (*data == '\n' || *data == '#') && !next_line(&c)) {
+	if (length && !holds_something(&c) && !next_line(&c)) {
 		snprintf(why, 200, "the table is empty");
 		return false;
 	}
