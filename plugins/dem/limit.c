@@ -120,7 +120,8 @@ static void lightest_grains(const dem *d, const quern_step *s, lightest *of) {
 static contact_limit limit_of_two(const dem *d, const quern_step *s, const lightest *l, uint32_t k) {
 	const bool two = isfinite(l->mass[1]);
 	const quern_real pair = two ? l->mass[0] * l->mass[1] / (l->mass[0] + l->mass[1]) : l->mass[0];
-	contact_limit c = limit_of(s, pair, 0.5 * l->radius, d->pair[k][k], -1);
+	/* to a fixed grain, however large, one that touches it is as if it were a wall */
+	contact_limit c = limit_of(s, pair, two ? 0.5 * l->radius : l->radius, d->pair[k][k], -1);
 	const char *name = d->n_materials > 1 ? d->material[k].name : NULL;
 	snprintf(c.where, sizeof c.where,
 		two ? "between the two lightest grains%s%.40s" : "on the lightest grain%s%.40s", name ? " of " : "",
@@ -183,10 +184,12 @@ static quern_real limit_of_lightest(
 	const bool by_period = share * fast.period <= 0.5 * first.hard;
 	if (isfinite(fast.period)) say_limit(&fast, &first, share, by_period, reason);
 	else snprintf(reason, 160, "grains without a contact law");
-	if (s->settling && d->settle_step * fast.period < first.hard) return d->settle_step * fast.period;
+	if (s->settling) {
+		const quern_real wanted = d->settle_step * fast.period;
+		return wanted <= first.hard ? wanted : 0.5 * first.hard;
+	}
 	const quern_real chosen = by_period ? share * fast.period : 0.5 * first.hard;
-	const quern_real speed =
-		d->moving && !s->settling ? quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY) : 0;
+	const quern_real speed = d->moving ? quern_bodies_speed(s, SLOT_BODIES, s->time, INFINITY) : 0;
 	if (!(0.1 * least < speed * chosen)) return chosen;
 	snprintf(reason, 160, "bodies of %.3g m/s and grains of radius %.3g m", speed, least);
 	return 0.1 * least / speed;

@@ -72,7 +72,8 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 	QUERN_PARAM(dem, place, NULL, "Single grains.", .rows = place_rows, .item_size = sizeof(dem_place),
 		.flags = QUERN_ONCE),
 	QUERN_PARAM(dem, file, NULL,
-		"Grains from a table with a header line: x y [z] radius [vx vy vz] [fixed] [material].",
+		"Grains from a table with a header line: x y radius [vx vy] [w] in 2-D, x y z radius [vx vy vz] [wx wy wz] in 3-D, then [fixed] "
+		"[material].",
 		.flags = QUERN_FILE | QUERN_ONCE),
 	QUERN_PARAM(dem, from, NULL,
 		"A run whose grains this one starts from, before all others: RUN for its last state, with the history of "
@@ -96,8 +97,8 @@ static const quern_param params[] = { MATERIAL_ROWS(dem, alone., "material.", .u
 		"At rest when the mean kinetic energy of a grain stays below this share of m g d.", .def = 1e-5,
 		.flags = QUERN_MIN_OPEN, .max = 1),
 	QUERN_PARAM_AS(dem, settle_step, "settle.step", "1",
-		"Step while settling, over half the shortest period of a contact.", .def = 0.1, .max = 0.2,
-		.flags = QUERN_MIN_OPEN),
+		"Step while settling, over half the shortest period of a contact; half of the limit where that is lower.",
+		.def = 0.1, .max = 0.2, .flags = QUERN_MIN_OPEN),
 	QUERN_PARAM_AS(dem, settle_most, "settle.most", "1",
 		"Most steps of settling; then the run goes on with a warning.", .def = 1e6, .min = 1, .max = 2e9),
 	DEM_BOX_PARAMS,
@@ -570,7 +571,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .
 	.looks = quern_dem_looks, .look = quern_dem_look_at_run, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 2,
+	.revision = 3,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.dem",
 	.brief = "Grains: discs and spheres with contact laws.",

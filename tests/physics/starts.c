@@ -191,6 +191,41 @@ static void settling_is_estimated(void **state) {
 	assert_true(good);
 }
 
+/* s, of the step with which spheres settle, by restitution and by what the scene asks for; and of the step with which they run. */
+static double settling_step(double restitution, double asked, double *running) {
+	double dt;
+	quern_run *run = harness_open(1,
+		"quern: 1\ndimension: 3\ngravity: [0, 0, -9.81]\ntime: {end: 1}\n"
+		"domain: {lower: [0, 0, 0], upper: [0.01, 0.01, 0.1], periodic: [true, true, false]}\n"
+		"bodies: [{plane: {point: [0, 0, 0], normal: [0, 0, 1]}}]\n"
+		"grains: {material: {density: 2500, radius: {mean: 1 mm}}, settle: {step: %g, most: 5},\n"
+		"  contact: {linear: {stiffness: 1e3, restitution: %g, friction: 0.5}},\n"
+		"  fill: {region: {box: {lower: [0, 0, 0], upper: [0.01, 0.01, 0.01]}}, settle: true}}\n",
+		asked, restitution);
+	quern_run_settling(run, &dt);
+	harness_settle(run);
+	harness_steps(run, 1);
+	*running = run->clock.dt;
+	harness_close(run);
+	return dt;
+}
+
+/* Settling takes the step that is asked for, up to the limit; half of the limit where dashpots put that below. By default it is never shorter than the step of
+ * the run. */
+static void settling_takes_its_step(void **state) {
+	double running;
+	(void)state;
+	const double tenth = settling_step(0.9, 0.1, &running);
+	assert_true(fabs(settling_step(0.9, 0.05, &running) / tenth - 0.5) < 1e-9);
+	assert_true(fabs(settling_step(0.9, 0.2, &running) / tenth - 2) < 1e-9);
+	const double before = settling_step(0.25, 0.1, &running);
+	for (double e = 0.19; e > 0.1; e -= 0.04) {
+		const double now = settling_step(e, 0.1, &running);
+		assert_true(now < before && now > 0.25 * before);
+		assert_true(now >= running);
+	}
+}
+
 /* Grains are looked at once in a contact's duration, however many steps that has: here 2^32. */
 static void steps_may_be_as_short(void **state) {
 	static const char *const levels[] = { "v1", "auto" };
@@ -212,7 +247,7 @@ static void steps_may_be_as_short(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(height_is_along_gravity),
 		cmocka_unit_test(stiffness_is_that_of_the_whole), cmocka_unit_test(points_in_bodies_are_left_out),
-		cmocka_unit_test(settling_is_estimated), cmocka_unit_test(points_off_their_places),
-		cmocka_unit_test(steps_may_be_as_short) };
+		cmocka_unit_test(settling_is_estimated), cmocka_unit_test(settling_takes_its_step),
+		cmocka_unit_test(points_off_their_places), cmocka_unit_test(steps_may_be_as_short) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
