@@ -191,15 +191,20 @@ static bool job_inside(const quern_pack_job *job, const quern_real x[3]) {
 	return true;
 }
 
+static quern_spot spot_of(const new_grain *g) {
+	quern_spot spot = { .radius = g->radius };
+	memcpy(spot.x, g->position, sizeof spot.x);
+	return spot;
+}
+
 /* The placer knows the cell's own new grains only once its colour is through. */
 static bool job_free(const quern_pack_job *job, const quern_spot *spot) {
 	const packed_cell *p = job->scene;
 	for (uint32_t i = 0; i < p->n; i++) {
-		quern_spot own = { .radius = p->grain[i].radius };
-		memcpy(own.x, p->grain[i].position, sizeof own.x);
+		const quern_spot own = spot_of(&p->grain[i]);
 		if (quern_placer_overlaps(&p->all->placer, spot, &own)) return false;
 	}
-	return quern_placer_free(&p->all->placer, spot);
+	return quern_placer_free(&p->all->placer, spot) && quern_hybrid_seen(p->all->d, p->c, spot->x);
 }
 
 static bool job_place(quern_pack_job *job, const quern_spot *spot) {
@@ -243,13 +248,21 @@ static void find_upstream(const update *d, uint32_t cell, quern_real upstream[3]
 	for (uint32_t k = 0; k < d->s->dim && length > 0; k++) upstream[k] /= sqrt(length);
 }
 
+/* Grains around a cell, and room for its own, which are among them when a packer that shrinks is asked again. */
+static quern_spot *find_seeds(const packed_cell *p, uint32_t *n) {
+	quern_spot *seed = quern_placer_seeds_in_order(
+		&p->all->placer, p->lower, p->upper, 2 * quern_radius_most(&p->all->d->h->radii), n);
+	quern_spot *wider = seed ? realloc(seed, ((size_t)*n + p->wanted) * sizeof *seed) : NULL;
+	if (!wider) free(seed);
+	return wider;
+}
+
 static void enrich_cell(packed_cell *p) {
 	const enriching *e = p->all;
 	const update *d = e->d;
 	const quern_bound *packer = &d->s->slot[SLOT_PACKER][0];
 	uint32_t n = 0;
-	quern_spot *seed =
-		quern_placer_seeds_in_order(&e->placer, p->lower, p->upper, 2 * quern_radius_most(&d->h->radii), &n);
+	quern_spot *seed = find_seeds(p, &n);
 	if (!seed) {
 		p->failed = true;
 		return;
@@ -270,15 +283,17 @@ static void enrich_cell(packed_cell *p) {
 	memcpy(job.upper, p->upper, sizeof job.upper);
 	find_upstream(d, p->c, job.upstream);
 	const quern_packer_ops *ops = packer->ops;
-	/* what is rounded up finds room or waits: where nothing presses, grains that are squeezed in would */
-	const bool grows = d->h->growth > 0 && (!ops->shrinks || p->whole == p->wanted);
-	if (grows && ops->shrinks) job.growth = QUERN_GROWS_ALONE;
+	const uint32_t again = !(d->h->growth > 0) ? 0 : ops->shrinks ? 1 : 3;
 	p->most = p->wanted;
-	for (uint32_t k = 0; k < 4 && p->n < p->most && (!k || (grows && !ops->shrinks)); k++) {
+	for (uint32_t k = 0; k <= again && p->n < p->most; k++) {
 		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
-		p->part = parts[k];
+		p->part = ops->shrinks ? 1 : parts[k];
+		job.growth = k && ops->shrinks ? QUERN_GROWS_ALONE : QUERN_STAYS_SMALL;
+		for (; ops->shrinks && job.n_seed < n + p->n; job.n_seed++)
+			seed[job.n_seed] = spot_of(&p->grain[job.n_seed - n]);
 		job.counter = ((uint64_t)d->u[U_UPDATES].index[0] << 32) + ((uint64_t)k << 24);
 		ops->pack[d->s->dim - 2](packer->self, &job);
+		/* what is rounded up finds room or waits: where nothing presses, grains that are squeezed in would */
 		p->most = p->whole;
 	}
 	free(seed);

@@ -89,6 +89,8 @@ void quern_hybrid_open_place(const update *, uint32_t entry, const int32_t cell[
  * it, be it ever so thin. */
 bool quern_hybrid_walled(
 	const update *, const bool *meant, uint32_t entry, const quern_real from[3], const quern_real to[3]);
+/* Whether something that is in a cell sees a place in it past all bodies; true as well where no body is near, or nothing there. */
+bool quern_hybrid_seen(const update *, uint32_t cell, const quern_real x[3]);
 
 /* ---- zones.c ---- */
 quern_status quern_hybrid_zones(update *);

@@ -125,20 +125,26 @@ quern_status quern_hybrid_walls(update *d) {
 	return status == QUERN_OK ? each_block(&w, open_block) : status;
 }
 
-/* Gap of a place to the nearest body that is meant and there now, and that one's normal if it is asked for. */
-static quern_real gap_at(const update *d, const bool *meant, const quern_real x[3], quern_real normal[3]) {
+/* Gap of a place to the nearest body that is meant and there now, and that one's normal if it is asked for: to where the continuum ends before it,
+ * or `bare`, to the body itself. */
+static quern_real gap_of(
+	const update *d, const bool *meant, const quern_real x[3], bool bare, quern_real normal[3]) {
 	quern_real least = INFINITY;
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
 		const quern_bound *body = &d->s->slot[SLOT_BODIES][b];
 		quern_real n[3] = { 0 };
 		if (!quern_body_is_there(body, d->s->settling) || (meant && !meant[b])) continue;
-		const quern_real out = ((const body_item *)body->item)->displacement,
+		const quern_real out = bare ? 0 : ((const body_item *)body->item)->displacement,
 						 gap = quern_body_gap(body, &d->pose[b], d->s->dim, x, out, normal ? n : NULL);
 		if (!(gap < least)) continue;
 		least = gap;
 		if (normal) memcpy(normal, n, sizeof n);
 	}
 	return least;
+}
+
+static quern_real gap_at(const update *d, const bool *meant, const quern_real x[3], quern_real normal[3]) {
+	return gap_of(d, meant, x, false, normal);
 }
 
 /* Of a cell's size: from so far before a surface on, a place is in the open. */
@@ -166,8 +172,8 @@ static quern_real free_way(const update *d, uint32_t entry, const quern_real x[3
 }
 
 /* Goes along the line by steps as long as nothing can be in the way, so that no wall is too thin. */
-bool quern_hybrid_walled(
-	const update *d, const bool *meant, uint32_t entry, const quern_real from[3], const quern_real to[3]) {
+static bool is_walled(const update *d, const bool *meant, uint32_t entry, const quern_real from[3],
+	const quern_real to[3], bool bare) {
 	const quern_real near = 1e-6 * d->g->cell;
 	quern_real length = 0, way;
 	if (d->wall[entry] >= 2 * d->g->cell) return false; /* within a cell, or from centre to centre */
@@ -178,9 +184,38 @@ bool quern_hybrid_walled(
 	for (int i = 0; i < 64 && way < length; i++) {
 		quern_real x[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) x[k] = from[k] + way / length * (to[k] - from[k]);
-		const quern_real gap = gap_at(d, meant, x, NULL);
+		const quern_real gap = gap_of(d, meant, x, bare, NULL);
 		if (gap <= near) return true;
 		way += gap;
 	}
 	return false;
+}
+
+bool quern_hybrid_walled(
+	const update *d, const bool *meant, uint32_t entry, const quern_real from[3], const quern_real to[3]) {
+	return is_walled(d, meant, entry, from, to, false);
+}
+
+/* Whether x is seen from particle i; one that lies in a body itself, as points may, sees nothing and does not count. */
+static bool seen_from(
+	const update *d, uint32_t c, const quern_real x[3], quern_real *const *all, int32_t i, bool *any) {
+	const quern_images images = quern_grid_images(d->g);
+	quern_real from[3] = { 0 };
+	for (uint32_t k = 0; k < d->s->dim; k++)
+		from[k] = quern_image_at(all[k][i], x[k], images.half[k], images.length[k]);
+	if (gap_of(d, NULL, from, true, NULL) <= 1e-6 * d->g->cell) return false;
+	*any = true;
+	return !is_walled(d, NULL, c, from, x, true);
+}
+
+bool quern_hybrid_seen(const update *d, uint32_t c, const quern_real x[3]) {
+	const uint32_t *begin[2] = { d->grain_begin, d->point_begin };
+	const int32_t *of[2] = { d->grain, d->point };
+	quern_real *const *at[2] = { d->u[U_GRAIN_POSITION].real, d->u[U_POINT_POSITION].real };
+	bool any = false;
+	if (d->wall[c] >= 0.5 * sqrt(d->s->dim) * d->g->cell) return true;
+	for (int which = 0; which < 2; which++)
+		for (uint32_t q = begin[which][c]; q < begin[which][c + 1]; q++)
+			if (seen_from(d, c, x, at[which], of[which][q], &any)) return true;
+	return !any;
 }

@@ -123,7 +123,11 @@ typedef struct sparse {
 	const char *name, *periodic, *oracle, *weights;
 	int columns, rows;
 	double lacks[2], tolerance; /* grains, by turns; of those that a cell gets */
+	const char *packer;         /* NULL: the default */
+	double radius;              /* m; 0: a quarter of a cell */
 } sparse;
+
+static double radius_of(const sparse *l) { return l->radius > 0 ? l->radius : cell / 4; }
 
 static quern_run *open_sparse(const sparse *l) {
 	char path[HARNESS_PATH];
@@ -131,11 +135,12 @@ static quern_run *open_sparse(const sparse *l) {
 	quern_run *run = harness_open(1,
 		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [%g, %g], periodic: [%s]}\n"
 		"time: {end: 1e-6, step: 1e-9}\n"
-		"grains: {material: {density: 2500, radius: {mean: 1 mm}},\n"
+		"grains: {material: {density: 2500, radius: {mean: %g}},\n"
 		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
 		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-		"hybrid: {oracle: [{fixed: {%s}}], weights: %s, substeps: 1, update: 1}\n",
-		l->columns * cell, l->rows * cell, l->periodic, path, cell, l->oracle, l->weights);
+		"hybrid: {oracle: [{fixed: {%s}}], weights: %s, packer: %s, substeps: 1, update: 1}\n",
+		l->columns * cell, l->rows * cell, l->periodic, radius_of(l), path, cell, l->oracle, l->weights,
+		l->packer ? l->packer : "two_point_tangent");
 	unlink(path);
 	harness_steps(run, 4);
 	return run;
@@ -143,7 +148,7 @@ static quern_run *open_sparse(const sparse *l) {
 
 /* Grains that a cell of the zone gets in one update, in the mean, where each lacks what its column and row say. */
 static double grains_got(quern_run *run, const sparse *l, double *lacking) {
-	const double mass = 2500 * 3.14159265358979312e-6;
+	const double mass = 2500 * 3.14159265358979312 * radius_of(l) * radius_of(l);
 	const uint32_t before = quern_host_table.set(run, "grain").n;
 	int n = 0;
 	*lacking = 0;
@@ -192,7 +197,53 @@ static void debts_round_together(void **state) {
 	assert_true(good);
 }
 
+/* A plate, an eighth of a cell thick, within the cells of the last column, and grains on its left alone: what these cells lack becomes grains on
+ * that side. The other one has room for as many, which darts and holes find; places that touch grains never do. */
+static void plates_are_not_passed(void **state) {
+	static const char *const packers[] = { "random", "two_point_tangent", "expand" };
+	(void)state;
+	for (size_t k = 0; k < sizeof packers / sizeof *packers; k++) {
+		char path[HARNESS_PATH];
+		put_one_each(path, 5, 9);
+		quern_run *run = harness_open(1,
+			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.02, 0.036]}\n"
+			"time: {end: 1e-6, step: 1e-9}\nbodies: [{box: {lower: [0.018, -0.01], upper: [0.0185, 0.05]}}]\n"
+			"grains: {material: {density: 2500, radius: {mean: 0.4 mm}},\n"
+			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
+			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+			"hybrid: {oracle: [{fixed: {otherwise: hybrid}}], packer: %s, substeps: 1, update: 1}\n",
+			path, cell, packers[k]);
+		unlink(path);
+		harness_steps(run, 3);
+		const uint32_t before = harness_count(run, "grain");
+		for (int j = 0; j < 9; j++)
+			harness_field(run, "cell.owed").real[0][cell_at(run, 0.0165, (j + 0.5) * cell)] +=
+				4 * 2500 * 3.14159265358979312 * 0.16e-6;
+		update(run);
+		const quern_column x = harness_field(run, "grain.position");
+		assert_true(harness_count(run, "grain") >= before + 9);
+		for (uint32_t i = 0; i < harness_count(run, "grain"); i++) assert_true(x.real[0][i] < 0.018);
+		harness_close(run);
+	}
+}
+
 #define ALONE "otherwise: discrete, boxes: [{lower: [0.016, 0.016], upper: [0.02, 0.02], zone: "
+/* Beside grains in a square lattice there is one full place in a cell, and two holes. Of the two grains that each cell lacks all of one goes into a
+ * hole, to grow, and no fewer do where some cells are to have a third by rounding, which waits: but for what these take of what their blocks lack. */
+static void rounding_takes_no_holes(void **state) {
+	double got[2], lacking;
+	(void)state;
+	for (int k = 0; k < 2; k++) {
+		const double lacks = k ? 2.4 : 2;
+		const sparse of = { "", "true, true", ALL, "half", 16, 16, { lacks, lacks }, 0, "expand", 1.05e-3 };
+		quern_run *run = open_sparse(&of);
+		got[k] = grains_got(run, &of, &lacking);
+		harness_close(run);
+	}
+	printf("  cells that lack 2 and 2.4 grains get %g and %g\n", got[0], got[1]);
+	assert_true(got[0] == 2 && got[1] > 0.9 * got[0]);
+}
+
 /* A cell alone among discrete ones owes more than it holds, and nobody takes that: its points get lighter, but not without end, and all that is
  * neither theirs nor the grains' stays owed. */
 static void debts_leave_points(void **state) {
@@ -318,6 +369,7 @@ static void rough_floors_are_no_surface(void **state) {
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(far_entries_find_a_cell),
 		cmocka_unit_test(plates_are_gone_round), cmocka_unit_test(debts_round_together),
+		cmocka_unit_test(plates_are_not_passed), cmocka_unit_test(rounding_takes_no_holes),
 		cmocka_unit_test(debts_leave_points), cmocka_unit_test(walls_are_no_surface),
 		cmocka_unit_test(rough_floors_are_no_surface) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
