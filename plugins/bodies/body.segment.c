@@ -87,9 +87,10 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "body.segment",
 	.brief = "A straight wall between two points, in 3-D a rod.",
-	.doc = "It keeps grains out on both sides, thin as it may be. The continuum sees it only where nodes of "
-		   "the grid "
-		   "lie in it: for that it must be about a cell thick.",
+	.doc =
+		"It keeps grains out on both sides, thin as it may be. The continuum sees it only where nodes of "
+		"the grid "
+		"lie in it, and a node of a slip, frictional or rough wall holds what comes from the nearer side: for that it must be about two cells thick, one where it is sticky.",
 	.cite = "Ericson 2005, section 5.1.2",
 	.instance_size = sizeof(segment),
 	.params = params,

@@ -218,7 +218,7 @@ static void approach(void **unused) {
 			}
 			gap[k] = fabs((double)pressure_of(dim, &c, 0) / p - 1);
 			printf(
-				"  %uD, %d steps of a shear of 0.1: from %g to %.6g Pa, off by %.2e; exp(-2) would leave %.6g\n",
+				"  %uD, %d steps of a shear of 0.1: from %g to %.6g Pa, off by %.2e; exp(-20 0.1) would leave %.6g\n",
 				dim, steps_of, first, (double)pressure_of(dim, &c, 0), gap[k], end + (first - end) * left);
 			assert_true(fabs(p / (end + (first - end) * left) - 1) < 0.01);
 			free_cloud(&c);
