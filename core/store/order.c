@@ -2,6 +2,7 @@
 #include "order.h"
 #include "text.h"
 #include <stdlib.h>
+#include <string.h>
 
 bool quern_plan_demands(const quern_plan_use *u) {
 	return u->counts && !(u->row->flags & (QUERN_OPTIONAL | QUERN_WANTED));
@@ -76,10 +77,13 @@ typedef struct {
 	int stages, previous;
 } history;
 
-/* Each of a list's plugins takes what it changes for its own. */
-static bool share_state(const quern_plan_use *a, const quern_plan_use *b) {
-	return a->stage == b->stage && a->slot && a->slot == b->slot && a->slot->list && a->bound != b->bound &&
-		   a->row->access == QUERN_UPDATE && b->row->access == QUERN_UPDATE;
+/* Two of a list both take what they remember of an entry for their own: of the set that their slot repeats, as contact laws do. Of others
+ * it may be what they change one after the other. */
+static bool share_memory(const quern_plan_use *a, const quern_plan_use *b) {
+	const char *set = a->slot && a->slot->list ? a->slot->repeat : NULL;
+	return set && a->slot == b->slot && a->stage == b->stage && a->bound != b->bound &&
+		   a->row->access == QUERN_UPDATE && b->row->access == QUERN_UPDATE &&
+		   !strncmp(a->row->field, set, strlen(set)) && a->row->field[strlen(set)] == '.';
 }
 
 static void conflicts(quern_plan *p, const quern_field *field, const quern_plan_use *u, history *h) {
@@ -95,7 +99,7 @@ static void conflicts(quern_plan *p, const quern_field *field, const quern_plan_
 				"%s: %s and %s both change it and nothing says which comes first", field->name, last->owner,
 				u->owner);
 	}
-	if (last && share_state(last, u))
+	if (last && share_memory(last, u))
 		quern_report_add(p->scene->report, u->mark,
 			"%s: %s and %s are in one list and both change it, each as if it were its own", field->name,
 			last->owner, u->owner);
