@@ -123,13 +123,9 @@ typedef struct sparse {
 	const char *name, *periodic, *oracle, *weights;
 	int columns, rows;
 	double lacks[2], tolerance; /* grains, by turns; of those that a cell gets */
-	const char *packer;         /* NULL: the default */
-	double radius;              /* m; 0: a quarter of a cell */
 } sparse;
 
-static double radius_of(const sparse *l) { return l->radius > 0 ? l->radius : cell / 4; }
-
-static quern_run *open_sparse(const sparse *l) {
+static quern_run *open_with(const sparse *l, const char *packer, double radius) {
 	char path[HARNESS_PATH];
 	put_one_each(path, l->columns, l->rows);
 	quern_run *run = harness_open(1,
@@ -139,16 +135,16 @@ static quern_run *open_sparse(const sparse *l) {
 		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
 		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
 		"hybrid: {oracle: [{fixed: {%s}}], weights: %s, packer: %s, substeps: 1, update: 1}\n",
-		l->columns * cell, l->rows * cell, l->periodic, radius_of(l), path, cell, l->oracle, l->weights,
-		l->packer ? l->packer : "two_point_tangent");
+		l->columns * cell, l->rows * cell, l->periodic, radius, path, cell, l->oracle, l->weights, packer);
 	unlink(path);
 	harness_steps(run, 4);
 	return run;
 }
+static quern_run *open_sparse(const sparse *l) { return open_with(l, "two_point_tangent", cell / 4); }
 
 /* Grains that a cell of the zone gets in one update, in the mean, where each lacks what its column and row say. */
-static double grains_got(quern_run *run, const sparse *l, double *lacking) {
-	const double mass = 2500 * 3.14159265358979312 * radius_of(l) * radius_of(l);
+static double grains_got(quern_run *run, const sparse *l, double radius, double *lacking) {
+	const double mass = 2500 * 3.14159265358979312 * radius * radius;
 	const uint32_t before = quern_host_table.set(run, "grain").n;
 	int n = 0;
 	*lacking = 0;
@@ -190,7 +186,7 @@ static void debts_round_together(void **state) {
 	for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
 		quern_run *run = open_sparse(&of[k]);
 		double lacking;
-		const double got = grains_got(run, &of[k], &lacking);
+		const double got = grains_got(run, &of[k], cell / 4, &lacking);
 		good &= table_row(of[k].name, got, lacking, of[k].tolerance);
 		harness_close(run);
 	}
@@ -235,9 +231,9 @@ static void rounding_takes_no_holes(void **state) {
 	(void)state;
 	for (int k = 0; k < 2; k++) {
 		const double lacks = k ? 2.4 : 2;
-		const sparse of = { "", "true, true", ALL, "half", 16, 16, { lacks, lacks }, 0, "expand", 1.05e-3 };
-		quern_run *run = open_sparse(&of);
-		got[k] = grains_got(run, &of, &lacking);
+		const sparse of = { "", "true, true", ALL, "half", 16, 16, { lacks, lacks }, 0 };
+		quern_run *run = open_with(&of, "expand", 1.05e-3);
+		got[k] = grains_got(run, &of, 1.05e-3, &lacking);
 		harness_close(run);
 	}
 	printf("  cells that lack 2 and 2.4 grains get %g and %g\n", got[0], got[1]);
