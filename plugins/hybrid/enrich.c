@@ -404,8 +404,7 @@ static bool add_obstacles(enriching *e, uint32_t begin, uint32_t end) {
 		const packed_cell *p = &e->cell[e->by_colour[i]];
 		good = good && !p->failed;
 		for (uint32_t k = 0; k < p->n; k++) {
-			quern_spot spot = { .radius = p->grain[k].radius };
-			memcpy(spot.x, p->grain[k].position, sizeof spot.x);
+			const quern_spot spot = spot_of(&p->grain[k]);
 			quern_placer_add(&e->placer, &spot);
 		}
 	}

@@ -127,7 +127,7 @@ quern_status quern_hybrid_walls(update *d) {
 
 /* Gap of a place to the nearest body that is meant and there now, and that one's normal if it is asked for: to where the continuum ends before it,
  * or `bare`, to the body itself. */
-static quern_real gap_of(
+static quern_real gap_at(
 	const update *d, const bool *meant, const quern_real x[3], bool bare, quern_real normal[3]) {
 	quern_real least = INFINITY;
 	for (uint32_t b = 0; b < d->s->n_slot[SLOT_BODIES]; b++) {
@@ -143,10 +143,6 @@ static quern_real gap_of(
 	return least;
 }
 
-static quern_real gap_at(const update *d, const bool *meant, const quern_real x[3], quern_real normal[3]) {
-	return gap_of(d, meant, x, false, normal);
-}
-
 /* Of a cell's size: from so far before a surface on, a place is in the open. */
 static const quern_real clear = 0.1;
 
@@ -155,7 +151,7 @@ void quern_hybrid_open_place(const update *d, uint32_t c, const int32_t cell[3],
 	quern_hybrid_centre(d, cell, x);
 	for (int tries = 0; tries < 4 && d->wall[c] < clear * d->g->cell; tries++) {
 		quern_real normal[3] = { 0 };
-		const quern_real out = clear * d->g->cell - gap_at(d, NULL, x, normal);
+		const quern_real out = clear * d->g->cell - gap_at(d, NULL, x, false, normal);
 		if (!(out > 0)) return;
 		for (uint32_t k = 0; k < d->s->dim; k++) x[k] += out * normal[k];
 	}
@@ -184,7 +180,7 @@ static bool is_walled(const update *d, const bool *meant, uint32_t entry, const 
 	for (int i = 0; i < 64 && way < length; i++) {
 		quern_real x[3] = { 0 };
 		for (uint32_t k = 0; k < d->s->dim; k++) x[k] = from[k] + way / length * (to[k] - from[k]);
-		const quern_real gap = gap_of(d, meant, x, bare, NULL);
+		const quern_real gap = gap_at(d, meant, x, bare, NULL);
 		if (gap <= near) return true;
 		way += gap;
 	}
@@ -203,7 +199,7 @@ static bool seen_from(
 	quern_real from[3] = { 0 };
 	for (uint32_t k = 0; k < d->s->dim; k++)
 		from[k] = quern_image_at(all[k][i], x[k], images.half[k], images.length[k]);
-	if (gap_of(d, NULL, from, true, NULL) <= 1e-6 * d->g->cell) return false;
+	if (gap_at(d, NULL, from, true, NULL) <= 1e-6 * d->g->cell) return false;
 	*any = true;
 	return !is_walled(d, NULL, c, from, x, true);
 }

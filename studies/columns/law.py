@@ -140,8 +140,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sweep", type=pathlib.Path, default=ROOT / "out/columns")
     by = found(parser.parse_args().sweep)
-    if whole_seeds(by):
-        print(table(whole_seeds(by)), end="")
+    whole = whole_seeds(by)
+    if whole:
+        print(table(whole), end="")
     if all(" mm" in name for name in by):
         print(f"\n{convergence(by)}", end="")
 

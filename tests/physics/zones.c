@@ -84,25 +84,42 @@ static void put_one_each(char path[HARNESS_PATH], int columns, int rows) {
 	fclose(out);
 }
 
+/* One grain in each of so many cells, which the oracle takes for hybrid ones, all or some of them. */
+typedef struct sparse {
+	const char *name, *periodic, *oracle, *weights;
+	int columns, rows;
+	double lacks[2], tolerance; /* grains, by turns; of those that a cell gets */
+} sparse;
+
+static quern_run *open_with(const sparse *l, const char *bodies, const char *packer, double radius) {
+	char path[HARNESS_PATH];
+	put_one_each(path, l->columns, l->rows);
+	quern_run *run = harness_open(1,
+		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [%g, %g], periodic: [%s]}\n"
+		"time: {end: 1e-6, step: 1e-9}\nbodies: [%s]\n"
+		"grains: {material: {density: 2500, radius: {mean: %g}},\n"
+		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
+		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
+		"hybrid: {oracle: [{fixed: {%s}}], weights: %s, packer: %s, substeps: 1, update: 1}\n",
+		l->columns * cell, l->rows * cell, l->periodic, bodies, radius, path, cell, l->oracle, l->weights,
+		packer);
+	unlink(path);
+	harness_steps(run, 4);
+	return run;
+}
+static quern_run *open_sparse(const sparse *l) { return open_with(l, "", "two_point_tangent", cell / 4); }
+
 /* A plate along half of a box; a hybrid cell A far above it and one, B, just below. What is owed just above goes to A, whoever else owes
  * something: it is reached first. B is near in a straight line alone, and comes round the plate's end. */
 static void plates_are_gone_round(void **state) {
 	(void)state;
 	for (int other = 0; other <= 1; other++) {
-		char path[HARNESS_PATH];
-		put_one_each(path, 20, 14);
-		quern_run *run = harness_open(1,
-			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.08, 0.056]}\n"
-			"time: {end: 1e-6, step: 1e-9}\n"
-			"bodies: [{box: {lower: [-0.01, 0.0239], upper: [0.04, 0.0241]}}]\n"
-			"grains: {material: {density: 2500, radius: {mean: 0.8 mm}},\n"
-			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
-			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-			"hybrid: {oracle: [{fixed: {otherwise: discrete, boxes: [{lower: [0.008, 0.052], upper: [0.012, 0.056], zone: hybrid},"
-			" {lower: [0.008, 0.02], upper: [0.012, 0.0235], zone: hybrid}]}}], substeps: 1, update: 1}\n",
-			path, cell);
-		unlink(path);
-		harness_steps(run, 3);
+		static const sparse l = { "", "false, false",
+			"otherwise: discrete, boxes: [{lower: [0.008, 0.052], upper: [0.012, 0.056], zone: hybrid},"
+			" {lower: [0.008, 0.02], upper: [0.012, 0.0235], zone: hybrid}]",
+			"half", 20, 14, { 0, 0 }, 0 };
+		quern_run *run = open_with(
+			&l, "{box: {lower: [-0.01, 0.0239], upper: [0.04, 0.0241]}}", "two_point_tangent", 0.8e-3);
 		const int32_t a = cell_at(run, 0.01, 0.054), b = cell_at(run, 0.01, 0.022),
 					  owed = cell_at(run, 0.01, 0.03);
 		assert_int_equal(harness_field(run, "cell.zone").index[a], QUERN_HYBRID);
@@ -117,30 +134,6 @@ static void plates_are_gone_round(void **state) {
 		harness_close(run);
 	}
 }
-
-/* One grain in each of so many cells, which the oracle takes for hybrid ones, all or some of them. */
-typedef struct sparse {
-	const char *name, *periodic, *oracle, *weights;
-	int columns, rows;
-	double lacks[2], tolerance; /* grains, by turns; of those that a cell gets */
-} sparse;
-
-static quern_run *open_with(const sparse *l, const char *packer, double radius) {
-	char path[HARNESS_PATH];
-	put_one_each(path, l->columns, l->rows);
-	quern_run *run = harness_open(1,
-		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [%g, %g], periodic: [%s]}\n"
-		"time: {end: 1e-6, step: 1e-9}\n"
-		"grains: {material: {density: 2500, radius: {mean: %g}},\n"
-		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
-		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-		"hybrid: {oracle: [{fixed: {%s}}], weights: %s, packer: %s, substeps: 1, update: 1}\n",
-		l->columns * cell, l->rows * cell, l->periodic, radius, path, cell, l->oracle, l->weights, packer);
-	unlink(path);
-	harness_steps(run, 4);
-	return run;
-}
-static quern_run *open_sparse(const sparse *l) { return open_with(l, "two_point_tangent", cell / 4); }
 
 /* Grains that a cell of the zone gets in one update, in the mean, where each lacks what its column and row say. */
 static double grains_got(quern_run *run, const sparse *l, double radius, double *lacking) {
@@ -199,18 +192,9 @@ static void plates_are_not_passed(void **state) {
 	static const char *const packers[] = { "random", "two_point_tangent", "expand" };
 	(void)state;
 	for (size_t k = 0; k < sizeof packers / sizeof *packers; k++) {
-		char path[HARNESS_PATH];
-		put_one_each(path, 5, 9);
-		quern_run *run = harness_open(1,
-			"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [0.02, 0.036]}\n"
-			"time: {end: 1e-6, step: 1e-9}\nbodies: [{box: {lower: [0.018, -0.01], upper: [0.0185, 0.05]}}]\n"
-			"grains: {material: {density: 2500, radius: {mean: 0.4 mm}},\n"
-			"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
-			"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
-			"hybrid: {oracle: [{fixed: {otherwise: hybrid}}], packer: %s, substeps: 1, update: 1}\n",
-			path, cell, packers[k]);
-		unlink(path);
-		harness_steps(run, 3);
+		static const sparse l = { "", "false, false", "otherwise: hybrid", "half", 5, 9, { 0, 0 }, 0 };
+		quern_run *run =
+			open_with(&l, "{box: {lower: [0.018, -0.01], upper: [0.0185, 0.05]}}", packers[k], 0.4e-3);
 		const uint32_t before = harness_count(run, "grain");
 		for (int j = 0; j < 9; j++)
 			harness_field(run, "cell.owed").real[0][cell_at(run, 0.0165, (j + 0.5) * cell)] +=
@@ -232,7 +216,7 @@ static void rounding_takes_no_holes(void **state) {
 	for (int k = 0; k < 2; k++) {
 		const double lacks = k ? 2.4 : 2;
 		const sparse of = { "", "true, true", ALL, "half", 16, 16, { lacks, lacks }, 0 };
-		quern_run *run = open_with(&of, "expand", 1.05e-3);
+		quern_run *run = open_with(&of, "", "expand", 1.05e-3);
 		got[k] = grains_got(run, &of, 1.05e-3, &lacking);
 		harness_close(run);
 	}
