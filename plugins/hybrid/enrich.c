@@ -248,13 +248,28 @@ static void find_upstream(const update *d, uint32_t cell, quern_real upstream[3]
 	for (uint32_t k = 0; k < d->s->dim && length > 0; k++) upstream[k] /= sqrt(length);
 }
 
-/* Grains around a cell, and room for its own, which are among them when a packer that shrinks is asked again. */
+/* Grains around a cell, and room for its own, which are among them when the packer is asked again. */
 static quern_spot *find_seeds(const packed_cell *p, uint32_t *n) {
 	quern_spot *seed = quern_placer_seeds_in_order(
 		&p->all->placer, p->lower, p->upper, 2 * quern_radius_most(&p->all->d->h->radii), n);
 	quern_spot *wider = seed ? realloc(seed, ((size_t)*n + p->wanted) * sizeof *seed) : NULL;
 	if (!wider) free(seed);
 	return wider;
+}
+
+/* Whether a cell is full, and its points bear more than the weight of one layer of grains. */
+static bool is_pressed(const update *d, uint32_t c) {
+	const quern_column *u = d->u;
+	quern_real volume = 0, bears = 0, gravity = 0;
+	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
+		const int32_t i = d->point[q];
+		volume += u[U_POINT_VOLUME].real[0][i];
+		for (uint32_t k = 0; k < d->s->dim; k++)
+			bears -= u[U_POINT_STRESS].real[k][i] * u[U_POINT_VOLUME].real[0][i] / d->s->dim;
+	}
+	for (uint32_t k = 0; k < d->s->dim; k++) gravity += d->s->gravity[k] * d->s->gravity[k];
+	const quern_real layer = d->h->packed * sqrt(gravity) * d->h->diameter;
+	return cell_holds(d, c) > 0.8 * cell_room(d, c) && layer > 0 && bears > layer * volume;
 }
 
 static void enrich_cell(packed_cell *p) {
@@ -289,12 +304,12 @@ static void enrich_cell(packed_cell *p) {
 		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
 		p->part = ops->shrinks ? 1 : parts[k];
 		job.growth = k && ops->shrinks ? QUERN_GROWS_ALONE : QUERN_STAYS_SMALL;
-		for (; ops->shrinks && job.n_seed < n + p->n; job.n_seed++)
+		for (; job.n_seed < n + p->n; job.n_seed++)
 			seed[job.n_seed] = spot_of(&p->grain[job.n_seed - n]);
 		job.counter = ((uint64_t)d->u[U_UPDATES].index[0] << 32) + ((uint64_t)k << 24);
 		ops->pack[d->s->dim - 2](packer->self, &job);
 		/* what is rounded up finds room or waits: where nothing presses, grains that are squeezed in would */
-		p->most = p->whole;
+		p->most = is_pressed(d, p->c) ? p->wanted : p->whole;
 	}
 	free(seed);
 	settle(p);

@@ -5,17 +5,19 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Of a radius: what a grain may overlap another one and still grow. */
+/* Of a radius: what a grain may overlap another one as it grows. */
 static const quern_real most_overlap = 0.015;
 
 static void note(quern_real *worst, int32_t i, quern_real overlap) {
 	if (overlap > worst[i]) worst[i] = overlap;
 }
 
-static void find_overlaps(const quern_step *s, quern_real *worst) {
+/* Who has no entry in the list is farther from others than a step of growth. */
+static void find_overlaps(const quern_step *s, quern_real *worst, uint32_t grains) {
 	const quern_column *u = s->use;
 	const uint32_t n = s->host->set(s->run, "contact").n;
 	const quern_images images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
+	for (uint32_t i = 0; i < grains; i++) worst[i] = -INFINITY;
 	for (uint32_t c = 0; c < n; c++) {
 		const int32_t i = u[G_FIRST].index[c], j = u[G_SECOND].index[c];
 		quern_real d2 = 0;
@@ -42,11 +44,13 @@ quern_status quern_hybrid_grow(const void *self, const quern_step *s) {
 		if (!worst) {
 			worst = s->host->memory(s->run, n * sizeof *worst);
 			if (!worst) return QUERN_E_MEMORY;
-			find_overlaps(s, worst);
+			find_overlaps(s, worst, n);
 		}
-		if (worst[i] > most_overlap * now) continue;
+		const quern_real room = most_overlap * now - worst[i]; /* the other one may grow as well */
+		if (!(room > 0)) continue;
 		const quern_real whole = quern_radius_of_mass(mass, h->density, s->dim),
-						 then = now + 0.5 * h->diameter * (quern_real)h->substeps / (quern_real)h->growth;
+						 then = now + fmin(room, 0.5 * h->diameter * (quern_real)h->substeps /
+													 (quern_real)h->growth);
 		u[G_RADIUS].real[0][i] = then < whole ? then : whole;
 		farthest = fmax(farthest, u[G_RADIUS].real[0][i] - now);
 	}
