@@ -304,8 +304,7 @@ static void enrich_cell(packed_cell *p) {
 		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
 		p->part = ops->shrinks ? 1 : parts[k];
 		job.growth = k && ops->shrinks ? QUERN_GROWS_ALONE : QUERN_STAYS_SMALL;
-		for (; job.n_seed < n + p->n; job.n_seed++)
-			seed[job.n_seed] = spot_of(&p->grain[job.n_seed - n]);
+		for (; job.n_seed < n + p->n; job.n_seed++) seed[job.n_seed] = spot_of(&p->grain[job.n_seed - n]);
 		job.counter = ((uint64_t)d->u[U_UPDATES].index[0] << 32) + ((uint64_t)k << 24);
 		ops->pack[d->s->dim - 2](packer->self, &job);
 		/* what is rounded up finds room or waits: where nothing presses, grains that are squeezed in would */

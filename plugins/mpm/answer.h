@@ -24,6 +24,16 @@ static quern_real pressure_of(const gather_work *w, uint32_t i) {
 	return pressure;
 }
 
+QUERN_INLINE void pressures_of(
+	const gather_work *w, uint32_t begin, uint32_t n, const int dim, quern_real *restrict pressure) {
+	memset(pressure, 0, n * sizeof *pressure);
+	for (int k = 0; k < dim; k++) {
+		const quern_real *restrict stress = w->s->use[GATHER_STRESS].real[k] + begin;
+		QUERN_SIMD
+		for (uint32_t i = 0; i < n; i++) pressure[i] -= stress[i] / dim;
+	}
+}
+
 /* On the grid in the middle of a cell: the mean of its corners. */
 static quern_real centre_density(const gather_work *w, const gather_memory *m, uint32_t place) {
 	const uint32_t dim = w->s->dim, edge = w->g->edge;
@@ -98,7 +108,8 @@ QUERN_INLINE quern_real mean_excess(const gather_work *w, const gather_memory *m
 				const int32_t there = (z * edge + y) * edge + x;
 				const quern_real excess = m->excess[there];
 				const bool counts = m->inside[there] && excess >= -most_excess;
-				sum += counts ? fmin(excess, most_excess) : 0;
+				const quern_real held = excess < most_excess ? excess : most_excess;
+				sum += counts ? held : 0;
 				n += counts;
 			}
 	return n ? fmin(fmax(0, sum / n - noise_around), most_around) : 0;
@@ -114,29 +125,43 @@ QUERN_INLINE void find_excess(const gather_work *w, gather_memory *m, const int 
 								  : 0;
 }
 
+/* The points of a chunk, to what their cells have. */
+QUERN_INLINE void level_chunk(
+	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
+	const quern_real *restrict mass = w->s->use[GATHER_MASS].real[0] + begin,
+							   *restrict volume = w->s->use[GATHER_VOLUME].real[0] + begin;
+	quern_real(*place)[STENCIL] = m->trip.stencil.position;
+	quern_real pressure[STENCIL], presses[STENCIL], closed[STENCIL];
+	for (int k = 0; k < dim; k++) {
+		const quern_real *restrict position = w->s->use[GATHER_POSITION].real[k] + begin;
+		for (uint32_t i = 0; i < n; i++) place[k][i] = position[i] - w->g->lower[k];
+	}
+	cells_of(w, b, place, n, dim, m->cell);
+	pressures_of(w, begin, n, dim, pressure);
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) {
+		presses[i] = volume[i] * pressure[i];
+		closed[i] = mass[i] < closed_from(w->p, pressure[i]) * volume[i] ? 0 : 1;
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t c = (uint32_t)m->cell[i];
+		m->level[c] += presses[i];
+		m->mean[c] += closed[i] * mass[i];
+		m->room[c] += closed[i] * volume[i];
+		m->loose[c] += (1 - closed[i]) * volume[i];
+	}
+}
+
 /* The mean pressure of each cell's points, by volume, and the density of each cell. Points that lie loose and bear nothing are a part of what flows
  * where the cell is full; in one that is not they are spray beside it. */
 QUERN_INLINE void level_block(const gather_work *w, gather_memory *m, uint32_t b, const int dim) {
-	const quern_real *mass = w->s->use[GATHER_MASS].real[0], *volume = w->s->use[GATHER_VOLUME].real[0];
-	quern_real *const *position = w->s->use[GATHER_POSITION].real,
-					  (*place)[STENCIL] = m->trip.stencil.position;
 	memset(m->level, 0, sizeof m->level);
 	memset(m->room, 0, sizeof m->room);
 	memset(m->loose, 0, sizeof m->loose);
 	memset(m->mean, 0, sizeof m->mean);
 	for (uint32_t begin = w->point[b]; begin < w->point[b + 1]; begin += STENCIL) {
-		const uint32_t rest = w->point[b + 1] - begin, n = rest < STENCIL ? rest : STENCIL;
-		for (int k = 0; k < dim; k++)
-			for (uint32_t i = 0; i < n; i++) place[k][i] = position[k][begin + i] - w->g->lower[k];
-		cells_of(w, b, place, n, dim, m->cell);
-		for (uint32_t i = 0; i < n; i++) {
-			const uint32_t at = begin + i, c = (uint32_t)m->cell[i];
-			const quern_real pressure = pressure_of(w, at);
-			const bool open = mass[at] < closed_from(w->p, pressure) * volume[at];
-			m->level[c] += volume[at] * pressure;
-			m->mean[c] += open ? 0 : mass[at];
-			*(open ? &m->loose[c] : &m->room[c]) += volume[at];
-		}
+		const uint32_t rest = w->point[b + 1] - begin;
+		level_chunk(w, m, b, begin, rest < STENCIL ? rest : STENCIL, dim);
 	}
 	for (uint32_t c = 0; c < QUERN_BLOCK_CELLS; c++) {
 		const bool any = m->room[c] + m->loose[c] > 0;
@@ -165,19 +190,17 @@ QUERN_INLINE quern_real follow_cell(
 }
 
 /* A continuum alone: densities of points go to the mean of their cell's, which keeps the volume of all, much faster
- * than that goes to what the cell holds. Each by itself would take over the noise of its own gradient. */
-static quern_real follow_alone(const gather_work *w, const gather_memory *m, uint32_t c, uint32_t i,
-	quern_real pressure, quern_real rate2) {
-	if (!(rate2 > 0) || !(m->level[c] > 0) || !(m->mean[c] > 0) ||
-		m->density[i] < closed_from(w->p, pressure))
-		return 0;
-	const quern_real time = w->s->dt * COUNT_EVERY, shear = sheared_rate(m, i, rate2, (int)w->s->dim) * time;
-	const quern_real evened = evening * w->p->follow * shear, part = w->p->follow * shear,
-					 soon = faster_around * part,
-					 excess = m->excess[c] < -most_excess ? 0 : fmin(m->excess[c], most_excess);
-	return (evened / (1 + evened) * (1 - m->density[i] / m->mean[c]) + part / (1 + part) * excess +
-			   soon / (1 + soon) * m->excess_around[c]) /
-		   time;
+ * than that goes to what the cell holds. Each by itself would take over the noise of its own gradient. `own`, beside the cell's
+ * level and mean, is the point's density; `shear` how far it is sheared until cells are counted again. */
+QUERN_INLINE quern_real follow_alone(quern_real follow, quern_real level, quern_real mean, quern_real own,
+	quern_real excess, quern_real excess_around, quern_real closed, quern_real shear) {
+	const quern_real evened = evening * follow * shear, part = follow * shear, soon = faster_around * part,
+					 high = excess < most_excess ? excess : most_excess,
+					 counted = excess < -most_excess ? 0 : high;
+	const quern_real grown = evened / (1 + evened) * (1 - own / mean) + part / (1 + part) * counted +
+							 soon / (1 + soon) * excess_around;
+	const bool follows = (shear > 0) & (level > 0) & (mean > 0) & (own >= closed);
+	return follows ? grown : 0;
 }
 
 /* Mass that came where there was no room has brought its volume along, and does not press: what pressure lacks comes as a compression
@@ -234,14 +257,28 @@ QUERN_INLINE void answer_chunk(
 /* A continuum alone: how fast each density will follow until cells are counted again, and the mean pressure around. */
 QUERN_INLINE void measure_chunk(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
-	const quern_column *u = w->s->use;
+	const quern_real still = w->still, time = w->s->dt * COUNT_EVERY, follow = w->p->follow,
+					 solid = closed_from(w->p, 0), soft = closed_from(w->p, 1);
+	quern_real *restrict following = w->s->use[GATHER_FOLLOWING].real[0] + begin,
+						 *restrict around = w->s->use[GATHER_AROUND].real[0] + begin;
+	quern_real pressure[STENCIL], mean[STENCIL], excess[STENCIL], excess_around[STENCIL];
 	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
+	pressures_of(w, begin, n, dim, pressure);
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t c = (uint32_t)m->cell[i];
-		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim);
-		u[GATHER_FOLLOWING].real[0][begin + i] =
-			flowing_share(w->still, rate2) * follow_alone(w, m, c, i, pressure_of(w, begin + i), rate2);
-		u[GATHER_AROUND].real[0][begin + i] = m->level[c];
+		around[i] = m->level[c];
+		mean[i] = m->mean[c];
+		excess[i] = m->excess[c];
+		excess_around[i] = m->excess_around[c];
+	}
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim),
+						 shear = sheared_rate(m, i, rate2, dim) * time,
+						 closed = pressure[i] > 0 ? soft : solid,
+						 grown = follow_alone(follow, around[i], mean[i], m->density[i], excess[i],
+							 excess_around[i], closed, shear);
+		following[i] = flowing_share(still, rate2) * (grown / time);
 	}
 }
 

@@ -11,19 +11,14 @@ static const quern_real pressed_off = 0.02;
 /* Of a move: from wherever in a cell, a fifth of the way to its face is left. */
 static const quern_real most_pull = 0.2;
 
-/* How far along an axis a point (m from the grid's lower corner) is from the middle of its cell, in cells. Between sorts one may be beyond its
+/* How far along an axis a point (m from the grid's lower corner) is from the middle of its cell, in cells; the block's begin at `begin`. Between sorts one may be beyond its
  * block's cells, and is in none of them: more than half. Beyond the end of a period narrower than a block, in a continuum alone, the last cell stands for the first. */
-QUERN_INLINE quern_real spread_offset(const gather_work *w, uint32_t b, int axis, quern_real position) {
-	const int32_t begin = w->g->at[b][axis] * (int32_t)w->g->edge;
-	const quern_real t = position / w->g->cell - begin, most = (quern_real)w->g->edge;
-	return ((t >= 0) & (t < most)) ? t - quern_floor(t) - 0.5 : 1;
+QUERN_INLINE quern_real spread_offset(quern_real position, quern_real cell, int32_t begin, quern_real edge) {
+	const quern_real t = position / cell - begin;
+	return ((t >= 0) & (t < edge)) ? t - quern_floor(t) - 0.5 : 1;
 }
-
-QUERN_INLINE bool spread_within(
-	const gather_work *w, uint32_t b, quern_real position[3][STENCIL], uint32_t i, const int dim) {
-	bool within = true;
-	for (int k = 0; k < dim; k++) within = within && spread_offset(w, b, k, position[k][i]) < 1;
-	return within;
+QUERN_INLINE int32_t spread_begin(const gather_work *w, uint32_t b, int axis) {
+	return w->g->at[b][axis] * (int32_t)w->g->edge;
 }
 
 /* Mean square of the way from the middle, over that of what is everywhere alike (1/12): of points in the middles of equal parts, as at first. */
@@ -142,38 +137,82 @@ static void spread_find_cut(const gather_work *w, gather_memory *m, uint32_t b) 
 	}
 }
 
-/* How fast the points of a chunk will go until cells are counted again: means to the middle of the cell and mean squares to those of the start, by a part
- * for each unit of shear, and little along an axis along which the flow takes points through cells anyway. Points of a hybrid's zone stay: grains lie
- * between them. */
-QUERN_INLINE void spread_chunk(
-	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
-	const quern_real time = w->s->dt * COUNT_EVERY, volume = quern_grid_cell_volume(w->g);
-	quern_real *const *rate = w->s->use[GATHER_SPREADING].real;
-	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
+/* Of a chunk's points: the square of the shear rate, by what share they are spread until cells are counted again, 0 for those that stay, and the mass
+ * of their cell. */
+typedef struct spread_points {
+	quern_real rate2[STENCIL], part[STENCIL], full[STENCIL];
+} spread_points;
+
+/* Points of a hybrid's zone stay: grains lie between them. */
+QUERN_INLINE void spread_parts(
+	const gather_work *w, gather_memory *m, uint32_t begin, uint32_t n, const int dim, spread_points *of) {
+	const quern_real time = w->s->dt * COUNT_EVERY, by = w->p->spread * time, still = w->still,
+					 volume = quern_grid_cell_volume(w->g), least = w->p->bears, most = waves * w->p->bulk;
+	const quern_real *weight = w->points.weight;
+	quern_real level[STENCIL], spreads[STENCIL];
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t c = (uint32_t)m->cell[i];
-		const quern_row *row = w->moment + (size_t)b * QUERN_BLOCK_CELLS + c;
-		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim), full = m->held[c] * volume;
-		const quern_real part =
-			w->p->spread * time * flowing_share(w->still, rate2) * sheared_rate(m, i, rate2, dim);
-		const bool stays = !m->inside[c] || !(m->level[c] > w->p->bears) ||
-						   !(m->level[c] < waves * w->p->bulk) || !(full > 0) || !(part > 0) ||
-						   (w->points.weight && w->points.weight[begin + i] < 1) ||
-						   !spread_within(w, b, m->trip.stencil.position, i, dim);
-		for (int k = 0; k < dim; k++) {
-			if (stays) {
-				rate[k][begin + i] = 0;
-				continue;
-			}
-			const quern_real off = spread_offset(w, b, k, m->trip.stencil.position[k][i]),
-							 low = m->cut[k][0][c], high = m->cut[k][1][c],
-							 mean = (*row)[2 * k] / full - spread_wanted(low, high),
-							 wide = (*row)[2 * k + 1] / full, passes = m->trip.pic[k][i] / w->g->cell,
-							 share = part / (1 + part) * (rate2 / (rate2 + passes * passes)),
-							 pull = share * (spread_beyond(mean) + wide * off);
-			rate[k][begin + i] = -fmin(fmax(pull, -most_pull), most_pull) / time;
-		}
+		level[i] = m->level[c];
+		of->full[i] = m->held[c] * volume;
+		spreads[i] = m->inside[c] && !(weight && weight[begin + i] < 1);
 	}
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim),
+						 part = by * flowing_share(still, rate2) * sheared_rate(m, i, rate2, dim);
+		const bool goes =
+			(spreads[i] > 0) & (level[i] > least) & (level[i] < most) & (of->full[i] > 0) & (part > 0);
+		of->rate2[i] = rate2;
+		of->part[i] = goes ? part : 0;
+	}
+}
+
+/* Those beyond their block's cells along an axis stay as well. */
+QUERN_INLINE void spread_offsets(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t n,
+	const int k, quern_real *restrict off, quern_real *restrict part) {
+	const int32_t begin = spread_begin(w, b, k);
+	const quern_real cell = w->g->cell,
+					 edge = (quern_real)w->g->edge, *restrict place = m->trip.stencil.position[k];
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) {
+		off[i] = spread_offset(place[i], cell, begin, edge);
+		part[i] = off[i] < 1 ? part[i] : 0;
+	}
+}
+
+QUERN_INLINE void spread_along(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t n,
+	const int k, const spread_points *of, const quern_real *restrict off, quern_real *restrict rate) {
+	const quern_real time = w->s->dt * COUNT_EVERY, cell = w->g->cell;
+	const quern_row *moment = w->moment + (size_t)b * QUERN_BLOCK_CELLS;
+	quern_real sum[STENCIL], squares[STENCIL], wanted[STENCIL];
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t c = (uint32_t)m->cell[i];
+		sum[i] = moment[c][2 * k];
+		squares[i] = moment[c][2 * k + 1];
+		wanted[i] = spread_wanted(m->cut[k][0][c], m->cut[k][1][c]);
+	}
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) {
+		const quern_real mean = sum[i] / of->full[i] - wanted[i], wide = squares[i] / of->full[i],
+						 passes = m->trip.pic[k][i] / cell, part = of->part[i],
+						 share = part / (1 + part) * (of->rate2[i] / (of->rate2[i] + passes * passes)),
+						 pull = share * (spread_beyond(mean) + wide * off[i]),
+						 held = pull > -most_pull ? pull < most_pull ? pull : most_pull : -most_pull;
+		rate[i] = part > 0 ? -held / time : 0;
+	}
+}
+
+/* How fast the points of a chunk will go until cells are counted again: means to the middle of the cell and mean squares to those of the start, by a part
+ * for each unit of shear, and little along an axis along which the flow takes points through cells anyway. */
+QUERN_INLINE void spread_chunk(
+	const gather_work *w, gather_memory *m, uint32_t b, uint32_t begin, uint32_t n, const int dim) {
+	spread_points of;
+	quern_real off[3][STENCIL];
+	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
+	spread_parts(w, m, begin, n, dim, &of);
+	for (int k = 0; k < dim; k++) spread_offsets(w, m, b, n, k, off[k], of.part);
+	for (int k = 0; k < dim; k++)
+		spread_along(w, m, b, n, k, &of, off[k], w->s->use[GATHER_SPREADING].real[k] + begin);
 }
 
 /* Nothing is moved across a face. Updates of zones come between counts: who has come into one stays from then on. */
