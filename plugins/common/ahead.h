@@ -6,16 +6,12 @@
 #include <quern/columns.h>
 
 /* A set of less than so many bytes stays in caches, which need not be asked. */
-enum {
-	AHEAD_MOST = 64,
-	AHEAD_BYTES = 4 << 20,
-	AHEAD_LINE = 64 / sizeof(quern_real),
-	AHEAD_LINES = STENCIL / AHEAD_LINE
-};
+enum { AHEAD_MOST = 64, AHEAD_BYTES = 4 << 20, AHEAD_LINE = 64 / sizeof(quern_real) };
 
 typedef struct ahead {
 	const quern_real *column[AHEAD_MOST];
 	uint32_t n;
+	bool asks; /* for these, and for nodes */
 } ahead;
 
 /* The parts of a use in real numbers that are there, once each. Parts beyond the most are not asked for, and are read all the same. */
@@ -29,29 +25,35 @@ static inline void ahead_add(ahead *a, const quern_column *use) {
 
 /* When all columns of a set of n entries are there. */
 static inline void ahead_end(ahead *a, uint32_t n) {
-	if ((size_t)n * a->n * sizeof(quern_real) < AHEAD_BYTES) a->n = 0;
+	a->asks = (size_t)n * a->n * sizeof(quern_real) >= AHEAD_BYTES;
+	if (!a->asks) a->n = 0;
 }
 
-/* What follows a chunk: the entries from `begin` on, of `n` in the set, and nodes of the next block. */
+/* What is still to be asked for beside a chunk: of what follows it, and of the next block's nodes. */
 typedef struct ahead_at {
-	uint32_t begin, n, next, rows; /* rows: nodes that have been asked for with the chunks before */
+	uint32_t column, entry, end; /* whose turn it is, of which entry; the first that is not asked for */
+	uint32_t each;               /* lines for each particle of a chunk */
+	const int32_t *node, *last;  /* in the next block's tile */
 } ahead_at;
 
-/* Behind those n of block b that begin at entry i; `first`: of each block. */
-QUERN_INLINE ahead_at ahead_from(
-	const quern_grid_view *g, const uint32_t *first, uint32_t b, uint32_t next, uint32_t i, uint32_t n) {
-	const uint32_t after = i + n < first[b + 1] ? i + n : first[next];
-	return QUERN_VALUE(ahead_at, after, first[g->n_blocks], next, i - first[b]);
+/* Beside those n of block b that begin at entry i; `first`: of each block. A block's later chunks go on among the nodes where those before have ended. */
+QUERN_INLINE ahead_at ahead_from(const ahead *a, const quern_grid_view *g, const uint32_t *first, uint32_t b,
+	uint32_t next, uint32_t i, uint32_t n) {
+	const uint32_t after = i + n < first[b + 1] ? i + n : first[next], all = first[g->n_blocks],
+				   size = g->tile_size, asked = i - first[b] < size ? i - first[b] : size;
+	const int32_t *tile = g->tile + (size_t)next * size;
+	return QUERN_VALUE(ahead_at, 0, after, after + STENCIL < all ? after + STENCIL : all,
+		(a->n + AHEAD_LINE - 1) / AHEAD_LINE, tile + asked, tile + (a->asks ? size : asked));
 }
 
-/* With the particle `part` of a chunk: its part of the lines of the next one and, in 3-D, one node of the next block's tile. In a plane all nodes are few enough to
- * be near anyway. A processor waits once it has asked for some tens of lines that have not come yet, so they are asked for in turn with other work. */
-QUERN_INLINE void ahead_ask(const ahead *a, const quern_grid_view *g, const quern_row *rows,
-	const ahead_at *at, uint32_t part, const int dim) {
-	const uint32_t i = at->begin + part % AHEAD_LINES * AHEAD_LINE, row = at->rows + part;
-	for (uint32_t c = part / AHEAD_LINES; c < a->n && i < at->n; c += AHEAD_LINES)
-		__builtin_prefetch(a->column[c] + i);
-	if (dim == 2 || !a->n || row >= g->tile_size) return;
-	const int32_t entry = g->tile[(size_t)at->next * g->tile_size + row];
+/* With each of STENCIL particles: its part of the lines of what follows, and one node. A processor waits once it has asked for some tens of
+ * lines that have not come yet, so they are asked for in turn with other work. */
+QUERN_INLINE void ahead_ask(const ahead *a, const quern_row *rows, ahead_at *at) {
+	for (uint32_t k = 0; k < at->each && at->entry < at->end; k++) {
+		__builtin_prefetch(a->column[at->column] + at->entry);
+		if (++at->column == a->n) at->column = 0, at->entry += AHEAD_LINE;
+	}
+	if (at->node == at->last) return;
+	const int32_t entry = *at->node++;
 	__builtin_prefetch(rows + (entry < 0 ? 0 : entry));
 }

@@ -32,6 +32,16 @@ QUERN_INLINE row_part part_of(quern_real x) {
 #endif
 }
 
+/* The first lanes of a, and those of b from lane `from` on. */
+QUERN_INLINE row_part part_join(row_part a, row_part b, const int from) {
+#if defined QUERN_WHOLE_ROWS
+	return (row_part)_mm512_mask_blend_pd((__mmask8)(0xff << from), (__m512d)a, (__m512d)b);
+#else
+	for (int l = from; l < PART_LANES; l++) a[l] = b[l];
+	return a;
+#endif
+}
+
 #if !defined __FMA__ && !defined __FP_FAST_FMA
 /* What a processor without fused products makes of those that it has: Boldo and Melquiond, Emulation of a FMA and correctly rounded sums: proved
  * algorithms using rounding to odd, IEEE Trans. Comput. 57 (2008). Numbers whose parts would not be exact go to the library, which takes ten times as long. */

@@ -327,6 +327,34 @@ QUERN_INLINE void stencil_gather(
 	stencil_gather_by(s, i, tile, dim, slopes, s->slope, out);
 }
 
+/* In a plane what comes back to points has five lanes, and a row has room for the first two once more: where the processor takes a row at once, one product
+ * does for sums and for slopes along x, by a factor that is the one or the other. Sums are the same to the bit. */
+enum { ONCE_MORE = 5 };
+QUERN_INLINE bool stencil_doubles(const int dim) { return dim == 2 && PARTS == 1; }
+
+QUERN_INLINE void stencil_double(quern_row *tile, uint32_t n) {
+	for (uint32_t k = 0; k < n; k++)
+		tile[k] = __builtin_shufflevector(tile[k], tile[k], 0, 1, 2, 3, 4, 0, 1, 7);
+}
+
+/* Of doubled rows, each of one part: the weighted sum, with its slopes along x from lane ONCE_MORE on; in the first lanes of `up` those along y. */
+QUERN_INLINE void stencil_gather_doubled(
+	const stencil *s, uint32_t i, const quern_row *tile, row_part *sum, row_part *up) {
+	const uint32_t span = tile_span(2);
+	row_part along[3], all = { 0 }, high = { 0 };
+	for (uint32_t x = 0; x < 3; x++)
+		along[x] = part_join(part_of(s->value[0][x][i]), part_of(s->slope[0][x][i]), ONCE_MORE);
+	for (uint32_t y = 0; y < 3; y++) {
+		const quern_row *row = tile + s->node[i] + y * span;
+		row_part e = { 0 };
+		for (uint32_t x = 0; x < 3; x++) e = part_fma(along[x], *const_parts_of(row + x), e);
+		all = part_fma(part_of(s->value[1][y][i]), e, all);
+		high = part_fma(part_of(s->slope[1][y][i]), e, high);
+	}
+	*sum = all;
+	*up = high;
+}
+
 /* ---- all blocks, where they add to nodes ---- */
 
 /* `next` is worked on after `block`, by whichever worker; the same where there is none. */

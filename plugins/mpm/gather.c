@@ -21,32 +21,36 @@ static quern_real said_around(const gather_work *w, const gather_memory *m, uint
 	return n ? sum / n : -m->tile[node][motion_density(w->s->dim)];
 }
 
+typedef int64_t row_signs __attribute__((vector_size(sizeof(quern_row))));
+
 static void speak_for_others(const gather_work *w, gather_memory *m) {
 	const uint32_t lane = motion_density(w->s->dim), nodes = w->g->tile_size;
-	bool any = false;
-	for (uint32_t k = 0; k < nodes; k++) {
-		m->silent[k] = m->tile[k][lane] < 0;
-		any = any || m->silent[k];
-	}
-	if (!any) return;
+	row_signs below = { 0 };
+	for (uint32_t k = 0; k < nodes; k++) below |= m->tile[k] < 0;
+	memset(m->silent, 0, nodes * sizeof *m->silent);
+	if (!below[lane]) return;
+	for (uint32_t k = 0; k < nodes; k++) m->silent[k] = m->tile[k][lane] < 0;
 	for (uint32_t k = 0; k < nodes; k++)
 		m->said[k] = m->tile[k][lane] < 0 ? said_around(w, m, k) : m->tile[k][lane];
 	for (uint32_t k = 0; k < nodes; k++) m->tile[k][lane] = m->said[k];
 }
 
 /* What the nodes say at the points of a chunk. */
-QUERN_INLINE void collect_chunk(const gather_work *w, gather_memory *m, uint32_t n, const int dim,
-	const bool slopes, const ahead_at *at) {
+QUERN_INLINE void collect_chunk(
+	const gather_work *w, gather_memory *m, uint32_t n, const int dim, const bool slopes, ahead_at *at) {
 	for (uint32_t i = 0; i < n; i++) {
-		ahead_ask(&w->ahead, w->g, w->motion, at, i, dim);
+		ahead_ask(&w->ahead, w->motion, at);
+		const bool doubled = slopes && stencil_doubles(dim);
 		quern_row v[4];
-		stencil_gather(&m->trip.stencil, i, m->tile, dim, slopes, v);
+		if (doubled) stencil_gather_doubled(&m->trip.stencil, i, m->tile, parts_of(&v[0]), parts_of(&v[2]));
+		else stencil_gather(&m->trip.stencil, i, m->tile, dim, slopes, v);
 		trips_hear(&m->trip, i, &v[0], 0, dim);
 		for (int k = 0; k < dim; k++)
-			for (int a = 0; a < dim && slopes; a++) m->gradient[dim * k + a][i] = v[1 + a][k];
+			for (int a = 0; a < dim && slopes; a++)
+				m->gradient[dim * k + a][i] = doubled && a == 0 ? v[0][ONCE_MORE + k] : v[1 + a][k];
 		m->grid_density[i] = v[0][2 * dim];
 	}
-	for (uint32_t i = n; i < STENCIL; i++) ahead_ask(&w->ahead, w->g, w->motion, at, i, dim);
+	for (uint32_t i = n; i < STENCIL; i++) ahead_ask(&w->ahead, w->motion, at);
 	trips_hear_echo(&w->trips, &m->trip, n, dim);
 }
 
@@ -242,6 +246,14 @@ QUERN_INLINE void finish_chunk(
 		if (!are_sound(w, m, begin, i, i + 1, axes)) w->bad[b] = (int32_t)(begin + i);
 }
 
+/* What answers to how full cells are and strains were added to, as nodes say it. */
+QUERN_INLINE void restore_gradient(const gather_work *w, gather_memory *m, uint32_t n, const int dim) {
+	for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
+		memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
+	for (int k = 0; k < dim * dim && w->strain->apply[dim - 2]; k++)
+		memcpy(m->gradient[k], m->raw[k], n * sizeof(quern_real));
+}
+
 QUERN_INLINE void gather_block(
 	const gather_work *w, gather_memory *m, uint32_t b, uint32_t next, const int dim, const bool last) {
 	quern_real *const *x = w->s->use[GATHER_POSITION].real;
@@ -249,13 +261,14 @@ QUERN_INLINE void gather_block(
 	if (begin == end) return;
 	quern_tile_load(w->g, w->motion, b, m->tile);
 	if (last) speak_for_others(w, m);
+	if (last && stencil_doubles(dim)) stencil_double(m->tile, w->g->tile_size);
 	trips_begin_block(&w->trips, &m->trip, b, last);
 	if (last && (w->answers || w->counts)) level_block(w, m, b, dim);
 	if (last && w->moment) spread_find_cut(w, m, b);
 	if (last && w->strain->means) strain_block(w, m, b, dim);
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
-		const ahead_at at = ahead_from(w->g, w->point, b, next, i, n);
+		ahead_at at = ahead_from(&w->ahead, w->g, w->point, b, next, i, n);
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, x, i, NULL, n, &m->trip.stencil);
 		collect_chunk(w, m, n, dim, last, &at);
 		if (last && w->p->matrix) fit_chunk(w, m, n, dim);
@@ -274,10 +287,7 @@ QUERN_INLINE void gather_block(
 		if (w->counts) measure_chunk(w, m, b, i, n, dim);
 		if (w->p->alone) follow_chunk(w, m, i, n);
 		press_chunk(w, m, i, n, dim);
-		for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
-			memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
-		for (int k = 0; k < dim * dim && w->strain->apply[dim - 2]; k++)
-			memcpy(m->gradient[k], m->raw[k], n * sizeof(quern_real));
+		if (w->gives) restore_gradient(w, m, n, dim);
 		finish_chunk(w, m, b, i, n, dim);
 	}
 	if (last && w->calm.part)
@@ -348,6 +358,8 @@ static void note_columns(gather_work *w, uint32_t n) {
 		if (material->uses[r].shape != QUERN_INDEX && material->uses[r].shape != QUERN_ID)
 			ahead_add(&w->ahead, &material->column[r]);
 	ahead_end(&w->ahead, n);
+	/* in a plane there is little else to do meanwhile, and the processor foresees enough */
+	if (w->s->dim == 2) w->ahead.n = 0;
 }
 
 quern_status quern_mpm_gather(const void *self, const quern_step *s) {
@@ -369,6 +381,7 @@ quern_status quern_mpm_gather(const void *self, const quern_step *s) {
 	w.moved = s->host->memory(s->run, w.g->n_blocks * sizeof(int32_t));
 	w.full = s->use[GATHER_FULL].real[0] ? dead_band * s->use[GATHER_FULL].real[0][0] : 0;
 	w.answers = p->rest_rate > 0 && w.full > 0 && s->use[GATHER_CROWDING].real[0];
+	w.gives = s->use[GATHER_GRADIENT].real[0] || s->use[GATHER_AFFINE].real[0];
 	const bool due = p->counted && s->use[GATHER_UNCOUNTED].index[0] == 1;
 	w.counts = due && p->alone;
 	w.still = p->alone ? flowing_alone * p->rest_alone : flowing * p->rest_rate;

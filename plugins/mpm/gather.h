@@ -19,6 +19,7 @@ typedef struct gather_work {
 	bool answers;          /* volume does, to how full cells are */
 	bool counts;           /* the same of a continuum alone, in this step */
 	bool spreads;          /* points are */
+	bool gives;            /* gradients are stored for others */
 	quern_row *moment;     /* by cell, in steps that count where they are: spread.h */
 	const body_pose *pose; /* by body, for that */
 	const quern_strain_ops *strain;

@@ -15,7 +15,7 @@ typedef struct {
 	ahead ahead; /* columns of points */
 } scatter_work;
 
-/* Of a chunk: mass and momentum, volume times stress, mass times velocity gradient. */
+/* Of a chunk: mass and momentum, minus volume times stress, mass times velocity gradient. */
 typedef struct {
 	quern_row tile[QUERN_TILE_MOST];
 	stencil stencil;
@@ -38,10 +38,11 @@ QUERN_INLINE void add_times(
 QUERN_INLINE void load_chunk(
 	const quern_column *u, scatter_memory *m, uint32_t begin, uint32_t n, const int dim, const bool affine) {
 	const quern_real *weight = u[SCATTER_WEIGHT].real[0];
-	quern_real part[STENCIL], volume[STENCIL];
+	quern_real part[STENCIL], less[STENCIL], volume[STENCIL];
 	for (uint32_t i = 0; i < n; i++) part[i] = weight ? weight[begin + i] : 1;
+	for (uint32_t i = 0; i < n; i++) less[i] = -part[i];
 	times(m->base[0], part, u[SCATTER_MASS].real[0] + begin, n);
-	times(volume, part, u[SCATTER_VOLUME].real[0] + begin, n);
+	times(volume, less, u[SCATTER_VOLUME].real[0] + begin, n);
 	for (int k = 0; k < dim; k++) times(m->base[1 + k], m->base[0], u[SCATTER_VELOCITY].real[k] + begin, n);
 	for (uint32_t k = 0; k < quern_shape_size(QUERN_SYMMETRIC, (uint32_t)dim); k++) {
 		times(m->push[k], volume, u[SCATTER_STRESS].real[k] + begin, n);
@@ -59,13 +60,13 @@ QUERN_INLINE sent send_point(scatter_memory *m, uint32_t i, const int dim, const
 	for (int k = 0; k < dim * dim && affine; k++) l[k % dim][k / dim] = m->along[k][i];
 	if (dim == 2) {
 		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i]);
-		p.lean[0] = PARTED(0, l[0][0], l[0][1], 0, -t.xx, -t.xy);
-		p.lean[1] = PARTED(0, l[1][0], l[1][1], 0, -t.xy, -t.yy);
+		p.lean[0] = PARTED(0, l[0][0], l[0][1], 0, t.xx, t.xy);
+		p.lean[1] = PARTED(0, l[1][0], l[1][1], 0, t.xy, t.yy);
 	} else {
 		p.base = PARTED(m->base[0][i], m->base[1][i], m->base[2][i], m->base[3][i]);
-		p.lean[0] = PARTED(0, l[0][0], l[0][1], l[0][2], 0, -t.xx, -t.xy, -t.xz);
-		p.lean[1] = PARTED(0, l[1][0], l[1][1], l[1][2], 0, -t.xy, -t.yy, -t.yz);
-		p.lean[2] = PARTED(0, l[2][0], l[2][1], l[2][2], 0, -t.xz, -t.yz, -t.zz);
+		p.lean[0] = PARTED(0, l[0][0], l[0][1], l[0][2], 0, t.xx, t.xy, t.xz);
+		p.lean[1] = PARTED(0, l[1][0], l[1][1], l[1][2], 0, t.xy, t.yy, t.yz);
+		p.lean[2] = PARTED(0, l[2][0], l[2][1], l[2][2], 0, t.xz, t.yz, t.zz);
 	}
 	return p;
 }
@@ -96,17 +97,17 @@ QUERN_INLINE void scatter_block(
 	memset(m->tile, 0, w->g->tile_size * sizeof(quern_row));
 	for (uint32_t i = begin; i < end; i += STENCIL) {
 		const uint32_t n = end - i < STENCIL ? end - i : STENCIL;
-		const ahead_at at = ahead_from(w->g, w->point, b, next, i, n);
+		ahead_at at = ahead_from(&w->ahead, w->g, w->point, b, next, i, n);
 		stencil_make(w->g, &w->s->slot[SLOT_SHAPE][0], b, u[SCATTER_POSITION].real, i, NULL, n, &m->stencil);
 		load_chunk(u, m, i, n, dim, affine);
 		for (uint32_t k = 0; k < n; k++) {
-			ahead_ask(&w->ahead, w->g, w->node, &at, k, dim);
+			ahead_ask(&w->ahead, w->node, &at);
 			const sent p = send_point(m, k, dim, affine);
 			stencil_scatter(&m->stencil, k, &p, affine ? SENDS_SLOPE | SENDS_ALONG : SENDS_SLOPE, m->tile,
 				dim, w->g->cell);
 			if (w->counts) count_point(w, m, b, k, u[SCATTER_MASS].real[0][i + k], dim);
 		}
-		for (uint32_t k = n; k < STENCIL; k++) ahead_ask(&w->ahead, w->g, w->node, &at, k, dim);
+		for (uint32_t k = n; k < STENCIL; k++) ahead_ask(&w->ahead, w->node, &at);
 	}
 	quern_tile_add(w->g, w->node, b, m->tile);
 }
