@@ -257,7 +257,7 @@ static quern_spot *find_seeds(const packed_cell *p, uint32_t *n) {
 	return wider;
 }
 
-/* Whether a cell is full, and its points bear more than the weight of one layer of grains. */
+/* Whether a cell is full, and its points bear more than the weight of one layer of grains. Without gravity, or points, none is. */
 static bool is_pressed(const update *d, uint32_t c) {
 	const quern_column *u = d->u;
 	quern_real volume = 0, bears = 0, gravity = 0;
@@ -299,6 +299,8 @@ static void enrich_cell(packed_cell *p) {
 	find_upstream(d, p->c, job.upstream);
 	const quern_packer_ops *ops = packer->ops;
 	const uint32_t again = !(d->h->growth > 0) ? 0 : ops->shrinks ? 1 : 3;
+	/* what is rounded up finds room or waits: where nothing presses, grains that are squeezed in would */
+	const uint32_t squeezed = again && is_pressed(d, p->c) ? p->wanted : p->whole;
 	p->most = p->wanted;
 	for (uint32_t k = 0; k <= again && p->n < p->most; k++) {
 		static const quern_real parts[] = { 1, 0.85, 0.75, 0.66 };
@@ -307,8 +309,7 @@ static void enrich_cell(packed_cell *p) {
 		for (; job.n_seed < n + p->n; job.n_seed++) seed[job.n_seed] = spot_of(&p->grain[job.n_seed - n]);
 		job.counter = ((uint64_t)d->u[U_UPDATES].index[0] << 32) + ((uint64_t)k << 24);
 		ops->pack[d->s->dim - 2](packer->self, &job);
-		/* what is rounded up finds room or waits: where nothing presses, grains that are squeezed in would */
-		p->most = is_pressed(d, p->c) ? p->wanted : p->whole;
+		p->most = squeezed;
 	}
 	free(seed);
 	settle(p);

@@ -12,7 +12,7 @@ static void note(quern_real *worst, int32_t i, quern_real overlap) {
 	if (overlap > worst[i]) worst[i] = overlap;
 }
 
-/* Who has no entry in the list is farther from others than a step of growth. */
+/* Who has no entry in the list has nobody near: steps of growth are short beside its skin, unless `growth` is some hundred grain steps alone. */
 static void find_overlaps(const quern_step *s, quern_real *worst, uint32_t grains) {
 	const quern_column *u = s->use;
 	const uint32_t n = s->host->set(s->run, "contact").n;
@@ -46,7 +46,7 @@ quern_status quern_hybrid_grow(const void *self, const quern_step *s) {
 			if (!worst) return QUERN_E_MEMORY;
 			find_overlaps(s, worst, n);
 		}
-		const quern_real room = most_overlap * now - worst[i]; /* the other one may grow as well */
+		const quern_real room = 0.5 * (most_overlap * now - worst[i]); /* the other one may grow as well */
 		if (!(room > 0)) continue;
 		const quern_real whole = quern_radius_of_mass(mass, h->density, s->dim),
 						 then = now + fmin(room, 0.5 * h->diameter * (quern_real)h->substeps /

@@ -91,23 +91,24 @@ typedef struct sparse {
 	double lacks[2], tolerance; /* grains, by turns; of those that a cell gets */
 } sparse;
 
-static quern_run *open_with(const sparse *l, const char *bodies, const char *packer, double radius) {
+static quern_run *open_with(
+	const sparse *l, const char *bodies, const char *packer, double radius, double gravity) {
 	char path[HARNESS_PATH];
 	put_one_each(path, l->columns, l->rows);
 	quern_run *run = harness_open(1,
-		"quern: 1\ndimension: 2\ngravity: [0, 0]\ndomain: {lower: [0, 0], upper: [%g, %g], periodic: [%s]}\n"
+		"quern: 1\ndimension: 2\ngravity: [0, %g]\ndomain: {lower: [0, 0], upper: [%g, %g], periodic: [%s]}\n"
 		"time: {end: 1e-6, step: 1e-9}\nbodies: [%s]\n"
 		"grains: {material: {density: 2500, radius: {mean: %g}},\n"
 		"  contact: {linear: {stiffness: 1e-9, restitution: 1, friction: 0}}, file: %s}\n"
 		"continuum: {cell: %g, material: {mu_i: {critical_density: 1900, bulk_modulus: 1e-6}}}\n"
 		"hybrid: {oracle: [{fixed: {%s}}], weights: %s, packer: %s, substeps: 1, update: 1}\n",
-		l->columns * cell, l->rows * cell, l->periodic, bodies, radius, path, cell, l->oracle, l->weights,
-		packer);
+		-gravity, l->columns * cell, l->rows * cell, l->periodic, bodies, radius, path, cell, l->oracle,
+		l->weights, packer);
 	unlink(path);
 	harness_steps(run, 4);
 	return run;
 }
-static quern_run *open_sparse(const sparse *l) { return open_with(l, "", "two_point_tangent", cell / 4); }
+static quern_run *open_sparse(const sparse *l) { return open_with(l, "", "two_point_tangent", cell / 4, 0); }
 
 /* A plate along half of a box; a hybrid cell A far above it and one, B, just below. What is owed just above goes to A, whoever else owes
  * something: it is reached first. B is near in a straight line alone, and comes round the plate's end. */
@@ -119,7 +120,7 @@ static void plates_are_gone_round(void **state) {
 			" {lower: [0.008, 0.02], upper: [0.012, 0.0235], zone: hybrid}]",
 			"half", 20, 14, { 0, 0 }, 0 };
 		quern_run *run = open_with(
-			&l, "{box: {lower: [-0.01, 0.0239], upper: [0.04, 0.0241]}}", "two_point_tangent", 0.8e-3);
+			&l, "{box: {lower: [-0.01, 0.0239], upper: [0.04, 0.0241]}}", "two_point_tangent", 0.8e-3, 0);
 		const int32_t a = cell_at(run, 0.01, 0.054), b = cell_at(run, 0.01, 0.022),
 					  owed = cell_at(run, 0.01, 0.03);
 		assert_int_equal(harness_field(run, "cell.zone").index[a], QUERN_HYBRID);
@@ -135,8 +136,8 @@ static void plates_are_gone_round(void **state) {
 	}
 }
 
-/* Grains that a cell of the zone gets in one update, in the mean, where each lacks what its column and row say. */
-static double grains_got(quern_run *run, const sparse *l, double radius, double *lacking) {
+/* Grains that a cell of the zone gets in one update, in the mean, where each lacks what its column and row say, and points bear a pressure. */
+static double grains_got(quern_run *run, const sparse *l, double radius, double pressure, double *lacking) {
 	const double mass = 2500 * 3.14159265358979312 * radius * radius;
 	const uint32_t before = quern_host_table.set(run, "grain").n;
 	int n = 0;
@@ -150,6 +151,9 @@ static double grains_got(quern_run *run, const sparse *l, double radius, double 
 			n++;
 		}
 	assert_true(n > 0);
+	for (int k = 0; k < 2; k++)
+		for (uint32_t i = 0; i < harness_count(run, "point") && pressure > 0; i++)
+			harness_field(run, "point.stress").real[k][i] = -pressure;
 	update(run);
 	*lacking = fmax(0, *lacking / n);
 	return (double)(quern_host_table.set(run, "grain").n - before) / n;
@@ -179,7 +183,7 @@ static void debts_round_together(void **state) {
 	for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
 		quern_run *run = open_sparse(&of[k]);
 		double lacking;
-		const double got = grains_got(run, &of[k], cell / 4, &lacking);
+		const double got = grains_got(run, &of[k], cell / 4, 0, &lacking);
 		good &= table_row(of[k].name, got, lacking, of[k].tolerance);
 		harness_close(run);
 	}
@@ -194,7 +198,7 @@ static void plates_are_not_passed(void **state) {
 	for (size_t k = 0; k < sizeof packers / sizeof *packers; k++) {
 		static const sparse l = { "", "false, false", "otherwise: hybrid", "half", 5, 9, { 0, 0 }, 0 };
 		quern_run *run =
-			open_with(&l, "{box: {lower: [0.018, -0.01], upper: [0.0185, 0.05]}}", packers[k], 0.4e-3);
+			open_with(&l, "{box: {lower: [0.018, -0.01], upper: [0.0185, 0.05]}}", packers[k], 0.4e-3, 0);
 		const uint32_t before = harness_count(run, "grain");
 		for (int j = 0; j < 9; j++)
 			harness_field(run, "cell.owed").real[0][cell_at(run, 0.0165, (j + 0.5) * cell)] +=
@@ -209,19 +213,25 @@ static void plates_are_not_passed(void **state) {
 
 #define ALONE "otherwise: discrete, boxes: [{lower: [0.016, 0.016], upper: [0.02, 0.02], zone: "
 /* Beside grains in a square lattice there is one full place in a cell, and two holes. Of the two grains that each cell lacks all of one goes into a
- * hole, to grow, and no fewer do where some cells are to have a third by rounding, which waits: but for what these take of what their blocks lack. */
+ * hole, to grow, and no fewer do where some cells are to have a third by rounding, which waits: but for what these take of what their blocks lack. Where
+ * points bear more than the weight of a layer, a third one goes into the other hole; not where they bear less, or nothing weighs. */
 static void rounding_takes_no_holes(void **state) {
-	double got[2], lacking;
+	static const double layer = 1900 * 9.81 * 2.1e-3;
+	static const double lacks[] = { 2, 2.4, 2.4, 2.4, 2.4 }, gravity[] = { 0, 0, 9.81, 0, 9.81 },
+						pressure[] = { 0, 0, 0.9 * layer, 1.1 * layer, 1.1 * layer };
+	double got[5], lacking;
 	(void)state;
-	for (int k = 0; k < 2; k++) {
-		const double lacks = k ? 2.4 : 2;
-		const sparse of = { "", "true, true", ALL, "half", 16, 16, { lacks, lacks }, 0 };
-		quern_run *run = open_with(&of, "", "expand", 1.05e-3);
-		got[k] = grains_got(run, &of, 1.05e-3, &lacking);
+	for (int k = 0; k < 5; k++) {
+		const sparse of = { "", "true, true", ALL, "half", 16, 16, { lacks[k], lacks[k] }, 0 };
+		quern_run *run = open_with(&of, "", "expand", 1.05e-3, gravity[k]);
+		got[k] = grains_got(run, &of, 1.05e-3, pressure[k], &lacking);
 		harness_close(run);
 	}
-	printf("  cells that lack 2 and 2.4 grains get %g and %g\n", got[0], got[1]);
+	printf("  cells that lack 2 and 2.4 grains get %g and %g, %g and %g; pressed ones %g\n", got[0], got[1],
+		got[2], got[3], got[4]);
 	assert_true(got[0] == 2 && got[1] > 0.9 * got[0]);
+	assert_true(got[2] == got[1] && got[3] == got[1]);
+	assert_true(got[4] > got[1] + 0.3);
 }
 
 /* A cell alone among discrete ones owes more than it holds, and nobody takes that: its points get lighter, but not without end, and all that is
