@@ -43,7 +43,7 @@ struct quern_pool {
 	_Alignas(64) _Atomic uint32_t n;
 	void (*_Atomic body)(void *, uint32_t, uint32_t);
 	void *_Atomic arg;
-	_Atomic bool stop, caller_waits, busy;
+	_Atomic bool stop, caller_waits, busy, lacked;
 	_Atomic uint32_t asleep, begun;
 	pthread_mutex_t lock;
 	pthread_cond_t work, end;
@@ -249,9 +249,14 @@ void *quern_pool_scratch(quern_pool *p, uint32_t worker, size_t bytes) {
 	free(own->memory);
 	own->bytes = (bytes + bytes / 4 + 4095) & ~(size_t)4095;
 	own->memory = quern_platform_memory(own->bytes);
-	if (!own->memory) own->bytes = 0;
+	if (!own->memory) {
+		own->bytes = 0;
+		atomic_store(&p->lacked, true);
+	}
 	return own->memory;
 }
+
+bool quern_pool_lacked(quern_pool *p) { return atomic_exchange(&p->lacked, false); }
 
 void quern_pool_rest(quern_pool *p) {
 	for (uint32_t w = 0; w < p->workers; w++)

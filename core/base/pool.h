@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* pool - the only place that knows about threads */
 #pragma once
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -20,6 +21,9 @@ void quern_pool_each(
 
 /* Memory of one worker, at least `bytes`, 64-byte aligned, kept between calls; NULL if there is none. */
 void *quern_pool_scratch(quern_pool *, uint32_t worker, size_t bytes);
+
+/* Between calls: whether some worker got none since this was asked last. */
+bool quern_pool_lacked(quern_pool *);
 
 /* Between calls: what lies in the memory of all workers goes back to the system until it is written again. */
 void quern_pool_rest(quern_pool *);

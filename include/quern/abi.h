@@ -284,7 +284,8 @@ typedef struct quern_host {
 	void (*parallel)(
 		quern_run *, uint32_t n, void (*body)(void *arg, uint32_t i, uint32_t worker), void *arg);
 	uint32_t (*workers)(quern_run *);
-	/* [stage, or this worker's own in a parallel body] 64-byte aligned, kept until asked for more. */
+	/* [stage, or this worker's own in a parallel body] 64-byte aligned, kept until asked for more. NULL only if memory is gone: a body
+	 * returns then, and the run ends after the stage. */
 	void *(*scratch)(quern_run *, uint32_t worker, size_t bytes);
 	/* [stage] Zeroed, 64-byte aligned memory until the stage returns, also of 0 bytes. NULL only if memory is
 	 * gone: return QUERN_E_MEMORY. */

@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include "harness.h"
 #include <run.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -219,9 +220,48 @@ static void no_room_for_a_plugin(void **state) {
 	assert_true(k > 6);
 }
 
+static quern_run *open_column(void) {
+	return harness_open(1,
+		"{quern: 1, dimension: 2, gravity: [0, -9.81], domain: {lower: [0, 0], upper: [0.1, 0.06]},\n"
+		"time: {end: 1, step: 1e-5}, bodies: [{plane: {point: [0, 5 mm], normal: [0, 1], boundary: sticky}}],\n"
+		"continuum: {cell: 4 mm, material: {elastic: {bulk_modulus: 1e6, density: 1900}},\n"
+		"  fill: {region: {box: {lower: [0, 6 mm], upper: [0.05, 0.04]}}}}}\n");
+}
+
+static double motion_of(quern_run *run) {
+	double sum = 0;
+	for (int k = 0; k < 2; k++)
+		for (uint32_t i = 0; i < harness_count(run, "point"); i++)
+			sum += (double)(i + 1) * harness_field(run, "point.velocity").real[k][i];
+	return sum;
+}
+
+/* Whatever a step of the continuum is refused, workers' own memory as well: it says so, or has done all the same what it should. */
+static void no_room_for_a_step(void **state) {
+	quern_run *run = open_column();
+	(void)state;
+	harness_steps(run, 1);
+	const double motion = motion_of(run);
+	harness_close(run);
+	long k = 0, told = 0;
+	assert_true(motion != 0);
+	for (bool all = false; !all; k++) {
+		run = open_column();
+		aligned_left = k;
+		const quern_status status = harness_try(run, 1);
+		all = aligned_left >= 0;
+		aligned_left = -1;
+		if (status == QUERN_OK) assert_true(motion_of(run) == motion);
+		else assert_int_equal(status, QUERN_E_MEMORY);
+		told += status != QUERN_OK;
+		harness_close(run);
+	}
+	assert_true(told > 3);
+}
+
 int main(void) {
 	const struct CMUnitTest tests[] = { cmocka_unit_test(loses_a_grain), cmocka_unit_test(gains_grains),
 		cmocka_unit_test(grows_rows), cmocka_unit_test(memory_of_nothing),
-		cmocka_unit_test(no_room_for_a_plugin) };
+		cmocka_unit_test(no_room_for_a_plugin), cmocka_unit_test(no_room_for_a_step) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
