@@ -34,12 +34,13 @@ static int32_t cells_to_face(const quern_grid_view *g, const int32_t at[3], uint
 	return at[k] < g->cells[k] - at[k] ? at[k] : g->cells[k] - at[k];
 }
 
-/* Volume of a node over that of one inside: less at and next to a face. */
+/* Volume of a node over that of one inside: less at and next to a face; between two of them both take. */
 static quern_real share_at(const grid_work *w, int32_t away) {
 	return away > 1 ? 1 : away == 1 ? w->p->share_next : w->p->share_wall;
 }
 static quern_real share_along(const grid_work *w, const int32_t at[3], uint32_t k) {
-	return w->g->periodic[k] ? 1 : share_at(w, cells_to_face(w->g, at, k));
+	const int32_t near = cells_to_face(w->g, at, k), far = w->g->cells[k] - near;
+	return w->g->periodic[k] ? 1 : share_at(w, near) - (1 - share_at(w, far));
 }
 
 /* Of that the part before a surface in the distance `gap`; a face of the domain may be `away` cells off behind it, or many. */
