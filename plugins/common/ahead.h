@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* ahead - asks memory for the next chunk of a large set while this one is worked on: each of its columns begins on a page of its own in every
- * block, where no processor foresees what is wanted next */
+/* ahead - asks memory for the next chunk of a large set while this one is worked on, and for the next block's nodes: each of a set's columns begins on a page
+ * of its own in every block. Who has much to do with a point in turn is served by what processors foresee: gather in 2-D asks for nodes alone. */
 #pragma once
 #include "stencil.h"
 #include <quern/columns.h>
@@ -32,7 +32,7 @@ static inline void ahead_end(ahead *a, uint32_t n) {
 /* What is still to be asked for beside a chunk: of what follows it, and of the next block's nodes. */
 typedef struct ahead_at {
 	uint32_t column, entry, end; /* whose turn it is, of which entry; the first that is not asked for */
-	uint32_t each;               /* lines for each particle of a chunk */
+	uint32_t each;               /* lines that are asked for at a time */
 	const int32_t *node, *last;  /* in the next block's tile */
 } ahead_at;
 

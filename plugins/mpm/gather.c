@@ -246,7 +246,7 @@ QUERN_INLINE void finish_chunk(
 		if (!are_sound(w, m, begin, i, i + 1, axes)) w->bad[b] = (int32_t)(begin + i);
 }
 
-/* What answers to how full cells are and strains were added to, as nodes say it. */
+/* Takes from gradients again what was added for how full cells are, and by strains: others get them as nodes say them. */
 QUERN_INLINE void restore_gradient(const gather_work *w, gather_memory *m, uint32_t n, const int dim) {
 	for (int k = 0; k < dim && (w->answers || w->p->alone); k++)
 		memcpy(m->gradient[(dim + 1) * k], m->kept[k], n * sizeof(quern_real));
@@ -298,8 +298,8 @@ QUERN_INLINE void gather_block(
 
 static void run_block(const gather_work *w, uint32_t b, uint32_t next, uint32_t worker, bool last) {
 	gather_memory *m = w->s->host->scratch(w->s->run, worker, sizeof *m);
-	if (!m) w->bad[b] = 0;
-	else if (w->s->dim == 2) {
+	if (!m) return;
+	if (w->s->dim == 2) {
 		if (last) gather_block(w, m, b, next, 2, true);
 		else gather_block(w, m, b, next, 2, false);
 	} else if (last) gather_block(w, m, b, next, 3, true);
@@ -358,7 +358,7 @@ static void note_columns(gather_work *w, uint32_t n) {
 		if (material->uses[r].shape != QUERN_INDEX && material->uses[r].shape != QUERN_ID)
 			ahead_add(&w->ahead, &material->column[r]);
 	ahead_end(&w->ahead, n);
-	/* in a plane there is little else to do meanwhile, and the processor foresees enough */
+	/* in a plane asking for columns takes longer than waiting for them: docs/decisions/0053 */
 	if (w->s->dim == 2) w->ahead.n = 0;
 }
 

@@ -25,7 +25,7 @@ typedef struct gather_work {
 	const quern_strain_ops *strain;
 	quern_real full;      /* from there on a cell is crowded */
 	quern_real still;     /* 1/s: sheared much faster, material flows */
-	ahead ahead;          /* columns of points */
+	ahead ahead;          /* columns of points, and nodes */
 	int32_t *bad, *moved; /* by block: first bad point or -1; whether one has left the tile */
 } gather_work;
 

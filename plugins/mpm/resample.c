@@ -141,9 +141,8 @@ quern_status quern_mpm_resample(const void *self, const quern_step *s) {
 	const mpm *p = self;
 	const quern_column *u = s->use;
 	const uint32_t n = s->host->set(s->run, "point").n;
-	/* a stage of the scene counts from where it begins, as a scene that starts from the state before it does */
-	if (!p->resample || !n || s->step == s->stage_step || (s->step - s->stage_step) % p->resample)
-		return QUERN_OK;
+	/* not where a stage of the scene begins, as not where a scene does */
+	if (!p->resample || !n || s->step == s->stage_step || (s->step + 1) % p->resample) return QUERN_OK;
 	const cover c = { .point = u[RESAMPLE_POSITION], .grain = { .real = { NULL } } };
 	quern_status status = quern_cover_sort(s, &c);
 	if (status != QUERN_OK) return status;

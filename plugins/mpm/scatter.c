@@ -12,10 +12,10 @@ typedef struct {
 	const uint32_t *point; /* partition by block */
 	quern_row *node;
 	bool counts; /* what cells hold */
-	ahead ahead; /* columns of points */
+	ahead ahead; /* columns of points, and nodes */
 } scatter_work;
 
-/* Of a chunk: mass and momentum, minus volume times stress, mass times velocity gradient. */
+/* Of a chunk: mass and momentum; volume times stress, negative; mass times velocity gradient. */
 typedef struct {
 	quern_row tile[QUERN_TILE_MOST];
 	stencil stencil;

@@ -11,8 +11,8 @@ static const quern_real pressed_off = 0.02;
 /* Of a move: from wherever in a cell, a fifth of the way to its face is left. */
 static const quern_real most_pull = 0.2;
 
-/* How far along an axis a point (m from the grid's lower corner) is from the middle of its cell, in cells; the block's begin at `begin`. Between sorts one may be beyond its
- * block's cells, and is in none of them: more than half. Beyond the end of a period narrower than a block, in a continuum alone, the last cell stands for the first. */
+/* How far along an axis a point (m from the grid's lower corner) is from the middle of its cell, in cells; the block's first cell is `begin`. Between sorts one
+ * may be beyond its block's cells, and is in none of them: more than half. Beyond the end of a period narrower than a block, in a continuum alone, the last cell stands for the first. */
 QUERN_INLINE quern_real spread_offset(quern_real position, quern_real cell, int32_t begin, quern_real edge) {
 	const quern_real t = position / cell - begin;
 	return ((t >= 0) & (t < edge)) ? t - quern_floor(t) - 0.5 : 1;
