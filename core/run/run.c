@@ -436,9 +436,11 @@ static quern_status run_stage(quern_run *run, quern_plan_stage *stage, double dt
 	quern_status status = stage->stage->run(stage->section->solver->self, &step);
 	quern_watch_leave();
 	quern_run_reset(run);
-	/* a body that has no memory can only leave its work undone */
-	if (quern_pool_lacked(run->pool) && status == QUERN_OK && run->status == QUERN_OK)
+	/* a body that has no memory can only leave its work undone, of which what others say may be a consequence */
+	if (quern_pool_lacked(run->pool)) {
+		run->status = QUERN_OK;
 		status = QUERN_E_MEMORY;
+	}
 	if (status == QUERN_OK) status = run->status;
 	else quern_run_stop(run, status, status == QUERN_E_MEMORY ? "out of memory" : "failed");
 	quern_plan_swap(run->plan, stage->swaps);

@@ -103,10 +103,7 @@ static void move_block(void *arg, uint32_t b, uint32_t worker) {
 	const forces_shared *sh = arg;
 	forces_work w;
 	char *base = sh->s->host->scratch(sh->s->run, worker, sh->bytes);
-	if (!base) {
-		sh->bad[b] = (int32_t)sh->grain[b];
-		return;
-	}
+	if (!base) return;
 	lay_out(sh, &w, base);
 	const uint32_t n = sh->grain[b + 1] - sh->grain[b];
 	quern_real *sums = sh->sums + (size_t)b * N_ENERGIES;

@@ -407,8 +407,10 @@ static bool is_met(const dem *d, uint32_t body, int32_t item) {
 	return false;
 }
 
-/* The touches of a block from entry `to` of the list on, or only how many there are; UINT32_MAX: of one grain too
- * many. Of a body those with parameters of one pair of materials come together. */
+/* Of a block's touches: one grain has too many, or there is no memory to count them. */
+static const uint32_t too_many = UINT32_MAX, uncounted = UINT32_MAX - 1;
+
+/* The touches of a block from entry `to` of the list on, or only how many there are, or that one grain has too many. Of a body those with parameters of one pair of materials come together. */
 static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, const uint32_t *to) {
 	const quern_step *s = l->s;
 	const uint32_t rounds = 1 + l->d->pairs.n;
@@ -425,7 +427,7 @@ static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, con
 				if (!(w->gap[k] < l->job.reach) || (l->fixed && l->fixed[i + k])) continue;
 				if (dem_item_on(l->d, l->material, (int32_t)(i + k), (int32_t)body) != item) continue;
 				const uint32_t features = find_features(l, body, i + k, w);
-				if (features > MOST_FEATURES) return UINT32_MAX;
+				if (features > MOST_FEATURES) return too_many;
 				for (uint32_t f = 0; f < features; f++, n++) {
 					if (!to) continue;
 					l->list[*to + n] = (quern_pair) { (int32_t)(i + k), (int32_t)body };
@@ -440,7 +442,7 @@ static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, con
 static void count_touches(void *arg, uint32_t b, uint32_t worker) {
 	listing *l = arg;
 	near_body *w = l->s->host->scratch(l->s->run, worker, sizeof *w);
-	l->found[b] = w ? touches_of_block(l, b, w, NULL) : 0;
+	l->found[b] = w ? touches_of_block(l, b, w, NULL) : uncounted;
 }
 
 static void gather_touches(void *arg, uint32_t b, uint32_t worker) {
@@ -460,7 +462,8 @@ static quern_status list_touches(listing *l) {
 	s->host->parallel(s->run, l->job.n_blocks, count_touches, l);
 	l->start[0] = 0;
 	for (uint32_t b = 0; b < l->job.n_blocks; b++) {
-		if (l->found[b] == UINT32_MAX)
+		if (l->found[b] == uncounted) return QUERN_E_MEMORY;
+		if (l->found[b] == too_many)
 			return s->host->stop(s->run, QUERN_E_NUMERIC, NULL, -1,
 				"a grain is near more than %d features of a body: make the skin or the grains smaller, or "
 				"the "
