@@ -23,7 +23,8 @@ typedef struct {
 
 typedef struct {
 	_Alignas(64) quern_real position[3][N], own[3][N], radius[N], gap[N], normal[3][N], velocity[3][N];
-	int32_t faced[SURFACES][N]; /* cells to the face of the domain that a surface is, or many */
+	/* cells to the face of the domain that a surface is, and to the one opposite; many of a body */
+	int32_t faced[SURFACES][N], opposite[SURFACES][N];
 	quern_real room[SURFACES][N],
 		facing[SURFACES][3][N]; /* what faces and bodies leave of a node, and which way they face */
 	uint32_t surfaces[N];
@@ -208,6 +209,7 @@ static void begin_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n
 		const uint32_t q = n->surfaces[i]++;
 		n->room[q][i] = share;
 		n->faced[q][i] = cells_to_face(w->g, at, k);
+		n->opposite[q][i] = w->g->cells[k] - n->faced[q][i];
 		for (uint32_t m = 0; m < w->g->dim; m++) n->facing[q][m][i] = 0;
 		n->facing[q][k][i] = at[k] < w->g->cells[k] - at[k] ? 1 : -1;
 	}
@@ -216,7 +218,8 @@ static void begin_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n
 /* Cosine of the angle within which surfaces face the same way. */
 static const quern_real alike = 0.7;
 
-/* Surfaces that face the same way are one, of which the nearest counts; two that face each other both take; what stands across multiplies. */
+/* Surfaces that face the same way are one, of which the nearest counts; two that face each other both take; what stands across multiplies. What the
+ * opposite face of a narrow domain takes is taken already. */
 static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n) {
 	const quern_real gap = n->gap[i], share = share_before(w, MANY, gap);
 	uint32_t q = 0;
@@ -226,8 +229,9 @@ static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n)
 		quern_real along = 0;
 		for (uint32_t k = 0; k < w->g->dim; k++) along += n->facing[q][k][i] * n->normal[k][i];
 		if (fabs(along) < alike) continue;
-		n->room[q][i] = along > 0 ? fmin(n->room[q][i], share_before(w, n->faced[q][i], gap))
-								  : fmax(0, n->room[q][i] + share - 1);
+		const quern_real across = share_at(w, n->opposite[q][i]);
+		n->room[q][i] = along > 0 ? fmin(n->room[q][i], share_before(w, n->faced[q][i], gap) - (1 - across))
+								  : fmax(0, n->room[q][i] + share_before(w, n->opposite[q][i], gap) - across);
 		return;
 	}
 	if (q == SURFACES) {
@@ -236,7 +240,7 @@ static void take_room(const grid_work *w, uint32_t b, uint32_t i, near_nodes *n)
 	}
 	n->surfaces[i] = q + 1;
 	n->room[q][i] = share;
-	n->faced[q][i] = MANY;
+	n->faced[q][i] = n->opposite[q][i] = MANY;
 	for (uint32_t k = 0; k < w->g->dim; k++) n->facing[q][k][i] = n->normal[k][i];
 }
 
