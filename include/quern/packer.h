@@ -27,8 +27,8 @@ struct quern_pack_job {
 	const quern_host *host;
 	quern_real lower[3], upper[3]; /* m, bounding box of allowed centres */
 	quern_real upstream[3];        /* unit, towards the continuum neighbours; zero if none or all */
-	const quern_spot *
-		seed; /* grains within reach at the start, as the images nearest to the region; when asked again, also what was placed in it before */
+	/* grains within reach at the start, as the images nearest to the region; when asked again, also what was placed in it */
+	const quern_spot *seed;
 	uint32_t n_seed, pad_seed;
 	/* [region] */
 	quern_real (*radius)(quern_pack_job *); /* m, the grain that waits: the same until it is placed */

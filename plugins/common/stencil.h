@@ -328,7 +328,7 @@ QUERN_INLINE void stencil_gather(
 }
 
 /* In a plane what comes back to points has five lanes, and a row has room for the first two once more: where the processor takes a row at once, one product
- * does for sums and for slopes along x, by a factor that is the one or the other. All are the same to the bit. What motion has in the lanes that are taken, its grip, is read before. */
+ * does for sums and for slopes along x, by a factor that is the one or the other. All are the same to the bit. What motion has in the lanes that are taken, its grip, is not read here. */
 enum { ONCE_MORE = 5 };
 QUERN_INLINE bool stencil_doubles(const int dim) { return dim == 2 && PARTS == 1; }
 

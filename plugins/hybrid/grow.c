@@ -12,7 +12,7 @@ static void note(quern_real *worst, int32_t i, quern_real overlap) {
 	if (overlap > worst[i]) worst[i] = overlap;
 }
 
-/* Who has no entry in the list has nobody near: steps of growth are short beside its skin, unless `growth` is some hundred grain steps alone. */
+/* Who has no entry in the list has nobody near, as long as a step of growth is short beside the list's skin; it is not if `growth` is only some hundred grain steps. */
 static void find_overlaps(const quern_step *s, quern_real *worst, uint32_t grains) {
 	const quern_column *u = s->use;
 	const uint32_t n = s->host->set(s->run, "contact").n;

@@ -141,7 +141,7 @@ quern_status quern_mpm_resample(const void *self, const quern_step *s) {
 	const mpm *p = self;
 	const quern_column *u = s->use;
 	const uint32_t n = s->host->set(s->run, "point").n;
-	/* not where a stage of the scene begins, as not where a scene does */
+	/* steps are counted through all stages of the scene; that which begins one is left out */
 	if (!p->resample || !n || s->step == s->stage_step || (s->step + 1) % p->resample) return QUERN_OK;
 	const cover c = { .point = u[RESAMPLE_POSITION], .grain = { .real = { NULL } } };
 	quern_status status = quern_cover_sort(s, &c);
