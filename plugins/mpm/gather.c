@@ -21,14 +21,13 @@ static quern_real said_around(const gather_work *w, const gather_memory *m, uint
 	return n ? sum / n : -m->tile[node][motion_density(w->s->dim)];
 }
 
-typedef int64_t row_signs __attribute__((vector_size(sizeof(quern_row))));
-
 static void speak_for_others(const gather_work *w, gather_memory *m) {
 	const uint32_t lane = motion_density(w->s->dim), nodes = w->g->tile_size;
-	row_signs below = { 0 };
-	for (uint32_t k = 0; k < nodes; k++) below |= m->tile[k] < 0;
+	const quern_real *density = (const quern_real *)(const void *)m->tile + lane;
+	int any = 0;
+	for (uint32_t k = 0; k < nodes; k++) any |= density[(size_t)k * QUERN_LANES] < 0;
 	memset(m->silent, 0, nodes * sizeof *m->silent);
-	if (!below[lane]) return;
+	if (!any) return;
 	for (uint32_t k = 0; k < nodes; k++) m->silent[k] = m->tile[k][lane] < 0;
 	for (uint32_t k = 0; k < nodes; k++)
 		m->said[k] = m->tile[k][lane] < 0 ? said_around(w, m, k) : m->tile[k][lane];
