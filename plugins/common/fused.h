@@ -32,12 +32,12 @@ QUERN_INLINE row_part part_of(quern_real x) {
 #endif
 }
 
-/* The first lanes of a, and those of b from lane `from` on. */
+/* The first lanes of a, and those of b from lane `from` on, which may be before all of them or behind. */
 QUERN_INLINE row_part part_join(row_part a, row_part b, const int from) {
 #if defined QUERN_WHOLE_ROWS
 	return (row_part)_mm512_mask_blend_pd((__mmask8)(0xff << from), (__m512d)a, (__m512d)b);
 #else
-	for (int l = from; l < PART_LANES; l++) a[l] = b[l];
+	for (int l = from > 0 ? from : 0; l < PART_LANES; l++) a[l] = b[l];
 	return a;
 #endif
 }

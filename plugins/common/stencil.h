@@ -327,8 +327,9 @@ QUERN_INLINE void stencil_gather(
 	stencil_gather_by(s, i, tile, dim, slopes, s->slope, out);
 }
 
-/* In a plane what comes back to points has five lanes, and a row has room for the first two once more: where the processor takes a row at once, one product
- * does for sums and for slopes along x, by a factor that is the one or the other. All are the same to the bit. What motion has in the lanes that are taken, its grip, is not read here. */
+/* In a plane what comes back to points has five lanes, and a row has room for the first two once more: one product does for sums and for slopes along x, by a
+ * factor that is the one or the other. All are the same to the bit. It pays where the processor takes a row at once. What motion has in the lanes that are taken,
+ * its grip, is not read here. */
 enum { ONCE_MORE = 5 };
 QUERN_INLINE bool stencil_doubles(const int dim) { return dim == 2 && PARTS == 1; }
 
@@ -337,22 +338,25 @@ QUERN_INLINE void stencil_double(quern_row *tile, uint32_t n) {
 		tile[k] = __builtin_shufflevector(tile[k], tile[k], 0, 1, 2, 3, 4, 0, 1, 7);
 }
 
-/* Of doubled rows, each of one part: the weighted sum, with its slopes along x from lane ONCE_MORE on; in the first lanes of `up` those along y. */
+/* Of doubled rows: the weighted sum, with its slopes along x from lane ONCE_MORE on; in the first lanes of `up` those along y. */
 QUERN_INLINE void stencil_gather_doubled(
-	const stencil *s, uint32_t i, const quern_row *tile, row_part *sum, row_part *up) {
+	const stencil *s, uint32_t i, const quern_row *tile, quern_row *sum, quern_row *up) {
 	const uint32_t span = tile_span(2);
-	row_part along[3], all = { 0 }, high = { 0 };
-	for (uint32_t x = 0; x < 3; x++)
-		along[x] = part_join(part_of(s->value[0][x][i]), part_of(s->slope[0][x][i]), ONCE_MORE);
-	for (uint32_t y = 0; y < 3; y++) {
-		const quern_row *row = tile + s->node[i] + y * span;
-		row_part e = { 0 };
-		for (uint32_t x = 0; x < 3; x++) e = part_fma(along[x], *const_parts_of(row + x), e);
-		all = part_fma(part_of(s->value[1][y][i]), e, all);
-		high = part_fma(part_of(s->slope[1][y][i]), e, high);
+	for (int k = 0; k < PARTS; k++) {
+		row_part along[3], all = { 0 }, high = { 0 };
+		for (uint32_t x = 0; x < 3; x++)
+			along[x] =
+				part_join(part_of(s->value[0][x][i]), part_of(s->slope[0][x][i]), ONCE_MORE - k * PART_LANES);
+		for (uint32_t y = 0; y < 3; y++) {
+			const quern_row *row = tile + s->node[i] + y * span;
+			row_part e = { 0 };
+			for (uint32_t x = 0; x < 3; x++) e = part_fma(along[x], const_parts_of(row + x)[k], e);
+			all = part_fma(part_of(s->value[1][y][i]), e, all);
+			high = part_fma(part_of(s->slope[1][y][i]), e, high);
+		}
+		parts_of(sum)[k] = all;
+		parts_of(up)[k] = high;
 	}
-	*sum = all;
-	*up = high;
 }
 
 /* ---- all blocks, where they add to nodes ---- */

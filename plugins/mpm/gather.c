@@ -41,7 +41,7 @@ QUERN_INLINE void collect_chunk(
 		ahead_ask(&w->ahead, w->motion, at);
 		const bool doubled = slopes && stencil_doubles(dim);
 		quern_row v[4];
-		if (doubled) stencil_gather_doubled(&m->trip.stencil, i, m->tile, parts_of(&v[0]), parts_of(&v[2]));
+		if (doubled) stencil_gather_doubled(&m->trip.stencil, i, m->tile, &v[0], &v[2]);
 		else stencil_gather(&m->trip.stencil, i, m->tile, dim, slopes, v);
 		trips_hear(&m->trip, i, &v[0], 0, dim);
 		for (int k = 0; k < dim; k++)
