@@ -410,7 +410,8 @@ static bool is_met(const dem *d, uint32_t body, int32_t item) {
 /* Of a block's touches: one grain has too many, or there is no memory to count them. */
 static const uint32_t too_many = UINT32_MAX, uncounted = UINT32_MAX - 1;
 
-/* The touches of a block from entry `to` of the list on, or only how many there are, or that one grain has too many. Of a body those with parameters of one pair of materials come together. */
+/* The touches of a block from entry `to` of the list on, or only how many there are, or that one grain has too many. Of a
+ * body those with parameters of one pair of materials come together. */
 static uint32_t touches_of_block(const listing *l, uint32_t b, near_body *w, const uint32_t *to) {
 	const quern_step *s = l->s;
 	const uint32_t rounds = 1 + l->d->pairs.n;

@@ -179,9 +179,8 @@ static void push(const absorbing *a, uint32_t c) {
 }
 
 quern_status quern_hybrid_absorb(update *d, uint8_t *made) {
-	quern_real g2 = 0;
-	for (uint32_t k = 0; k < d->s->dim; k++) g2 += d->s->gravity[k] * d->s->gravity[k];
-	absorbing a = { .d = d, .made = made, .speed = nudge * sqrt(sqrt(g2) * d->h->diameter) };
+	const quern_real gravity = quern_gravity_size(d->s->dim, d->s->gravity);
+	absorbing a = { .d = d, .made = made, .speed = nudge * sqrt(gravity * d->h->diameter) };
 	a.before = d->s->host->memory(d->s->run, ((size_t)d->n_cells + 1) * sizeof(quern_real));
 	bool good = a.before;
 	for (uint32_t k = 0; k <= d->s->dim && good; k++)

@@ -259,17 +259,9 @@ static quern_spot *find_seeds(const packed_cell *p, uint32_t *n) {
 
 /* Whether a cell is full, and its points bear more than the weight of one layer of grains. Without gravity, or points, none is. */
 static bool is_pressed(const update *d, uint32_t c) {
-	const quern_column *u = d->u;
-	quern_real volume = 0, bears = 0, gravity = 0;
-	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
-		const int32_t i = d->point[q];
-		volume += u[U_POINT_VOLUME].real[0][i];
-		for (uint32_t k = 0; k < d->s->dim; k++)
-			bears -= u[U_POINT_STRESS].real[k][i] * u[U_POINT_VOLUME].real[0][i] / d->s->dim;
-	}
-	for (uint32_t k = 0; k < d->s->dim; k++) gravity += d->s->gravity[k] * d->s->gravity[k];
-	const quern_real layer = d->h->packed * sqrt(gravity) * d->h->diameter;
-	return cell_holds(d, c) > 0.8 * cell_room(d, c) && layer > 0 && bears > layer * volume;
+	const quern_real pressure = quern_hybrid_points_pressure(d, c, d->u[U_POINT_VOLUME].real[0]),
+					 layer = d->h->packed * quern_gravity_size(d->s->dim, d->s->gravity) * d->h->diameter;
+	return cell_holds(d, c) > 0.8 * cell_room(d, c) && layer > 0 && pressure > layer;
 }
 
 static void enrich_cell(packed_cell *p) {

@@ -33,9 +33,7 @@ void quern_hybrid_add_to_bed(const update *d, uint32_t c, bed *sum) {
 }
 
 bool quern_hybrid_is_at_rest(const update *d, const bed *sum) {
-	quern_real g2 = 0;
-	for (uint32_t k = 0; k < d->s->dim; k++) g2 += d->s->gravity[k] * d->s->gravity[k];
-	const quern_real weight = sqrt(g2) * d->h->diameter;
+	const quern_real weight = quern_gravity_size(d->s->dim, d->s->gravity) * d->h->diameter;
 	return weight > 0 && sum->kinetic <= AT_REST * sum->mass * weight &&
 		   sum->pressure >= BORNE * sum->cells * d->h->packed * weight;
 }

@@ -4,20 +4,24 @@
 #include "update.h"
 #include <math.h>
 
-/* Pressure of both clouds in their shares; only the sum is the material's. */
-static quern_real pressure_of(const update *d, uint32_t c) {
+quern_real quern_hybrid_points_pressure(const update *d, uint32_t c, const quern_real *weight) {
 	const uint32_t dim = d->s->dim;
-	quern_real stress[6], grains = 0, points = 0, mass = 0;
-	const quern_real share = 1 - old_share(d, (int32_t)c);
-	quern_hybrid_contact_stress(d, c, stress);
-	for (uint32_t k = 0; k < dim; k++) grains -= stress[k] / dim;
+	quern_real sum = 0, all = 0;
 	for (uint32_t q = d->point_begin[c]; q < d->point_begin[c + 1]; q++) {
 		const int32_t i = d->point[q];
-		for (uint32_t k = 0; k < dim; k++)
-			points -= d->u[U_POINT_MASS].real[0][i] * d->u[U_POINT_STRESS].real[k][i] / dim;
-		mass += d->u[U_POINT_MASS].real[0][i];
+		for (uint32_t k = 0; k < dim; k++) sum -= weight[i] * d->u[U_POINT_STRESS].real[k][i] / dim;
+		all += weight[i];
 	}
-	return share * grains + (1 - share) * (mass > 0 ? points / mass : 0);
+	return all > 0 ? sum / all : 0;
+}
+
+/* Pressure of both clouds in their shares; only the sum is the material's. */
+static quern_real pressure_of(const update *d, uint32_t c) {
+	quern_real stress[6], grains = 0;
+	const quern_real share = 1 - old_share(d, (int32_t)c);
+	quern_hybrid_contact_stress(d, c, stress);
+	for (uint32_t k = 0; k < d->s->dim; k++) grains -= stress[k] / d->s->dim;
+	return share * grains + (1 - share) * quern_hybrid_points_pressure(d, c, d->u[U_POINT_MASS].real[0]);
 }
 
 /* Gradient of what cells have along one axis; one-sided where one of the neighbours is empty. */

@@ -77,6 +77,8 @@ bool quern_hybrid_mean_stress(const update *, uint32_t cell, quern_real stress[6
 quern_status quern_hybrid_normals(update *);
 
 /* ---- rates.c ---- */
+/* Pa: mean of a cell's points by a weight, their mass or volume; 0 without any. */
+quern_real quern_hybrid_points_pressure(const update *, uint32_t cell, const quern_real *weight);
 quern_status quern_hybrid_rates(update *);
 
 /* ---- walls.c ---- */

@@ -212,25 +212,21 @@ QUERN_INLINE void answer_chunk(
 					 solid = closed_from(p, 0), soft = closed_from(p, 1), still = w->still,
 					 stiff = p->relief * bulk, soon = fmin(1, p->answer * dt);
 	const quern_real *crowding = w->s->use[GATHER_CROWDING].real[0] + (size_t)b * QUERN_BLOCK_CELLS;
-	const quern_real *stress[3];
-	quern_real crowded[STENCIL], holds[STENCIL], lack[STENCIL], mean[STENCIL];
+	quern_real crowded[STENCIL], holds[STENCIL], lack[STENCIL], mean[STENCIL], pressed[STENCIL];
 	cells_of(w, b, m->trip.stencil.position, n, dim, m->cell);
+	pressures_of(w, begin, n, dim, pressed);
 	for (uint32_t i = 0; i < n; i++) {
 		crowded[i] = crowding[m->cell[i]];
 		holds[i] = m->held[m->cell[i]];
 		mean[i] = m->mean[m->cell[i]];
 		m->mean_pressure[i] = m->level[m->cell[i]];
 	}
-	for (int k = 0; k < dim; k++) stress[k] = w->s->use[GATHER_STRESS].real[k] + begin;
 	QUERN_SIMD
 	for (uint32_t i = 0; i < n; i++) {
-		quern_real pressure = 0, trace = 0;
-		for (int k = 0; k < dim; k++) {
-			pressure -= stress[k][i] / dim;
-			trace += m->gradient[(dim + 1) * k][i];
-		}
-		const quern_real closed = pressure > 0 ? soft : solid;
-		pressure -= bulk * trace * dt; /* what the flow itself will make of it */
+		quern_real trace = 0;
+		for (int k = 0; k < dim; k++) trace += m->gradient[(dim + 1) * k][i];
+		const quern_real closed = pressed[i] > 0 ? soft : solid,
+						 pressure = pressed[i] - bulk * trace * dt; /* what the flow itself will make of it */
 		const quern_real rate2 = calm_shear(m->gradient, i, (uint32_t)dim),
 						 flows = flowing_share(still, rate2);
 		/* of the deformation, what changes shape: what only changes volume does not even out densities */

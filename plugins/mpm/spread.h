@@ -17,9 +17,6 @@ QUERN_INLINE quern_real spread_offset(quern_real position, quern_real cell, int3
 	const quern_real t = position / cell - begin;
 	return ((t >= 0) & (t < edge)) ? t - quern_floor(t) - 0.5 : 1;
 }
-QUERN_INLINE int32_t spread_begin(const gather_work *w, uint32_t b, int axis) {
-	return w->g->at[b][axis] * (int32_t)w->g->edge;
-}
 
 /* Mean square of the way from the middle, over that of what is everywhere alike (1/12): of points in the middles of equal parts, as at first. */
 QUERN_INLINE quern_real spread_even(const gather_work *w) {
@@ -170,7 +167,7 @@ QUERN_INLINE void spread_parts(
 /* Those beyond their block's cells along an axis stay as well. */
 QUERN_INLINE void spread_offsets(const gather_work *w, const gather_memory *m, uint32_t b, uint32_t n,
 	const int k, quern_real *restrict off, quern_real *restrict part) {
-	const int32_t begin = spread_begin(w, b, k);
+	const int32_t begin = w->g->at[b][k] * (int32_t)w->g->edge;
 	const quern_real cell = w->g->cell,
 					 edge = (quern_real)w->g->edge, *restrict place = m->trip.stencil.position[k];
 	QUERN_SIMD
