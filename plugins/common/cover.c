@@ -80,20 +80,20 @@ static void bring_back(quern_real *restrict x, uint32_t n, quern_real lower, que
 	for (uint32_t i = 0; i < n && far; i++) x[i] = quern_brought_back(x[i], lower, upper);
 }
 
-/* Cells along an axis. A point on a face or farther out by round-off belongs to the cell inside; false where one has left. */
+/* Cells along an axis. A point on a face or farther out by round-off belongs to the cell inside, and so does what a periodic axis is longer than its cells:
+ * in the first cell it would have no place, since it is not moved there. False where one has left. */
 static bool find_cells(const work *w, uint32_t k, uint32_t begin, uint32_t n, int32_t *restrict cell) {
 	const quern_step *s = w->s;
 	quern_real *restrict x = w->c->point.real[k] + begin;
 	const quern_real lower = s->lower[k], upper = s->upper[k], inverse = 1 / w->g->cell,
 					 slack = 1e-6 * w->g->cell, origin = w->g->lower[k];
-	const int32_t cells = w->g->cells[k], around = s->periodic[k] ? cells : 0;
+	const int32_t cells = w->g->cells[k];
 	int left = 0;
 	if (s->periodic[k]) bring_back(x, n, lower, upper);
 #pragma omp simd reduction(| : left)
 	for (uint32_t i = 0; i < n; i++) {
 		const bool in = (x[i] >= lower - slack) & (x[i] <= upper + slack);
-		const int32_t c = quern_cell_along(in ? x[i] : lower, origin, inverse);
-		cell[i] = quern_cell_held(c >= cells ? c - around : c, cells);
+		cell[i] = quern_cell_held(quern_cell_along(in ? x[i] : lower, origin, inverse), cells);
 		left |= !in;
 	}
 	return !left;
