@@ -415,6 +415,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->bears = 0.5 * p->density * quern_gravity_size(setup->dim, setup->gravity) * p->cell;
 	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
 	const bool hybrid = setup->host->keeps(setup, "hybrid");
+	if (hybrid) p->points = 2; /* its updates make as many, whatever a fill would */
 	p->alone = ops->friction && (p->follow > 0 || p->alone) && p->rest > 0 && !hybrid;
 	/* in a hybrid always, so that a stage may spread points or not */
 	p->counted = p->alone || (ops->friction && hybrid);
@@ -487,7 +488,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "continuum"
 	.limit = limit, .account = account, .cell = cell, .accept = accept, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 12,
+	.revision = 13,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.mpm",
 	.brief = "The continuum: material points on a sparse grid.",

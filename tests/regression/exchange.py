@@ -126,6 +126,18 @@ def check(folder):
     print(f"{len(before)} files of the program unchanged")
 
 
+def check_points(folder):
+    """How many points a fill would have has no say in a hybrid, whose updates make two along each axis, with hats neither."""
+    for shape in ("gimp", "linear"):
+        series = {}
+        for points in (1, 2, 4):
+            run(folder / f"{shape}{points}", [f"continuum.shape={shape}", f"continuum.points={points}"])
+            series[points] = (folder / f"{shape}{points}" / "series.csv").read_bytes()
+        assert len(set(series.values())) == 1, f"{shape}: continuum.points changes a hybrid"
+        print(f"continuum.points: 1, 2 or 4, {shape}: the same series of {len(series[2])} bytes", flush=True)
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
         check(pathlib.Path(name))
+        check_points(pathlib.Path(name))
