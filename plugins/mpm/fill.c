@@ -1,18 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* fill - the first points: a lattice in each region, with the stress of the overburden if wished */
+#include "../common/height.h"
 #include "../common/outlets.h"
 #include "../common/stressed.h"
 #include "lattice.h"
 #include <math.h>
 #include <stdio.h>
-
-/* The axis along which gravity is strongest. */
-static uint32_t steepest(const quern_step *s) {
-	uint32_t axis = 0;
-	for (uint32_t k = 1; k < s->dim; k++)
-		if (fabs(s->gravity[k]) > fabs(s->gravity[axis])) axis = k;
-	return axis;
-}
 
 /* An item with the places of its lattice: which of them lie in the region, and how many of these lie above each. */
 typedef struct {
@@ -39,7 +32,7 @@ static quern_real depth_of(
 static void weigh(const mpm *p, const quern_step *s, const filling *f, uint32_t place, const quern_real x[3],
 	const quern_column *stress, uint32_t i) {
 	static const uint32_t shear[3][3] = { { 0, 3, 5 }, { 3, 1, 4 }, { 5, 4, 2 } };
-	const uint32_t axis = steepest(s);
+	const uint32_t axis = quern_vertical(s->dim, s->gravity);
 	const quern_real g = s->gravity[axis], depth = depth_of(f, place, axis, g, x);
 	const quern_real pressure = p->density * fabs(g) * depth;
 	for (uint32_t k = 0; k < p->dim; k++) {
@@ -52,7 +45,7 @@ static void weigh(const mpm *p, const quern_step *s, const filling *f, uint32_t 
 
 /* Against gravity, from the end on. */
 static void count_over(const quern_step *s, filling *f) {
-	const uint32_t axis = steepest(s), *count = f->lattice.count;
+	const uint32_t axis = quern_vertical(s->dim, s->gravity), *count = f->lattice.count;
 	const uint32_t stride = axis == 0 ? 1 : axis == 1 ? count[0] : count[0] * count[1];
 	const bool up = s->gravity[axis] < 0;
 	for (uint32_t k = 0; k < f->lattice.n; k++) {
