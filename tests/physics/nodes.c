@@ -12,6 +12,7 @@
 #include "harness.h"
 #include "table.h"
 #include <math.h>
+#include <quern/grid.h>
 #include <stdio.h>
 
 static const double cell = 0.1, filled = 1000;
@@ -170,8 +171,31 @@ static void full_between_faces(void **state) {
 	assert_true(good);
 }
 
+/* A node a cell before a plane and a cell before a face of the domain, which is none of the plane's. */
+static void full_between_plane_and_face(void **state) {
+	bool good = true;
+	(void)state;
+	table_head("density a cell before a plane and a cell before a face");
+	for (int k = 0; k < 2; k++) {
+		const wall w = { "", 2, { 0, 0.8, 0 }, { 0, 1, 0 }, false, 0 };
+		quern_run *run = open_wall(&w, k ? "bspline" : "gimp");
+		double worst = 0;
+		int nodes = 0;
+		harness_steps(run, 1);
+		const quern_grid_view *g = quern_host_table.grid(run);
+		for (int x = 2; x <= 8; x++) {
+			const int32_t i = quern_grid_entry(g, (const int32_t[3]) { x, 9, 0 });
+			worst = fmax(worst, fabs(harness_field(run, "motion.density").real[0][8 * i] / filled - 1)),
+			nodes++;
+		}
+		good &= table_row(k ? "bspline, off by" : "gimp, off by", worst, 0, k ? 3e-3 : 1e-3) && nodes == 7;
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(full_at_walls),
-		cmocka_unit_test(full_between_faces) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(full_at_walls), cmocka_unit_test(full_between_faces),
+		cmocka_unit_test(full_between_plane_and_face) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
