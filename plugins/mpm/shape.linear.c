@@ -19,11 +19,13 @@ static void weights(const void *self, const quern_shape_batch *b) {
 							 *restrict w2 = b->value[a][2];
 		quern_real *restrict g0 = b->slope[a][0], *restrict g1 = b->slope[a][1],
 							 *restrict g2 = b->slope[a][2];
-		/* a point on the upper wall belongs to the last cell */
-		const quern_real last = b->wall[a][1] == INT32_MAX ? 0x1p40 : (quern_real)(b->wall[a][1] - 1);
+		/* a point on a wall, or beyond it by round-off, belongs to the cell inside */
+		const quern_real last = b->wall[a][1] == INT32_MAX ? 0x1p40 : (quern_real)(b->wall[a][1] - 1),
+						 least = b->wall[a][0] == INT32_MIN ? -0x1p40 : (quern_real)b->wall[a][0];
 		QUERN_SIMD
 		for (uint32_t i = 0; i < b->n; i++) {
-			const quern_real t = x[i] * inverse, cell = quern_floor(t), base = cell > last ? last : cell;
+			const quern_real t = x[i] * inverse, cell = quern_floor(t), held = cell > last ? last : cell,
+							 base = held < least ? least : held;
 			first[i] = (int32_t)base;
 			w1[i] = t - base;
 			w0[i] = 1 - (t - base);
