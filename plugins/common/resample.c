@@ -82,11 +82,12 @@ static uint32_t loneliest(const resample *r, uint32_t c, const int32_t cell[3], 
 /* Takes this share of every point of the cell. */
 static void take_shares(const resample *r, uint32_t c, quern_real share, new_point *p) {
 	const uint32_t dim = r->s->dim, parts = quern_shape_size(QUERN_SYMMETRIC, dim);
+	quern_real heaviest = 0;
 	for (uint32_t q = r->begin[c]; q < r->begin[c + 1]; q++) {
 		const int32_t i = r->point[q];
 		quern_real *mass = &r->mass->real[0][i], *volume = &r->volume->real[0][i];
 		const quern_real given = share * *mass, room = share * *volume;
-		if (p->parent < 0 || *mass > r->mass->real[0][p->parent]) p->parent = i;
+		if (p->parent < 0 || *mass > heaviest) p->parent = i, heaviest = *mass;
 		for (uint32_t k = 0; k < dim; k++) p->velocity[k] += given * r->velocity->real[k][i];
 		for (uint32_t k = 0; k < parts; k++) p->stress[k] += room * r->stress->real[k][i];
 		p->mass += given;

@@ -285,7 +285,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "hybrid", .
 	.substeps = substeps, .account = account, .looks = looks, .look = quern_hybrid_look,
 	.work = quern_hybrid_work };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 11,
+	.revision = 12,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.hybrid",
 	.brief = "Grains where they matter, continuum everywhere else.",

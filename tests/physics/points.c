@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What a zone update makes of points that are too many in a cell, or too few: mass, momentum and volume are kept to
- * round-off, so is the sum of volume times stress, and a point that was open is open afterwards, as loose as before. The
- * stage itself is called, between two steps, on points that the test has crowded. */
+ * round-off, so is the sum of volume times stress, and a point that was open is open afterwards, as loose as before; in a cell that becomes
+ * all continuum too. Stages themselves are called, between two steps, on points that the test has crowded or opened. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,6 +12,8 @@
 #include "harness.h"
 #include "table.h"
 #include <math.h>
+#include <quern/grid.h>
+#include <quern/oracle.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -41,10 +43,10 @@ static quern_run *block(int dim, const char *material) {
 	return run;
 }
 
-static void update(quern_run *run) {
+static void call(quern_run *run, const char *name) {
 	for (size_t k = 0; k < run->plan->n_stages; k++) {
 		const quern_plan_stage *stage = &run->plan->stages[k];
-		if (strcmp(stage->name, "hybrid.update") != 0) continue;
+		if (strcmp(stage->name, name) != 0) continue;
 		const quern_step step = quern_run_record(run, stage->section);
 		if (stage->stage->run(stage->section->solver->self, &step) != QUERN_OK) fail_msg("%s", run->message);
 	}
@@ -181,7 +183,7 @@ static bool try_crowd(int dim, int which, bool open) {
 	const uint32_t n = harness_count(run, "point");
 	uint32_t most = n, least = n;
 	for (int k = 0; k < 6; k++) {
-		update(run);
+		call(run, "hybrid.update");
 		const uint32_t now = harness_count(run, "point");
 		most = now > most ? now : most, least = now < least ? now : least;
 	}
@@ -222,7 +224,109 @@ static void many_and_few(void **state) {
 	assert_true(good);
 }
 
+static int32_t cell_of(quern_run *run, const quern_column *x, uint32_t i, int dim) {
+	const quern_grid_view *g = quern_host_table.grid(run);
+	quern_real at[3] = { 0 };
+	int32_t c[3];
+	for (int k = 0; k < dim; k++) at[k] = x->real[k][i];
+	assert_true(quern_grid_cell_at(g, at, c));
+	return quern_grid_entry(g, c);
+}
+
+/* What a part keeps of the point that it was split from is that of the heaviest of those that gave it mass. */
+static void parts_remember_the_heaviest(void **state) {
+	bool good = true;
+	(void)state;
+	table_head("points that a cell's points were split from");
+	for (int dim = 2; dim <= 3; dim++) {
+		srand(7);
+		quern_run *run = block(dim, materials[REMEMBERS]);
+		crowd(run, dim, false, false);
+		remember(run);
+		const quern_column x = harness_field(run, "point.position"), m = harness_field(run, "point.mass");
+		const uint32_t n = harness_count(run, "point");
+		int32_t *home = malloc(n * sizeof *home);
+		double *mass = malloc(n * sizeof *mass);
+		uint32_t parts = 0, lighter = 0;
+		assert_true(home && mass);
+		for (uint32_t i = 0; i < n; i++) home[i] = cell_of(run, &x, i, dim), mass[i] = m.real[0][i];
+		call(run, "hybrid.update");
+		const memories now = memories_of(run);
+		for (uint32_t i = 0; i < now.n; i++) {
+			if (now.age.real[0][i] != 7) continue;
+			const uint32_t from = (uint32_t)now.mark.real[0][i];
+			uint32_t heaviest = from;
+			for (uint32_t k = 0; k < n; k++)
+				if (home[k] == home[from] && mass[k] > mass[heaviest]) heaviest = k;
+			parts++, lighter += heaviest != from;
+		}
+		printf("  %d-D: %u parts\n", dim, parts);
+		assert_true(parts > 20);
+		good &= table_row("  of a lighter one", lighter, 0, 0);
+		free(home), free(mass);
+		harness_close(run);
+	}
+	assert_true(good);
+}
+
+/* ---- cells that become all continuum ---- */
+
+/* Cells of the inside are halves once more, of grains that all lack, and their points are open. Returns how many points those are. */
+static uint32_t halve(quern_run *run, int dim, bool hyper, double room) {
+	const quern_column zone = harness_field(run, "cell.zone"), owed = harness_field(run, "cell.owed"),
+					   w = harness_field(run, "point.weight"), m = harness_field(run, "point.mass"),
+					   x = harness_field(run, "point.position"), s = harness_field(run, "point.stress"),
+					   volume = harness_field(run, "point.volume");
+	uint32_t n = 0;
+	for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+		if (w.real[0][i] < 1) continue;
+		const int32_t c = cell_of(run, &x, i, dim);
+		zone.index[c] = QUERN_HYBRID;
+		w.real[0][i] = 0.5;
+		owed.real[0][c] += 0.5 * m.real[0][i];
+		volume.real[0][i] = room * m.real[0][i] / density;
+		if (hyper) harness_field(run, "point.volume_strain").real[0][i] = room - 1;
+		for (int k = 0; k < (dim == 2 ? 3 : 6); k++) s.real[k][i] = 0;
+		n++;
+	}
+	return n;
+}
+
+/* What is open and under no pressure is open afterwards, as loose as before; closed, it would press at its first contraction. */
+static void open_ones_stay_open(void **state) {
+	bool good = true;
+	(void)state;
+	table_head("open points of cells that become all continuum");
+	for (int dim = 2; dim <= 3; dim++)
+		for (int hyper = 0; hyper <= 1; hyper++) {
+			quern_run *run = block(dim, materials[hyper]);
+			const uint32_t halves = halve(run, dim, hyper, 1.25);
+			uint32_t n = 0;
+			double least = INFINITY, most = 0, strain = 0;
+			harness_field(run, "total.samples").real[0][0] = 1; /* of contacts that bear nothing */
+			call(run, "hybrid.update");
+			const quern_column w = harness_field(run, "point.weight"), m = harness_field(run, "point.mass"),
+							   volume = harness_field(run, "point.volume");
+			for (uint32_t i = 0; i < harness_count(run, "point"); i++) {
+				if (w.real[0][i] < 1) continue;
+				const double room = volume.real[0][i] * density / m.real[0][i];
+				least = fmin(least, room), most = fmax(most, room), n++;
+				if (hyper)
+					strain = fmax(strain, fabs(harness_field(run, "point.volume_strain").real[0][i] - 0.25));
+			}
+			printf("  %d-D, %s: %u of %u points are all continuum\n", dim, hyper ? "drucker_prager" : "mu_i",
+				n, halves);
+			good &= n > halves / 2;
+			good &= table_row("  room of the densest", least, 1.25, 1e-12);
+			good &= table_row("  of the loosest", most, 1.25, 1e-12);
+			if (hyper) good &= table_row("  volume strain, off by", strain, 0, 1e-12);
+			harness_close(run);
+		}
+	assert_true(good);
+}
+
 int main(void) {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(many_and_few) };
+	const struct CMUnitTest tests[] = { cmocka_unit_test(many_and_few),
+		cmocka_unit_test(parts_remember_the_heaviest), cmocka_unit_test(open_ones_stay_open) };
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
