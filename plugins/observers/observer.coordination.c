@@ -21,7 +21,8 @@ static const quern_param params[] = { REGION_PARAMS(observer, QUERN_MAYBE),
 	X(SECOND, "contact.second", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL, .target = "grain") \
 	X(FORCE, "contact.force", "N", QUERN_READ, QUERN_VECTOR, .with = "contact.first") \
 	X(TOUCHING, "touch.grain", "1", QUERN_READ, QUERN_INDEX, .flags = QUERN_OPTIONAL, .target = "grain") \
-	X(TOUCH, "touch.force", "N", QUERN_READ, QUERN_VECTOR, .with = "touch.grain")
+	X(TOUCH, "touch.force", "N", QUERN_READ, QUERN_VECTOR, .with = "touch.grain") \
+	X(BOX, "total.box_length", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL)
 /* clang-format on */
 QUERN_USE_ENUM(USES);
 static const quern_use uses[] = QUERN_USE_ROWS(USES);
@@ -37,7 +38,7 @@ static const quern_output outputs[] = {
 };
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
-	return region_check(&((const observer *)self)->region, setup, err);
+	return region_init(&((observer *)self)->region, setup, err);
 }
 
 /* A contact that bears a force; on a body `second` is -1. */
@@ -96,9 +97,10 @@ static void average(const observer *o, const quern_observer_batch *b, const int3
 	const int32_t *number, quern_real *term[3], quern_real *out, const quern_host *host, quern_run *run) {
 	const quern_column *u = b->use;
 	const uint32_t grains = b->count[POSITION];
+	const bool still = !u[BOX].real[0];
 	for (uint32_t i = 0; i < grains; i++) {
-		const bool in =
-			!(u[FIXED].index && u[FIXED].index[i]) && region_holds(&o->region, u[POSITION].real, i, b->dim);
+		const bool in = !(u[FIXED].index && u[FIXED].index[i]) &&
+						region_holds(&o->region, u[POSITION].real, i, b->dim, still);
 		const quern_real share = in ? (u[WEIGHT].real[0] ? u[WEIGHT].real[0][i] : 1) : 0;
 		term[GRAINS][i] = o->rattlers || !left_out[i] ? share : 0;
 		term[NUMBER][i] = term[GRAINS][i] * number[i];
@@ -140,7 +142,7 @@ static const quern_observer_ops ops = {
 	.size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.coordination",
 	.brief = "How many contacts that bear a force a grain has.",

@@ -10,7 +10,8 @@ static const quern_param params[] = { REGION_PARAMS(observer, QUERN_MAYBE), QUER
 /* clang-format off */
 #define OWN_USES(X) \
 	X(POSITION, "grain.position", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
-	X(VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL)
+	X(VELOCITY, "grain.velocity", "m/s", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL) \
+	X(BOX, "total.box_length", "m", QUERN_READ, QUERN_VECTOR, .flags = QUERN_OPTIONAL)
 /* clang-format on */
 QUERN_USE_ENUM_FROM(CLOUD_USES_ROWS, OWN_USES);
 static const quern_use uses[] = { CLOUD_USES(QUERN_USE_ROW) OWN_USES(QUERN_USE_ROW) QUERN_END_USES };
@@ -27,7 +28,7 @@ static const quern_output outputs[] = {
 };
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
-	return region_check(&((const observer *)self)->region, setup, err);
+	return region_init(&((observer *)self)->region, setup, err);
 }
 
 /* Each grain counts as one, whatever its mass. */
@@ -36,10 +37,12 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const observer *o = self;
 	quern_real *const *x = b->use[POSITION].real, *const *v = b->use[VELOCITY].real;
 	const cloud grains = observed(b, false);
+	const bool still = !b->use[BOX].real[0];
 	cloud_sums s;
 	if (!cloud_open(&s, host, run, &grains)) return QUERN_E_MEMORY;
 	for (uint32_t i = 0; i < grains.n; i++)
-		s.mass[i] = region_holds(&o->region, x, i, b->dim) ? cloud_mass(&grains, i) / grains.mass[i] : 0;
+		s.mass[i] =
+			region_holds(&o->region, x, i, b->dim, still) ? cloud_mass(&grains, i) / grains.mass[i] : 0;
 	const quern_real n = out[GRAINS] = cloud_total(&s);
 	if (!(n > 0)) return QUERN_OK;
 	for (uint32_t k = 0; k < b->dim; k++) {
@@ -56,7 +59,7 @@ static const quern_observer_ops ops = {
 	.size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.granular_temperature",
 	.brief = "How much the velocities of grains differ from their mean.",

@@ -8,7 +8,6 @@
 typedef struct {
 	observer_region region;
 	quern_real density;
-	quern_real length[3]; /* m, of periodic axes, else 0 */
 } observer;
 static const quern_param params[] = { REGION_PARAMS(observer, QUERN_REQUIRED),
 	QUERN_PARAM_AS(observer, density, "grain_density", "kg/m^3",
@@ -35,12 +34,10 @@ static const quern_output outputs[] = {
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	observer *o = self;
-	for (uint32_t k = 0; k < setup->dim; k++)
-		o->length[k] = setup->periodic[k] ? setup->upper[k] - setup->lower[k] : 0;
 	if (isnan(o->density) && setup->host->keeps(setup, "continuum"))
 		return setup->host->fail(
 			err, QUERN_E_PARAM, "grain_density", "must be given where there are no grains to take it from");
-	return region_check(&o->region, setup, err);
+	return region_init(&o->region, setup, err);
 }
 
 /* ---- a disc and a box ---- */
@@ -145,8 +142,8 @@ static quern_real volume_in(const observer *o, quern_real *const *x, uint32_t i,
 		quern_real low[3], high[3];
 		bool none = false;
 		for (uint32_t k = 0; k < dim; k++) {
-			const quern_real at = x[k][i] + shift[k] * o->length[k];
-			none = none || (shift[k] && !(o->length[k] > 0));
+			const quern_real at = x[k][i] + shift[k] * o->region.length[k];
+			none = none || (shift[k] && !(o->region.length[k] > 0));
 			low[k] = o->region.lower[k] - at, high[k] = o->region.upper[k] - at;
 			none = none || low[k] >= size || high[k] <= -size;
 		}

@@ -9,8 +9,6 @@
 typedef struct {
 	observer_region region;
 	int32_t axis, bins;
-	quern_real low[3], high[3]; /* m, of the region, of the domain where it has no bound */
-	quern_real length[3];       /* m, of the domain along periodic axes, else 0 */
 } observer;
 static const quern_param params[] = { QUERN_PARAM(observer, axis, "1",
 										  "Axis across which the slabs lie: 0 x, 1 y, 2 z.", .max = 2),
@@ -46,15 +44,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if ((uint32_t)o->axis >= setup->dim)
 		return setup->host->fail(
 			err, QUERN_E_PARAM, "axis", "must be less than %u in this scene", setup->dim);
-	for (uint32_t k = 0; k < setup->dim; k++) {
-		o->low[k] = isnan(o->region.lower[k]) ? setup->lower[k] : o->region.lower[k];
-		o->high[k] = isnan(o->region.upper[k]) ? setup->upper[k] : o->region.upper[k];
-		if (setup->periodic[k]) o->length[k] = setup->upper[k] - setup->lower[k];
-		if (!(o->high[k] > o->low[k]))
-			return setup->host->fail(err, QUERN_E_PARAM, "region.box.upper",
-				"must be above the lower corner along every axis; axis %u is not", k);
-	}
-	return QUERN_OK;
+	return region_init(&o->region, setup, err);
 }
 
 /* The share of a disc, a sphere or a cube of half a width `size` that is below t, from -1 to 1 of it. */
@@ -87,7 +77,7 @@ static void join(const slabs *s, int64_t k, quern_real mass, quern_real *const *
 /* An entry, as it stands at `x` along the axis, and what of it reaches through a periodic face. */
 static void share_out(const slabs *s, quern_real x, quern_real size, bool round, quern_real mass,
 	quern_real *const *v, uint32_t i) {
-	const quern_real length = s->o->length[s->o->axis];
+	const quern_real length = s->o->region.length[s->o->axis];
 	for (int image = length > 0 ? -1 : 0; image <= (length > 0 ? 1 : 0); image++) {
 		const quern_real at = x + image * length;
 		const int64_t from = (int64_t)floor((at - size - s->low) / s->width),
@@ -101,18 +91,17 @@ static void share_out(const slabs *s, quern_real x, quern_real size, bool round,
 	}
 }
 
-/* Where an entry stands: of its images that nearest to the region's middle. It may be a while until what has left a periodic domain is brought
- * back. */
+/* Where an entry stands. */
 static quern_real place_of(const observer *o, quern_real *const *x, uint32_t i, uint32_t k) {
-	const quern_real off = x[k][i] - 0.5 * (o->low[k] + o->high[k]);
-	return x[k][i] + (quern_image_far(off, o->length[k]) - off);
+	const observer_region *r = &o->region;
+	return region_image(x[k][i], r->low[k], r->high[k], r->length[k]);
 }
 
 /* Across the slabs an entry counts if its centre is in the region; along the axis with what of it is in each. */
 static bool is_beside(const observer *o, quern_real *const *x, uint32_t i, uint32_t dim) {
 	for (uint32_t k = 0; k < dim; k++) {
 		const quern_real at = place_of(o, x, i, k);
-		if (k != (uint32_t)o->axis && !(at >= o->low[k] && at <= o->high[k])) return false;
+		if (k != (uint32_t)o->axis && !(at >= o->region.low[k] && at <= o->region.high[k])) return false;
 	}
 	return true;
 }
@@ -139,13 +128,13 @@ static quern_status whole(const void *self, const quern_observer_batch *b, quern
 	const quern_column *u = b->use;
 	const cloud grains = observed(b, false), points = observed(b, true);
 	const uint32_t axis = (uint32_t)o->axis;
-	slabs s = { o, b->dim, o->low[axis], (o->high[axis] - o->low[axis]) / o->bins,
+	slabs s = { o, b->dim, o->region.low[axis], (o->region.high[axis] - o->region.low[axis]) / o->bins,
 		(quern_real(*)[N_OUTPUTS])(void *)out, false };
 	quern_real volume = s.width;
 	const uint32_t *grain = grains.n ? host->parts(run, grains.set)->entry : NULL,
 				   *point = points.n ? host->parts(run, points.set)->entry : NULL;
 	for (uint32_t k = 0; k < b->dim; k++)
-		if (k != axis) volume *= o->high[k] - o->low[k];
+		if (k != axis) volume *= o->region.high[k] - o->region.low[k];
 	for (int pass = 0; pass < 2; pass++) {
 		s.again = pass;
 		add_all(&s, &grains, grain, &u[GRAIN_POSITION], &u[GRAIN_VELOCITY], u[GRAIN_RADIUS].real[0], NULL);

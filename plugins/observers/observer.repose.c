@@ -2,12 +2,14 @@
 /* observer.repose - the slope of the free surface along an axis, by least squares over the tops of columns */
 #include "../common/height.h"
 #include "observers.h"
+#include "region.h"
 #include <quern/math.h>
 
 typedef struct {
 	int32_t axis;
 	quern_real from, to, width, diameter, cell;
-	quern_real lower[3], upper[3]; /* m, of the domain */
+	quern_real lower[3], upper[3]; /* m, of the domain, or of the span along its axis */
+	quern_real length[3];          /* m, of the domain along periodic axes, else 0 */
 } observer;
 static const quern_param params[] = {
 	QUERN_PARAM(observer, axis, "1", "Axis along which the surface falls or rises: 0 x, 1 y, 2 z.", .max = 2),
@@ -60,7 +62,10 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if ((uint32_t)o->axis == quern_vertical(setup->dim, setup->gravity))
 		return setup->host->fail(err, QUERN_E_PARAM, "axis",
 			"gravity is strongest along it: the surface rises across, not along it");
-	for (uint32_t k = 0; k < setup->dim; k++) o->lower[k] = setup->lower[k], o->upper[k] = setup->upper[k];
+	for (uint32_t k = 0; k < setup->dim; k++) {
+		o->lower[k] = setup->lower[k], o->upper[k] = setup->upper[k];
+		o->length[k] = setup->periodic[k] ? setup->upper[k] - setup->lower[k] : 0;
+	}
 	if (!isnan(o->from)) o->lower[o->axis] = o->from;
 	if (!isnan(o->to)) o->upper[o->axis] = o->to;
 	if (!(o->upper[o->axis] > o->lower[o->axis]))
@@ -109,11 +114,13 @@ static void add_tops(const observer *o, const quern_observer_batch *b, bool poin
 	const cloud c = observed(b, point);
 	for (uint32_t i = 0; i < c.n; i++) {
 		uint32_t place = 0;
+		quern_real at[3] = { 0 };
 		bool in = cloud_mass(&c, i) >= 0.5 * c.mass[i];
 		for (uint32_t k = b->dim; k-- > 0 && in;) {
 			if (k == t->up) continue;
-			in = x[k][i] >= o->lower[k] && x[k][i] < o->upper[k];
-			if (in) place = place * t->n[k] + (uint32_t)((x[k][i] - o->lower[k]) / o->width);
+			at[k] = region_image(x[k][i], o->lower[k], o->upper[k], o->length[k]);
+			in = at[k] >= o->lower[k] && at[k] < o->upper[k];
+			if (in) place = place * t->n[k] + (uint32_t)((at[k] - o->lower[k]) / o->width);
 		}
 		if (!in) continue;
 		const quern_real half =
@@ -122,8 +129,8 @@ static void add_tops(const observer *o, const quern_observer_batch *b, bool poin
 			(t->down ? b->upper[t->up] - x[t->up][i] : x[t->up][i] - b->lower[t->up]) + half;
 		const column *old =
 			&t->at[place]; /* of equals the one with the lower coordinate, whatever the order */
-		if (old->taken && (top < old->top || (top == old->top && x[o->axis][i] >= old->x))) continue;
-		t->at[place] = (column) { x[o->axis][i], top, true };
+		if (old->taken && (top < old->top || (top == old->top && at[o->axis] >= old->x))) continue;
+		t->at[place] = (column) { at[o->axis], top, true };
 	}
 }
 
@@ -166,7 +173,7 @@ static const quern_observer_ops ops = {
 	.size = sizeof ops, .output_size = sizeof(quern_output), .outputs = outputs, .whole = whole
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 1,
+	.revision = 2,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "observer.repose",
 	.brief = "The slope of the free surface along an axis.",

@@ -59,7 +59,7 @@ static const quern_output outputs[] = {
 
 static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	observer *o = self;
-	if (region_check(&o->region, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	if (region_init(&o->region, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	for (uint32_t k = 0; k < setup->dim; k++) {
 		const quern_real lower = o->region.lower[k], upper = o->region.upper[k];
 		o->periodic[k] = setup->periodic[k];
