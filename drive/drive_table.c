@@ -58,7 +58,7 @@ static bool next_line(reader *r, const char **begin, const char **end) {
 	return false;
 }
 
-/* Up to the next comma, without blanks around; false if there is none left, or if it is too long for any name or number. */
+/* Up to the next comma, without blanks around; false if there is none left. One that is too long ends in dots, as no name or number does. */
 static bool next_word(const char **at, const char *end, char out[MOST_WORD]) {
 	if (!*at) return false;
 	const char *stop = memchr(*at, ',', (size_t)(end - *at)), *from = *at, *to = stop ? stop : end;
@@ -68,6 +68,7 @@ static bool next_word(const char **at, const char *end, char out[MOST_WORD]) {
 	const size_t n = (size_t)(to - from) < MOST_WORD - 1 ? (size_t)(to - from) : MOST_WORD - 1;
 	for (size_t k = 0; k < n; k++) out[k] = from[k] >= ' ' && from[k] < 127 ? from[k] : '?';
 	out[n] = 0;
+	if ((size_t)(to - from) > n) memcpy(out + n - 3, "...", 3);
 	return true;
 }
 
@@ -179,12 +180,12 @@ static bool begin_with(reader *r, drive_path *p, const drive_leg *leg) {
 	}
 	if (!p->pressed) return true;
 	double rest = p->dim * leg->pressure;
-	uint32_t alike = 0;
+	uint32_t free = 0;
 	for (uint32_t c = 0; c < p->dim; c++)
-		if (p->control[c] == DRIVE_ALIKE) alike++;
+		if (p->control[c] != DRIVE_STRESS) free++;
 		else rest += p->start.target[c];
 	for (uint32_t c = 0; c < p->dim; c++)
-		if (p->control[c] == DRIVE_ALIKE) p->start.target[c] = -rest / alike;
+		if (p->control[c] != DRIVE_STRESS) p->start.target[c] = -rest / free;
 	return true;
 }
 

@@ -66,6 +66,10 @@ def check_elastic(here):
         t = drive(here, *two, "--path", "table.csv")
         near(f"{dim}-D pure shear from a table: shear stress", t["shear_stress"], 2 * g * np.abs(t[f"strain_{shear}"]), 1e-10)
         near(f"{dim}-D pure shear from a table: shear strain", t["shear_strain"], 2 * np.abs(t[f"strain_{shear}"]), 1e-12)
+        (here / "table.csv").write_text(f"time,strain_{UP[dim]},pressure\n0,0,50e3\n1,-1e-3,50e3\n")
+        t = drive(here, *two, "--path", "table.csv")
+        near(f"{dim}-D pressed from a table: pressure", t["pressure"], 5e4, 1e-9)
+        near(f"{dim}-D   shear stress, from none", t["shear_stress"], math.sqrt(dim / (2 * (dim - 1))) * 2 * g * -t[f"strain_{UP[dim]}"], 1e-6)
 
 
 def check_prager(here):
@@ -183,7 +187,7 @@ def check_words(here):
               "time,strain_xz,foo\n1,2,3": "line 1: unknown column 'foo'", "time,shear_xx\n1,2": "unknown column 'shear_xx'",
               "time,strain_xx\n1,nan": "line 2: column 'strain_xx': 'nan' is no finite number", "time,strain_xx\n\n1,0.1\n2,x": "line 4: ",
               "time,strain_xx\n1,1e999": "no finite number", "time,strain_xx\n1,2,3": "more words than the 2 columns",
-              "time,strain_xx\n1": "there are 1 words, and 2 columns", "time,strain_xx\n1,1\n1,2": "line 3: time 1 s does not come after 1 s",
+              "time,strain_xx\n1": "there are 1 words, and 2 columns", f"time,strain_xx\n1,{'0' * 62}1e-3": "'000", "time,strain_xx\n1,1\n1,2": "line 3: time 1 s does not come after 1 s",
               "time,strain_xx\n-1,1": "does not come after 0 s", "time,strain_xx,stress_xx\n1,1,1": "both give component xx",
               "time,time,strain_xx\n1,1,1": "stands twice", "time,strain_xx [%]\n1,1": "is in 1, not in [%]", "time,strain_xx\n0,1\n1,2": "must be 0 at time 0",
               "time,strain_xx\n0,0\n": "no row comes after time 0", "time,pressure,strain_xx,strain_yy,strain_zz\n1,1,0,0,0": "beside 'pressure'"}
