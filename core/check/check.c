@@ -306,16 +306,26 @@ static void load_column(
 }
 
 /* The first byte is, and each is like the one before. */
-static bool is_poison(const char *bytes, size_t n) {
-	return (unsigned char)*bytes == POISON && !memcmp(bytes, bytes + 1, n - 1);
+static bool is_filled(const char *bytes, size_t n, unsigned char byte) {
+	return !n || ((unsigned char)*bytes == byte && !memcmp(bytes, bytes + 1, n - 1));
+}
+
+/* Whether what load_column() has put behind the batch is there, before cap and beyond. */
+static bool is_left(const runner *r, const quern_check_column *c, const char *from, uint32_t begin,
+	uint32_t n, uint32_t cap) {
+	const size_t size = quern_check_entry_bytes(c);
+	const char *behind = from + n * size, *last = (const char *)c->given + (begin + n - 1) * size;
+	bool same = is_filled(from - GUARD, GUARD, POISON) &&
+				is_filled(from + cap * size, r->stride - GUARD - cap * size, POISON);
+	if (c->role == QUERN_CHECK_OUT) return same && is_filled(behind, (cap - n) * size, 0xff);
+	for (uint32_t i = n; i < cap; i++, behind += size) same = same && !memcmp(behind, last, size);
+	return same;
 }
 
 static void store_column(runner *r, uint32_t worker, const quern_check_column *c, const char *from,
 	uint32_t begin, uint32_t n, uint32_t cap) {
 	const size_t size = quern_check_entry_bytes(c);
-	const size_t after = r->stride - GUARD - cap * size;
-	if (!is_poison(from - GUARD, GUARD) || !is_poison(from + cap * size, after))
-		r->overrun[worker]++, r->culprit[worker] = c->name;
+	if (!is_left(r, c, from, begin, n, cap)) r->overrun[worker]++, r->culprit[worker] = c->name;
 	if (c->found) memcpy((char *)c->found + begin * size, from, n * size);
 	else if (memcmp((const char *)c->given + begin * size, from, n * size) != 0)
 		r->changed[worker]++, r->culprit[worker] = c->name;

@@ -66,7 +66,8 @@ static void try_kernel(check_kernel *k, batch_tallies *t) {
 			&t->threads, !column, "%s, %u-D: %s differs when several threads call it", name, dim, column);
 	}
 	culprit = k->culprit ? k->culprit : "";
-	quern_check_expect(&t->guards, !k->overrun, "%s, %u-D: writes beyond cap of %s", name, dim, culprit);
+	quern_check_expect(
+		&t->guards, !k->overrun, "%s, %u-D: writes beyond the batch in %s", name, dim, culprit);
 	quern_check_expect(&t->inputs, !k->changed, "%s, %u-D: changes its input %s", name, dim, culprit);
 	quern_check_expect(
 		&t->self, !k->altered, "%s, %u-D: changes self, which is read-only after init", name, dim);
@@ -96,7 +97,7 @@ void quern_check_batches(const check *c) {
 	if (!t.batches.tried) return;
 	quern_check_tell(&c->open, &t.batches, "1, 7, 8, 64, 250 and 512 at a time give the same bits");
 	quern_check_tell(&c->open, &t.threads, "4 threads at once give the same bits");
-	quern_check_tell(&c->open, &t.guards, "nothing is written beyond cap");
+	quern_check_tell(&c->open, &t.guards, "nothing is written beyond the batch");
 	quern_check_tell(&c->open, &t.inputs, "inputs are left alone");
 	quern_check_tell(&c->open, &t.self, "self is left alone");
 	quern_check_tell(&c->open, &t.environment, "modes of arithmetic are left alone");

@@ -76,6 +76,7 @@ BROKEN = [
                                "law->loss = -0.2 * quern_damping_ratio(law->restitution)")], "impacts gain no energy"),
     ("depends on n", LINEAR, [(FORCE, "b->force[0][i] += f.x * (1 + 1e-15 * (b->n > 100));")], "batches"),
     ("writes beyond cap", LINEAR, [around("b->force[0][b->cap] = 1;")], "guards"),
+    ("writes beyond n", LINEAR, [around("if (b->n < b->cap) b->force[0][b->n] += 1;")], "guards"),
     ("writes its input", LINEAR, [around("((quern_real *)b->overlap)[0] = 0;")], "inputs"),
     ("writes itself", LINEAR, [around("((linear *)self)->loss += 1e-3;")], "self"),
     ("rounds down", LINEAR, [around("__builtin_ia32_ldmxcsr(0x3f80);")], "arithmetic"),
