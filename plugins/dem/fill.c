@@ -314,7 +314,10 @@ static quern_status open_placer(filling *f, const grain_table *table) {
 	return status;
 }
 
-/* Regions that cannot be meant: more grains than a run can number. */
+/* Grains, and what one takes with its contacts: whoever has asked for more may have mistaken a unit. */
+static const quern_real many = 2e7, bytes_each = 600;
+
+/* Regions that cannot be meant: more grains than a run can number. Of many it says so before they are placed, which takes a while. */
 static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 	const dem_fill *item = (const dem_fill *)d->fill.items + i;
 	char param[40];
@@ -325,6 +328,10 @@ static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 		const quern_real across = (item->upper[k] - item->lower[k]) / (2 * least);
 		grains *= across > 1 ? across : 1;
 	}
+	if (grains > many && grains <= 0x1p30)
+		s->host->log(s->run, 2,
+			"fill %u: a box around its region holds about %.2g grains of radius %g m; with their contacts they take some %.0f GB",
+			i, grains, least, grains * bytes_each * 1e-9);
 	if (grains <= 0x1p30) return QUERN_OK;
 	snprintf(param, sizeof param, "fill.%u", i);
 	return s->host->stop(s->run, QUERN_E_PARAM, param, -1,

@@ -12,6 +12,7 @@ import signal
 import struct
 import subprocess
 import termios
+import threading
 import time
 
 import h5py
@@ -192,7 +193,21 @@ def who_is_at_work(place):
     print(f"a killed run says '{word['status']}' and holds no lock; one that cannot write its last word has none")
 
 
+def many_grains(place):
+    """Whoever has mistaken a unit is told how many grains that makes, and how much memory, before they are placed."""
+    scene = place / "many.yaml"
+    scene.write_text(BED.replace("mean: 4 mm", "mean: 5 um"))
+    with subprocess.Popen([lab.QUERN, "plan", scene], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        patience = threading.Timer(60, process.kill)
+        patience.start()
+        said = process.stderr.readline()
+        process.kill()
+        patience.cancel()
+    print(said.strip())
+    assert "about 9e+08 grains of radius 5e-06 m" in said, said
+
+
 if __name__ == "__main__":
     with lab.workplace() as name:
-        for test in (a_line, numbers, share_and_updates, cost, who_is_at_work):
+        for test in (a_line, many_grains, numbers, share_and_updates, cost, who_is_at_work):
             test(pathlib.Path(name))
