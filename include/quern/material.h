@@ -40,7 +40,7 @@ typedef struct quern_material_ops {
 	void (*friction)(const void *self, uint32_t dim, quern_real *slow, quern_real *fast, quern_real *number,
 		quern_real *density);
 	/* since 2.1; NULL: the density without stress. [setup] kg/m^3, at most that density: what is looser
-	 * bears nothing, however it flows */
+	 * bears nothing, however it flows. The limit of the step holds down to it */
 	quern_real (*loosest)(const void *self);
 } quern_material_ops;
 

@@ -81,7 +81,8 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 	.brief = "Linear elasticity in rates.",
 	.doc =
 		"The stress turns with the material and grows with the strain rate. It holds under tension, and the "
-		"point never opens: for bars, waves and tests, not for sand.",
+		"point never opens: for bars, waves and tests, not for sand. Stretched to less than 0.81 of its density it "
+		"needs a shorter step than the recommended one.",
 	.cite = "Truesdell & Noll 1965; Hughes & Winget 1980",
 	.instance_size = sizeof(elastic),
 	.params = params,

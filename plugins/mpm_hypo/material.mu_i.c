@@ -30,7 +30,8 @@ static const quern_param params[] = { QUERN_PARAM(mu_i, bulk_modulus, "Pa",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(mu_i, grain_density, "kg/m^3", "Density of a grain.", .from = "grain.density",
 		.flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(mu_i, critical_density, "kg/m^3", "Below it the material is open and carries no stress.",
+	QUERN_PARAM(mu_i, critical_density, "kg/m^3",
+		"Below it the material is open and carries no stress, but for what flows at flow_density.",
 		.from = "grain.critical_density", .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
 	QUERN_PARAM(mu_i, flow_density, "kg/m^3",
 		"Density without stress that slow flow comes to; 0: flow keeps the density that it has.", .max = 1e6),
@@ -256,7 +257,7 @@ static const quern_plugin plugin = { .size = sizeof plugin,
 		"solved "
 		"implicitly, so that viscosity never limits the step. It resists no tension, and below the critical "
 		"density nothing: such a point takes its volume from the grid until it is dense again. With flow_density "
-		"what flows comes to a density of its own, the looser the faster it flows.",
+		"what flows comes to a density of its own, the looser the faster it flows, and bears there.",
 	.cite = "Dunatunga & Kamrin 2015; Jop, Forterre & Pouliquen 2006; Pailha & Pouliquen 2009",
 	.instance_size = sizeof(mu_i),
 	.params = params,
