@@ -199,6 +199,7 @@ static bool prepare(forces_shared *sh, const quern_set_view grains) {
 	}
 	sh->images = quern_images_of(s->dim, s->lower, s->upper, s->periodic);
 	if (sh->d->boxed && !prepare_box(sh, ahead, grains.n_blocks)) return false;
+	sh->opens = integrator->open[s->dim - 2] && !sh->boxed;
 	/* an integrator in two parts has moved the grains on already: bodies are where they will be then */
 	const quern_real now = s->time + ((quern_real)s->within + (sh->looks ? 0 : ahead)) * s->dt;
 	sh->pose = quern_body_poses(s, SLOT_BODIES, now, now);

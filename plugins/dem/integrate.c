@@ -25,10 +25,10 @@ static quern_real most_of(quern_real *restrict column, uint32_t n) {
 	return column[0];
 }
 
-/* The way since the last list and its square; how much of the velocity on the way of this step is kept on that of the next; and 1
- * where a grain is lost: what leaves this stage must be finite, and slower than a radius per step. */
-QUERN_INLINE void compare(
-	const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n, const int dim) {
+/* The way since the last list and its square, if that is looked at here; how much of the velocity on the way of this step is kept on that of the
+ * next; and 1 where a grain is lost: what leaves this stage must be finite, and slower than a radius per step. */
+QUERN_INLINE void compare(const forces_shared *sh, const forces_work *w, uint32_t begin, uint32_t n,
+	const int dim, const bool measured) {
 	const quern_column *u = sh->use;
 	const quern_real *restrict x = u[FORCE_POSITION].real[0] + begin,
 							   *restrict y = u[FORCE_POSITION].real[1] + begin,
@@ -50,15 +50,17 @@ QUERN_INLINE void compare(
 						 *restrict along_z = w->grains[G_ALONG + 2];
 	QUERN_SIMD
 	for (uint32_t i = 0; i < n; i++) {
-		const quern_vec d = { x[i] - ax[i], y[i] - ay[i], dim == 3 ? z[i] - az[i] : 0 };
 		const quern_vec now = { vx[i], vy[i], dim == 3 ? vz[i] : 0 },
 						old = { ox[i], oy[i], dim == 3 ? oz[i] : 0 },
 						next = quern_vec_axpy(waits, quern_vec_sub(now, old), now);
 		const quern_real step = quern_vec_dot(now, now, dim) * dt * dt, most = radius[i] * radius[i];
-		way[i] = quern_vec_dot(d, d, dim);
-		along_x[i] = d.x;
-		along_y[i] = d.y;
-		if (dim == 3) along_z[i] = d.z;
+		if (measured) {
+			const quern_vec d = { x[i] - ax[i], y[i] - ay[i], dim == 3 ? z[i] - az[i] : 0 };
+			way[i] = quern_vec_dot(d, d, dim);
+			along_x[i] = d.x;
+			along_y[i] = d.y;
+			if (dim == 3) along_z[i] = d.z;
+		}
 		kept[i] = mass[i] * quern_vec_dot(old, next, dim);
 		whole[i] = mass[i];
 		lost[i] = step <= most ? 0 : 1; /* an unordered comparison finds a NaN too */
@@ -76,23 +78,33 @@ static void spread(const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t
 	}
 }
 
-static void check_grains(
+/* How far grains have come since the last list. An integrator in two parts has that looked at after the first of them, which is when it decides
+ * about a list. */
+static void measure_ways(
 	const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
-	quern_real none, lost;
-	if (sh->s->dim == 2) compare(sh, w, begin, n, 2);
-	else compare(sh, w, begin, n, 3);
 	if (sh->boxed) {
 		quern_real *const *to = sh->use[FORCE_POSITION].real;
 		quern_dem_box_ways(&sh->box_then, &sh->use[FORCE_BOX_LISTED], begin, n,
 			(quern_real *const[3]) { to[0] + begin, to[1] + begin, sh->s->dim == 3 ? to[2] + begin : NULL },
 			sh->use[FORCE_ANCHOR].real, w->grains[G_WAY]);
 	}
-	quern_dem_range(w->grains[G_LOST], n, &none, &lost);
-	for (uint32_t i = 0; lost > 0 && i < n && sh->bad[b] < 0; i++)
-		if (w->grains[G_LOST][i] > 0) sh->bad[b] = (int32_t)(begin + i);
 	const quern_real farthest = most_of(w->grains[G_WAY], n);
 	sh->farthest[b] = farthest > sh->farthest[b] ? farthest : sh->farthest[b];
 	spread(sh, b, begin, n, w);
+}
+
+static void check_grains(
+	const forces_shared *sh, uint32_t b, uint32_t begin, uint32_t n, const forces_work *w) {
+	const bool flat = sh->s->dim == 2;
+	quern_real none, lost;
+	if (flat && sh->opens) compare(sh, w, begin, n, 2, false);
+	else if (flat) compare(sh, w, begin, n, 2, true);
+	else if (sh->opens) compare(sh, w, begin, n, 3, false);
+	else compare(sh, w, begin, n, 3, true);
+	if (!sh->opens) measure_ways(sh, b, begin, n, w);
+	quern_dem_range(w->grains[G_LOST], n, &none, &lost);
+	for (uint32_t i = 0; lost > 0 && i < n && sh->bad[b] < 0; i++)
+		if (w->grains[G_LOST][i] > 0) sh->bad[b] = (int32_t)(begin + i);
 	sh->turned[2 * b] += sum_up(w->grains[G_KEPT], n);
 	sh->turned[2 * b + 1] += sum_up(w->grains[G_WHOLE], n);
 }

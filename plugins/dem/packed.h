@@ -28,6 +28,11 @@ QUERN_INLINE void packed_columns(const lanes4 *from, size_t stride, const int32_
 	packed_rows(from, stride, at, row);
 	packed_turn(row, column);
 }
+/* Four numbers of a column of the set, from any entry on. */
+typedef quern_real lanes4_anywhere __attribute__((vector_size(32), aligned(8)));
+QUERN_INLINE const lanes4_anywhere *packed_anywhere(const quern_real *from) {
+	return (const lanes4_anywhere *)(const void *)from;
+}
 /* Four numbers of a column, or half of a row. */
 QUERN_INLINE const lanes4 *packed_at(const quern_real *from) { return (const lanes4 *)(const void *)from; }
 QUERN_INLINE void packed_put(quern_real *to, const lanes4 *column) { *(lanes4 *)(void *)to = *column; }

@@ -4,71 +4,106 @@
 
 /* ---- rows of grains ---- */
 
-QUERN_INLINE quern_real mass_of(const forces_shared *sh, uint32_t i) {
-	const int32_t *fixed = sh->use[FORCE_FIXED].index;
-	const quern_real mass = sh->use[FORCE_MASS].real[0][i];
-	return fixed && fixed[i] ? -mass : mass;
+/* n columns of grains from `begin` on, whose rows are made at once. */
+typedef struct {
+	uint32_t begin, n;
+	const quern_real *mass; /* kg, with the sign that rows have */
+} packing;
+
+/* Four rows, of four columns from entry i on; NULL: zeros. */
+QUERN_INLINE void make_rows(const quern_real *const from[4], uint32_t i, lanes4 row[4]) {
+	lanes4 column[4];
+	for (int k = 0; k < 4; k++) column[k] = from[k] ? *packed_anywhere(from[k] + i) : (lanes4) { 0 };
+	packed_turn(column, row);
 }
 
-/* Velocity v and spin s of entry k, of a grain of mass m. */
-QUERN_INLINE void pack_motion(lanes4 *motion, quern_real *const *v, quern_real *const *s, uint32_t k,
-	quern_real m, const int dim, const bool spin) {
-	motion[0] = dim == 3 ? (lanes4) { v[0][k], v[1][k], v[2][k], m }
-						 : (lanes4) { v[0][k], v[1][k], spin ? s[0][k] : 0, 0 };
-	if (dim == 3 && spin) motion[1] = (lanes4) { s[0][k], s[1][k], s[2][k], 0 };
+/* Rows of four columns, `stride` apart. */
+QUERN_INLINE void put_rows(lanes4 *to, size_t stride, const quern_real *const from[4], uint32_t n) {
+	const uint32_t whole = n & ~3u;
+	lanes4 row[4];
+	for (uint32_t i = 0; i < whole; i += 4, to += 4 * stride) {
+		make_rows(from, i, row);
+		for (uint32_t k = 0; k < 4; k++) to[k * stride] = row[k];
+	}
+	if (whole == n) return;
+	make_rows(from, whole, row);
+	for (uint32_t k = 0; whole + k < n; k++) to[k * stride] = row[k];
+}
+
+/* Of velocities and spins, each from the first of these grains on. */
+QUERN_INLINE void put_motions(lanes4 *motion, const quern_real *const v[3], const quern_real *const s[3],
+	const packing *p, const int dim, const bool spin) {
+	lanes4 *to = motion + packed_motions(dim) * (size_t)p->begin;
+	const quern_real *const flat[4] = { v[0], v[1], spin ? s[0] : NULL, NULL },
+							*const spatial[4] = { v[0], v[1], v[2], p->mass },
+							*const turns[4] = { s[0], s[1], s[2], NULL };
+	put_rows(to, packed_motions(dim), dim == 3 ? spatial : flat, p->n);
+	if (dim == 3 && spin) put_rows(to + 1, 2, turns, p->n);
+}
+
+QUERN_INLINE void columns_from(
+	const quern_column *column, uint32_t begin, const int n, const quern_real *out[3]) {
+	for (int k = 0; k < 3; k++) out[k] = k < n ? column->real[k] + begin : NULL;
 }
 
 /* `to`: rows of motion by the state, which are those that dashpots see unless these are predicted. */
 QUERN_INLINE void pack(
-	const forces_shared *sh, uint32_t begin, uint32_t end, lanes4 *to, const int dim, const bool spin) {
-	quern_real *const *x = sh->use[FORCE_OLD_POSITION].real, *const *v = sh->use[FORCE_OLD_VELOCITY].real,
-					  *const *s = sh->use[FORCE_OLD_SPIN].real;
-	const quern_real *radius = sh->use[FORCE_RADIUS].real[0];
-	for (uint32_t i = begin; i < end; i++) {
-		const quern_real m = mass_of(sh, i);
-		sh->place[i] = dim == 3 ? (lanes4) { x[0][i], x[1][i], x[2][i], radius[i] }
-								: (lanes4) { x[0][i], x[1][i], radius[i], m };
-		if (to) pack_motion(&to[packed_motions(dim) * (size_t)i], v, s, i, m, dim, spin);
-	}
+	const forces_shared *sh, const packing *p, lanes4 *to, const int dim, const bool spin) {
+	const quern_real *x[3], *v[3], *s[3], *radius = sh->use[FORCE_RADIUS].real[0] + p->begin;
+	columns_from(&sh->use[FORCE_OLD_POSITION], p->begin, dim, x);
+	columns_from(&sh->use[FORCE_OLD_VELOCITY], p->begin, dim, v);
+	columns_from(&sh->use[FORCE_OLD_SPIN], p->begin, !spin ? 0 : dim == 3 ? 3 : 1, s);
+	const quern_real *const flat[4] = { x[0], x[1], radius, p->mass }, *const spatial[4] = { x[0], x[1], x[2],
+		radius };
+	put_rows(sh->place + p->begin, 1, dim == 3 ? spatial : flat, p->n);
+	if (to) put_motions(to, v, s, p, dim, spin);
 }
 
 /* What dashpots see, as the integrator says. A fixed grain has no acceleration, whatever its forces are. */
-QUERN_INLINE void pack_predicted(
-	const forces_shared *sh, uint32_t begin, uint32_t n, const int dim, const bool spin) {
+QUERN_INLINE void pack_predicted(const forces_shared *sh, const packing *p, const int dim, const bool spin) {
 	const quern_bound *bound = dem_integrator(sh->s);
-	const quern_column *u = sh->use, *velocity = &u[FORCE_OLD_VELOCITY], *turning = &u[FORCE_OLD_SPIN];
-	const int32_t *fixed = u[FORCE_FIXED].index;
+	const int32_t *fixed = sh->use[FORCE_FIXED].index;
+	const int turns = !spin ? 0 : dim == 3 ? 3 : 1;
 	_Alignas(64) quern_real then[6][GRAINS];
-	quern_real *const v[3] = { then[0], then[1], then[2] }, *const s[3] = { then[3], then[4], then[5] };
+	const quern_real *const v[3] = { then[0], then[1], then[2] }, *const s[3] = { then[3], then[4], then[5] };
 	quern_column own[QUERN_MOST_USES];
-	quern_integrator_batch batch = { .n = n, .cap = GRAINS, .dt = sh->s->dt, .use = own };
+	quern_integrator_batch batch = { .n = p->n, .cap = GRAINS, .dt = sh->s->dt, .use = own };
 	for (uint32_t r = 0; r < bound->n_uses; r++)
-		own[r] = quern_column_from(bound->column[r], bound->uses[r].shape, begin);
-	for (int k = 0; k < dim; k++) {
-		batch.gravity[k] = sh->s->gravity[k];
-		batch.position[k] = u[FORCE_OLD_POSITION].real[k] + begin;
-		batch.velocity[k] = velocity->real[k] + begin;
-		batch.new_velocity[k] = v[k];
-	}
-	for (int k = 0; k < (dim == 3 ? 3 : 1) && spin; k++) {
-		batch.spin[k] = turning->real[k] + begin;
-		batch.new_spin[k] = s[k];
-	}
+		own[r] = quern_column_from(bound->column[r], bound->uses[r].shape, p->begin);
+	for (int k = 0; k < dim; k++) batch.gravity[k] = sh->s->gravity[k], batch.new_velocity[k] = then[k];
+	for (int k = 0; k < turns; k++) batch.new_spin[k] = then[3 + k];
+	columns_from(&sh->use[FORCE_OLD_POSITION], p->begin, dim, batch.position);
+	columns_from(&sh->use[FORCE_OLD_VELOCITY], p->begin, dim, batch.velocity);
+	columns_from(&sh->use[FORCE_OLD_SPIN], p->begin, turns, batch.spin);
 	((const quern_integrator_ops *)bound->ops)->predict[dim - 2](bound->self, &batch);
-	for (uint32_t i = 0; i < n; i++) {
-		const uint32_t g = begin + i;
-		lanes4 *motion = &sh->motion[packed_motions(dim) * (size_t)g];
-		if (fixed && fixed[g])
-			pack_motion(motion, velocity->real, turning->real, g, mass_of(sh, g), dim, spin);
-		else pack_motion(motion, v, s, i, mass_of(sh, g), dim, spin);
+	for (uint32_t i = 0; i < p->n && fixed; i++) {
+		if (!fixed[p->begin + i]) continue;
+		for (int k = 0; k < dim; k++) then[k][i] = batch.velocity[k][i];
+		for (int k = 0; k < turns; k++) then[3 + k][i] = batch.spin[k][i];
 	}
+	put_motions(sh->motion, v, s, p, dim, spin);
+}
+
+/* The mass of a fixed grain has a minus sign. */
+static const quern_real *signed_masses(
+	const forces_shared *sh, uint32_t begin, uint32_t n, quern_real to[GRAINS]) {
+	const quern_real *mass = sh->use[FORCE_MASS].real[0] + begin;
+	const int32_t *fixed = sh->use[FORCE_FIXED].index;
+	if (!fixed) return mass;
+	QUERN_SIMD
+	for (uint32_t i = 0; i < n; i++) to[i] = fixed[begin + i] ? -mass[i] : mass[i];
+	return to;
 }
 
 QUERN_INLINE void pack_all(
 	const forces_shared *sh, uint32_t begin, uint32_t end, const int dim, const bool spin) {
-	pack(sh, begin, end, sh->predicts ? sh->mean : sh->motion, dim, spin);
-	for (uint32_t i = begin; i < end && sh->predicts; i += GRAINS)
-		pack_predicted(sh, i, end - i < GRAINS ? end - i : GRAINS, dim, spin);
+	_Alignas(64) quern_real mass[GRAINS];
+	for (uint32_t i = begin; i < end; i += GRAINS) {
+		const uint32_t n = end - i < GRAINS ? end - i : GRAINS;
+		const packing p = { i, n, signed_masses(sh, i, n, mass) };
+		pack(sh, &p, sh->predicts ? sh->mean : sh->motion, dim, spin);
+		if (sh->predicts) pack_predicted(sh, &p, dim, spin);
+	}
 }
 
 void quern_dem_pack(const forces_shared *sh, uint32_t b) {
