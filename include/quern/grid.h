@@ -44,9 +44,15 @@ QUERN_INLINE void quern_grid_hold(const quern_grid_view *g, int32_t cell[3]) {
 	for (uint32_t k = 0; k < g->dim; k++) cell[k] = quern_cell_held(cell[k], g->cells[k]);
 }
 
-/* Cell of a position, wrapped along periodic axes; false outside the domain. */
+/* Cell of a position, wrapped along periodic axes; false outside the domain. A period may be longer than its cells by a millionth: what lies
+ * there belongs to the last of them. */
 QUERN_INLINE bool quern_grid_cell_at(const quern_grid_view *g, const quern_real x[3], int32_t cell[3]) {
-	for (uint32_t k = 0; k < 3; k++) cell[k] = k < g->dim ? quern_grid_cell(g, k, x[k]) : 0;
+	for (uint32_t k = 0; k < 3; k++) {
+		cell[k] = k < g->dim ? quern_grid_cell(g, k, x[k]) : 0;
+		if (k < g->dim && g->periodic[k] && cell[k] == g->cells[k] &&
+			x[k] - g->lower[k] < (1 + 1e-6) * g->cells[k] * g->cell)
+			cell[k]--;
+	}
 	return quern_grid_bring_back(g, cell);
 }
 

@@ -2,6 +2,7 @@
 /* Free flight, in which nothing may happen that no force causes: transfers keep momentum, uniform motion stays as it is to
  * round-off, a body that turns as a whole feels no stress, and what a transfer takes from a turning body is what it
  * promises. */
+#include <quern/grid.h>
 #include <quern/shape.h>
 #include <quern/transfer.h>
 #include <setjmp.h>
@@ -567,6 +568,10 @@ static void sliver_of_a_period(void **unused) {
 		for (uint32_t i = 0; i < harness_count(run, "point"); i++)
 			for (int k = 0; k < dim; k++)
 				off = fmax(off, fabs(v.real[k][i] - (const double[3]) { 0.5, 0.1, -0.2 }[k]));
+		int32_t cell[3];
+		const bool inside = quern_grid_cell_at(
+			quern_host_table.grid(run), (const quern_real[3]) { 0.2 - 1e-8, 15e-3, 15e-3 }, cell);
+		assert_true(inside && cell[0] == 59); /* for whoever sorts points by cells */
 		printf("  %d-D: %u of %u points\n", dim, moved, n);
 		assert_true(moved > 0 && harness_count(run, "point") == n);
 		good &= table_row("  worst velocity, off by", off, 0, 1e-12);
