@@ -195,10 +195,9 @@ static bool is_face(const grid_work *w, const near_nodes *n, uint32_t b, uint32_
 	int32_t at[3];
 	const uint32_t k = axis_nearest(n, i, w->g->dim);
 	quern_grid_cell_of(w->g, b * N + i, at);
-	const int32_t down = at[k], up = w->g->cells[k] - at[k];
-	const bool beyond = n->normal[k][i] > 0 ? down <= up : up <= down;
-	return !w->g->periodic[k] && beyond && fabs(n->normal[k][i]) > 1 - 1e-9 &&
-		   fabs(n->gap[i] - cells_to_face(w->g, at, k) * w->g->cell) < 1e-6 * w->g->cell;
+	const int32_t away = n->normal[k][i] > 0 ? at[k] : w->g->cells[k] - at[k];
+	return !w->g->periodic[k] && fabs(n->normal[k][i]) > 1 - 1e-9 &&
+		   fabs(n->gap[i] - away * w->g->cell) < 1e-6 * w->g->cell;
 }
 
 /* The faces of the domain come first among a node's surfaces, so that a body just before one does not take its half again. */

@@ -54,7 +54,7 @@ static const quern_shape_ops ops = {
 	.size = sizeof ops, .weights = weights, .shares = shares, .stiffness = stiffness, .light = 0.0625
 };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 2,
+	.revision = 3,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "shape.linear",
 	.brief = "Linear hats.",

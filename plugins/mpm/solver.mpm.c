@@ -23,8 +23,8 @@ static const quern_param source_rows[] = { SOURCE_KEYS(5), QUERN_END_PARAMS };
 static const quern_param params[] = { QUERN_PARAM(mpm, cell, "m",
 										  "Cell of the grid; the domain is a whole number of them.",
 										  .flags = QUERN_REQUIRED | QUERN_MIN_OPEN, .max = 1e6),
-	QUERN_PARAM(mpm, points, "1", "Points per cell and axis at the start.", .def = 2, .min = 1, .max = 8,
-		.flags = QUERN_ONCE),
+	QUERN_PARAM(mpm, points, "1", "Points per cell and axis at the start; a hybrid has 2.", .def = 2,
+		.min = 1, .max = 8, .flags = QUERN_ONCE),
 	QUERN_PARAM(mpm, fill, NULL, "Regions of material at the start; a hybrid starts from its grains alone.",
 		.rows = fill_rows, .item_size = sizeof(mpm_fill), .flags = QUERN_ONCE),
 	QUERN_PARAM(mpm, from, NULL,
@@ -321,6 +321,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	p->stream = setup->stream;
 	if (quern_sources_check(&p->source, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
+	if (hybrid) p->points = 2; /* its updates make as many, whatever a fill would */
 	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
 	return QUERN_OK;
 }
@@ -415,7 +416,6 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->bears = 0.5 * p->density * quern_gravity_size(setup->dim, setup->gravity) * p->cell;
 	p->loosest = ops->loosest ? ops->loosest(material->self) : p->density;
 	const bool hybrid = setup->host->keeps(setup, "hybrid");
-	if (hybrid) p->points = 2; /* its updates make as many, whatever a fill would */
 	p->alone = ops->friction && (p->follow > 0 || p->alone) && p->rest > 0 && !hybrid;
 	/* in a hybrid always, so that a stage may spread points or not */
 	p->counted = p->alone || (ops->friction && hybrid);

@@ -15,13 +15,14 @@ static void weights(const void *self, const quern_shape_batch *b) {
 	const quern_real inverse = b->inverse_cell;
 	(void)self;
 	for (uint32_t a = 0; a < b->dim; a++) {
-		/* a point on the upper wall belongs to the last cell */
-		const quern_real last = b->wall[a][1] == INT32_MAX ? 0x1p40 : (quern_real)(b->wall[a][1] - 1);
+		/* a point on a wall, or beyond it by round-off, belongs to the cell inside */
+		const quern_real last = b->wall[a][1] == INT32_MAX ? 0x1p40 : (quern_real)(b->wall[a][1] - 1),
+						 least = b->wall[a][0] == INT32_MIN ? -0x1p40 : (quern_real)b->wall[a][0];
 		const quern_real *restrict x = b->position[a];
 		quern_real *const *value = b->value[a], *const *slope = b->slope[a];
 		QUERN_SIMD
 		for (uint32_t i = 0; i < b->n; i++) {
-			const quern_real t = x[i] * inverse, cell = quern_min(quern_floor(t), last);
+			const quern_real t = x[i] * inverse, cell = quern_max(quern_min(quern_floor(t), last), least);
 			b->first[a][i] = (int32_t)cell;
 			value[0][i] = 1 - (t - cell);
 			value[1][i] = t - cell;

@@ -180,15 +180,14 @@ static void full_between_plane_and_face(void **state) {
 		const wall w = { "", 2, { 0, 0.8, 0 }, { 0, 1, 0 }, false, 0 };
 		quern_run *run = open_wall(&w, k ? "bspline" : "gimp");
 		double worst = 0;
-		int nodes = 0;
 		harness_steps(run, 1);
 		const quern_grid_view *g = quern_host_table.grid(run);
 		for (int x = 2; x <= 8; x++) {
 			const int32_t i = quern_grid_entry(g, (const int32_t[3]) { x, 9, 0 });
-			worst = fmax(worst, fabs(harness_field(run, "motion.density").real[0][8 * i] / filled - 1)),
-			nodes++;
+			assert_true(i >= 0);
+			worst = fmax(worst, fabs(harness_field(run, "motion.density").real[0][8 * i] / filled - 1));
 		}
-		good &= table_row(k ? "bspline, off by" : "gimp, off by", worst, 0, k ? 3e-3 : 1e-3) && nodes == 7;
+		good &= table_row(k ? "bspline, off by" : "gimp, off by", worst, 0, k ? 3e-3 : 1e-3);
 		harness_close(run);
 	}
 	assert_true(good);
