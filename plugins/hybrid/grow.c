@@ -57,16 +57,12 @@ quern_status quern_hybrid_grow(const void *self, const quern_step *s) {
 	const hybrid *h = self;
 	const uint32_t n = s->host->set(s->run, "grain").n;
 	quern_real farthest = 0;
-	bool any = false;
-	if (!(h->growth > 0)) return QUERN_OK;
-	quern_real *worst = s->host->memory(s->run, ((size_t)n + 1) * sizeof *worst);
+	uint32_t first = h->growth > 0 ? 0 : n;
+	while (first < n && !shall_grow(h, s, first)) first++;
+	if (first == n) return QUERN_OK;
+	quern_real *worst = s->host->memory(s->run, n * sizeof *worst);
 	if (!worst) return QUERN_E_MEMORY;
-	for (uint32_t i = 0; i < n; i++) {
-		const bool grows = shall_grow(h, s, i);
-		worst[i] = grows ? -INFINITY : NAN;
-		any = any || grows;
-	}
-	if (!any) return QUERN_OK;
+	for (uint32_t i = 0; i < n; i++) worst[i] = i >= first && shall_grow(h, s, i) ? -INFINITY : NAN;
 	find_overlaps(s, worst);
 	for (uint32_t i = 0; i < n; i++)
 		if (!isnan(worst[i])) farthest = fmax(farthest, grow(h, s, i, worst[i]));

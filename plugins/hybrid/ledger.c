@@ -42,19 +42,20 @@ static bool presses(const update *d, int32_t i) {
 	return trace < 0;
 }
 
-/* What was open and is under no pressure stays as it is: closed, it would press at the first contraction, be the cell ever so loose. What flows at a
- * density of its own keeps its room. */
-static void take_over_point(const update *d, int32_t i, const quern_real contact[6], quern_real loosest) {
+/* What is loose, bears nothing and is under no pressure stays as it is: closed, it would press at the first contraction, be the cell ever so loose. What
+ * flows at a density of its own keeps its room. */
+static void take_over_point(
+	const update *d, int32_t i, quern_real share, const quern_real contact[6], quern_real loosest) {
 	const uint32_t n = quern_shape_size(QUERN_SYMMETRIC, d->s->dim);
-	const quern_real share = old_share(d, d->point_cell[i]), mass = d->u[U_POINT_MASS].real[0][i];
+	const quern_real mass = d->u[U_POINT_MASS].real[0][i];
 	quern_real *volume = &d->u[U_POINT_VOLUME].real[0][i], room = *volume;
-	bool bore = false;
+	bool open = mass < d->h->packed * room;
 	for (uint32_t k = 0; k < n; k++) {
 		quern_real *stress = &d->u[U_POINT_STRESS].real[k][i];
-		bore = bore || *stress != 0;
+		open = open && *stress == 0;
 		*stress = (1 - share) * contact[k] + share * *stress;
 	}
-	if (!bore && !presses(d, i)) {
+	if (open && !presses(d, i)) {
 		for (uint32_t k = 0; k < n; k++) d->u[U_POINT_STRESS].real[k][i] = 0;
 		return;
 	}
@@ -65,10 +66,10 @@ static void take_over_point(const update *d, int32_t i, const quern_real contact
 /* Only the shares' sum is the material's stress; points that will carry all of it take it on. */
 static void take_over_stress(const update *d, uint32_t c) {
 	const uint32_t begin = d->point_begin[c], end = d->point_begin[c + 1];
-	const quern_real loosest = loosest_flow(d);
+	const quern_real share = old_share(d, (int32_t)c), loosest = loosest_flow(d);
 	quern_real contact[6];
 	if (begin == end || !quern_hybrid_mean_stress(d, c, contact)) return;
-	for (uint32_t q = begin; q < end; q++) take_over_point(d, d->point[q], contact, loosest);
+	for (uint32_t q = begin; q < end; q++) take_over_point(d, d->point[q], share, contact, loosest);
 }
 
 /* Whether a cell is on its way to all continuum. One that shall hold grains too keeps the mass of those that it has. */
