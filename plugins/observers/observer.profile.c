@@ -44,7 +44,7 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	if ((uint32_t)o->axis >= setup->dim)
 		return setup->host->fail(
 			err, QUERN_E_PARAM, "axis", "must be less than %u in this scene", setup->dim);
-	return region_init(&o->region, setup, err);
+	return region_init_wide(&o->region, setup, err);
 }
 
 /* The share of a disc, a sphere or a cube of half a width `size` that is below t, from -1 to 1 of it. */

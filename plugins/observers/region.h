@@ -7,7 +7,7 @@
 
 typedef struct observer_region {
 	quern_real lower[3], upper[3]; /* m; NaN: no bound */
-	quern_real low[3], high[3];    /* m, of region_init: bounds, or else the domain's faces */
+	quern_real low[3], high[3];    /* m, of region_init: bounds, or else the domain's faces at the start */
 	quern_real length[3];          /* m, of the domain along periodic axes, else 0 */
 } observer_region;
 
@@ -25,11 +25,18 @@ static inline quern_status region_init(observer_region *r, const quern_setup *se
 		if (r->upper[k] <= r->lower[k])
 			return setup->host->fail(err, QUERN_E_PARAM, "region.box.upper",
 				"must be above the lower corner along every axis; axis %u is not", k);
+	}
+	return QUERN_OK;
+}
+
+/* Of one that must have a width, also where a bound is left to the domain. */
+static inline quern_status region_init_wide(observer_region *r, const quern_setup *setup, quern_err *err) {
+	if (region_init(r, setup, err) != QUERN_OK) return QUERN_E_PARAM;
+	for (uint32_t k = 0; k < setup->dim; k++)
 		if (!(r->high[k] > r->low[k]))
 			return setup->host->fail(err, QUERN_E_PARAM,
 				isnan(r->lower[k]) ? "region.box.upper" : "region.box.lower",
 				"the region lies outside of the domain along axis %u", k);
-	}
 	return QUERN_OK;
 }
 
