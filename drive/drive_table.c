@@ -170,7 +170,7 @@ static bool read_row(reader *r, const char *at, const char *end, drive_leg *leg)
 	return k == r->n || fault(r, "there are %u words, and %u columns", k, r->n);
 }
 
-/* The row of time 0 says what stresses there are; every component that no column gives a stress is under the pressure. */
+/* The row of time 0 says what stresses there are; normal components that no column gives a stress share alike what is left to the mean pressure. */
 static bool begin_with(reader *r, drive_path *p, const drive_leg *leg) {
 	for (uint32_t k = 0; k < r->n; k++) {
 		const column *c = &r->column[k];
@@ -180,12 +180,12 @@ static bool begin_with(reader *r, drive_path *p, const drive_leg *leg) {
 	}
 	if (!p->pressed) return true;
 	double rest = p->dim * leg->pressure;
-	uint32_t free = 0;
+	uint32_t others = 0;
 	for (uint32_t c = 0; c < p->dim; c++)
-		if (p->control[c] != DRIVE_STRESS) free++;
+		if (p->control[c] != DRIVE_STRESS) others++;
 		else rest += p->start.target[c];
 	for (uint32_t c = 0; c < p->dim; c++)
-		if (p->control[c] != DRIVE_STRESS) p->start.target[c] = -rest / free;
+		if (p->control[c] != DRIVE_STRESS) p->start.target[c] = -rest / others;
 	return true;
 }
 

@@ -305,7 +305,7 @@ static void load_column(
 		memcpy(to + i * size, (const char *)c->given + (begin + n - 1) * size, size);
 }
 
-/* The first byte is, and each is like the one before. */
+/* The first one is that byte, and each is like the one before. */
 static bool is_filled(const char *bytes, size_t n, unsigned char byte) {
 	return !n || ((unsigned char)*bytes == byte && !memcmp(bytes, bytes + 1, n - 1));
 }

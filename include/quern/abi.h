@@ -17,10 +17,10 @@
  *           [region] one worker per region; like [batch], but may call the services in the job it got.
  * State.    `self` is read-only after init. All that evolves is in fields, so it is checkpointed, sorted,
  *           carried over and written out without the plugin's help.
- * Batches.  n entities, struct of arrays, one column per component; 0 < n <= cap. Lanes in [n, cap) may be read, and are never
- *           written: what stands there is harmless, or the next entities of the set. Columns that are made for a call are 64-byte
- *           aligned and padded to QUERN_LANES, those of a set begin anywhere. A result never depends on how entities are cut
- *           into batches.
+ * Batches.  n entities, struct of arrays, one column per component; 0 < n <= cap. Lanes from n up to the next multiple of
+ *           QUERN_LANES may be read, and none is written: what stands there is harmless, or the next entities of the set. Columns
+ *           that are made for a call are 64-byte aligned, those of a set begin anywhere. A result never depends on how entities
+ *           are cut into batches.
  * Units.    SI. A 2-D scene is a slab one metre thick: kg, N, Pa and kg/m^3 mean the same in both
  *           dimensions. 2-D vectors have two components, axial ones (spin, torque, slip) one.
  * Growth.   Structs grow at the end only. What a plugin fills carries its size, or its owner carries a stride, and

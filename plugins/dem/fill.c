@@ -314,11 +314,8 @@ static quern_status open_placer(filling *f, const grain_table *table) {
 	return status;
 }
 
-/* Grains, and what one takes with its contacts: whoever has asked for more may have mistaken a unit. */
-static const quern_real many = 2e7, bytes_each = 600;
-
-/* Regions that cannot be meant: more grains than a run can number. Of many it says so before they are placed, which takes a while. */
-static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
+/* Regions that cannot be meant: more grains than a run can number. `all`: grains, of those before too. */
+static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i, quern_real *all) {
 	const dem_fill *item = (const dem_fill *)d->fill.items + i;
 	char param[40];
 	quern_real grains = 1, least = INFINITY;
@@ -328,15 +325,29 @@ static quern_status check_fill(const dem *d, const quern_step *s, uint32_t i) {
 		const quern_real across = (item->upper[k] - item->lower[k]) / (2 * least);
 		grains *= across > 1 ? across : 1;
 	}
-	if (grains > many && grains <= 0x1p30)
-		s->host->log(s->run, 2,
-			"fill %u: a box around its region holds about %.2g grains of radius %g m; with their contacts they take some %.0f GB",
-			i, grains, least, grains * bytes_each * 1e-9);
+	*all += grains;
 	if (grains <= 0x1p30) return QUERN_OK;
 	snprintf(param, sizeof param, "fill.%u", i);
 	return s->host->stop(s->run, QUERN_E_PARAM, param, -1,
 		"the region holds about %.2g grains of radius %g m; more than %.2g cannot be numbered", grains, least,
 		0x1p30);
+}
+
+/* Whoever has asked for so many may have mistaken a unit. */
+static const quern_real many = 2e7;
+/* A grain takes so many bytes with its contacts (docs/run_folder.md). */
+static const quern_real bytes_each = 600;
+
+/* Of many it is said before they are placed, which takes a while. */
+static quern_status check_fills(const dem *d, const quern_step *s) {
+	quern_status status = QUERN_OK;
+	quern_real all = 0;
+	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = check_fill(d, s, i, &all);
+	if (status == QUERN_OK && all > many)
+		s->host->log(s->run, 2,
+			"fill: boxes around its regions hold about %.2g grains; with their contacts they take some %.0f GB",
+			all, all * bytes_each * 1e-9);
+	return status;
 }
 
 /* What comes next must find them. */
@@ -437,7 +448,7 @@ static quern_status fill_all(filling *f, const grain_table *table) {
 	add_before(f);
 	quern_status status = add_all(f, d->place.items, d->place.n, "place");
 	if (status == QUERN_OK) status = add_all(f, table->grain, table->n, "file");
-	for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++) status = check_fill(d, s, i);
+	if (status == QUERN_OK) status = check_fills(d, s);
 	if (status != QUERN_OK) return status;
 	for (int fixed = 1; fixed >= 0; fixed--) /* floors first: what falls must find them */
 		for (uint32_t i = 0; i < d->fill.n && status == QUERN_OK; i++)

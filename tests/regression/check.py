@@ -77,6 +77,7 @@ BROKEN = [
     ("depends on n", LINEAR, [(FORCE, "b->force[0][i] += f.x * (1 + 1e-15 * (b->n > 100));")], "batches"),
     ("writes beyond cap", LINEAR, [around("b->force[0][b->cap] = 1;")], "guards"),
     ("writes beyond n", LINEAR, [around("if (b->n < b->cap) b->force[0][b->n] += 1;")], "guards"),
+    ("makes more than n", "shape", [("value[2][i] = 0;", "value[2][i] = 0; if (b->n < b->cap) value[2][b->n] = 0;")], "guards"),
     ("writes its input", LINEAR, [around("((quern_real *)b->overlap)[0] = 0;")], "inputs"),
     ("writes itself", LINEAR, [around("((linear *)self)->loss += 1e-3;")], "self"),
     ("rounds down", LINEAR, [around("__builtin_ia32_ldmxcsr(0x3f80);")], "arithmetic"),
