@@ -10,7 +10,7 @@ extern "C" {
 typedef struct quern_shape_batch {
 	uint32_t n, cap, dim, pad;
 	quern_real inverse_cell;       /* 1/m */
-	const quern_real *position[3]; /* m from the grid's lower corner */
+	const quern_real *position[3]; /* m from the grid's lower corner; by round-off it may lie beyond a wall */
 	int32_t wall
 		[3]
 		[2]; /* node index of walls on node lines, INT32_MIN and INT32_MAX where there is none within two cells */

@@ -251,6 +251,7 @@ static void collect(const forces_shared *sh, uint32_t n_blocks) {
 		body_books_close(&sh->books_of_bodies, s, n_blocks, sh->by_place, &u[FORCE_IMPULSE], &u[FORCE_TWIST],
 			&u[FORCE_WORK], &u[FORCE_SUPPORT]);
 	const bool alone = (s->settling || !u[FORCE_LENT].real[0]) && !sh->boxed;
+	/* where ways are measured elsewhere they are 0 here, and bodies have come as far */
 	*displacement =
 		fmax(*displacement, quern_dem_used_of_skin(s, sh->ways, n_blocks, farthest, sweep(sh), alone));
 	if (sh->boxed) quern_dem_box_collect(sh, n_blocks);

@@ -68,12 +68,11 @@ typedef struct forces_shared {
 	bool predicts;      /* dashpots act on other velocities than those by which grains have moved */
 	bool means;         /* it does, and a law asks for the latter */
 	bool works, twists; /* what bodies do, and their torques, are booked */
-	const body_pose *pose; /* by body */
-	quern_real dt;         /* s, by which springs move */
-	bool books;            /* losses of this step are booked */
-	bool looks;            /* nothing moves: forces and energies of the state as it is */
-	bool
-		opens; /* the integrator has a part before the forces, where ways are measured in a box that is not strained */
+	const body_pose *pose;         /* by body */
+	quern_real dt;                 /* s, by which springs move */
+	bool books;                    /* losses of this step are booked */
+	bool looks;                    /* nothing moves: forces and energies of the state as it is */
+	bool opens;                    /* ways are measured in the integrator's part before the forces */
 	const history_column *history; /* what laws remember of contacts */
 	uint32_t n_history;
 	bool boxed;            /* the domain is strained */

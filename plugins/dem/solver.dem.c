@@ -571,7 +571,7 @@ static const quern_solver_ops ops = { QUERN_SOLVER_SIZES, .section = "grains", .
 	.looks = quern_dem_looks, .look = quern_dem_look_at_run, .from = "from", .takes = takes,
 	.essential = essential, .same = same, .unlike = unlike };
 static const quern_plugin plugin = { .size = sizeof plugin,
-	.revision = 3,
+	.revision = 4,
 	.dims = QUERN_2D | QUERN_3D,
 	.id = "solver.dem",
 	.brief = "Grains: discs and spheres with contact laws.",

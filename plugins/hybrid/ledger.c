@@ -49,7 +49,7 @@ static void take_over_point(
 	const uint32_t n = quern_shape_size(QUERN_SYMMETRIC, d->s->dim);
 	const quern_real mass = d->u[U_POINT_MASS].real[0][i];
 	quern_real *volume = &d->u[U_POINT_VOLUME].real[0][i], room = *volume;
-	bool open = mass < d->h->packed * room;
+	bool open = mass < (1 - 1e-9) * d->h->packed * room;
 	for (uint32_t k = 0; k < n; k++) {
 		quern_real *stress = &d->u[U_POINT_STRESS].real[k][i];
 		open = open && *stress == 0;

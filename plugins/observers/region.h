@@ -17,6 +17,14 @@ typedef struct observer_region {
 		.flags = flags_),                                                                                    \
 		QUERN_PARAM_AS(T, region.upper, "region.box.upper", "m", "Upper corner.", .flags = flags_)
 
+/* Whether it has a width there, with the domain's face for a bound that it lacks. */
+static inline quern_status region_has_width(
+	const observer_region *r, uint32_t k, const quern_setup *setup, quern_err *err) {
+	if (r->high[k] > r->low[k]) return QUERN_OK;
+	return setup->host->fail(err, QUERN_E_PARAM, isnan(r->lower[k]) ? "region.box.upper" : "region.box.lower",
+		"the region lies outside of the domain along axis %u", k);
+}
+
 static inline quern_status region_init(observer_region *r, const quern_setup *setup, quern_err *err) {
 	for (uint32_t k = 0; k < setup->dim; k++) {
 		r->low[k] = isnan(r->lower[k]) ? setup->lower[k] : r->lower[k];
@@ -25,6 +33,7 @@ static inline quern_status region_init(observer_region *r, const quern_setup *se
 		if (r->upper[k] <= r->lower[k])
 			return setup->host->fail(err, QUERN_E_PARAM, "region.box.upper",
 				"must be above the lower corner along every axis; axis %u is not", k);
+		if (r->length[k] > 0 && region_has_width(r, k, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	}
 	return QUERN_OK;
 }
@@ -33,10 +42,7 @@ static inline quern_status region_init(observer_region *r, const quern_setup *se
 static inline quern_status region_init_wide(observer_region *r, const quern_setup *setup, quern_err *err) {
 	if (region_init(r, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	for (uint32_t k = 0; k < setup->dim; k++)
-		if (!(r->high[k] > r->low[k]))
-			return setup->host->fail(err, QUERN_E_PARAM,
-				isnan(r->lower[k]) ? "region.box.upper" : "region.box.lower",
-				"the region lies outside of the domain along axis %u", k);
+		if (region_has_width(r, k, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	return QUERN_OK;
 }
 
