@@ -17,6 +17,7 @@ typedef struct mpm {
 	quern_real cell, cut; /* from the scene */
 	quern_real light;     /* what the shape asks for, where `cut` is 0 */
 	int32_t points, rasterise, resample;
+	int32_t per_axis; /* points of a cell, as they are made: of the fill, or of a hybrid's updates */
 	quern_list fill, source;
 	const char *from;
 	bool outlets, sources, resamples;

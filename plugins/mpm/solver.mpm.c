@@ -321,8 +321,8 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 	p->stream = setup->stream;
 	if (quern_sources_check(&p->source, setup, err) != QUERN_OK) return QUERN_E_PARAM;
 	setup->host->publish(setup, "grid.cell", "m", p->cell);
-	if (hybrid) p->points = 2; /* its updates make as many, whatever a fill would */
-	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->points);
+	p->per_axis = hybrid ? 2 : p->points; /* a hybrid's updates make as many, whatever a fill would */
+	setup->host->publish(setup, "continuum.half_width", "1", 0.5 / p->per_axis);
 	return QUERN_OK;
 }
 
@@ -421,7 +421,7 @@ static quern_status ready(void *self, const quern_setup *setup, const quern_boun
 	p->counted = p->alone || (ops->friction && hybrid);
 	((const quern_shape_ops *)shape->ops)->shares(shape->self, &p->share_wall, &p->share_next);
 	p->stiffness = ((const quern_shape_ops *)shape->ops)->stiffness(shape->self);
-	p->light = quern_shape_light(shape->ops, p->points);
+	p->light = quern_shape_light(shape->ops, p->per_axis);
 	if (find_rough(p, setup, material, slot[SLOT_BODIES], n_slot[SLOT_BODIES], err) != QUERN_OK)
 		return QUERN_E_PARAM;
 	setup->host->publish(setup, "continuum.density", "kg/m^3", p->density);

@@ -20,7 +20,7 @@ QUERN_INLINE quern_real spread_offset(quern_real position, quern_real cell, int3
 
 /* Mean square of the way from the middle, over that of what is everywhere alike (1/12): of points in the middles of equal parts, as at first. */
 QUERN_INLINE quern_real spread_even(const gather_work *w) {
-	const quern_real one = 1.0 / w->p->points;
+	const quern_real one = 1.0 / w->p->per_axis;
 	return 1 - one * one;
 }
 
