@@ -46,9 +46,9 @@ static quern_status init(void *self, const quern_setup *setup, quern_err *err) {
 /* Grains that roll as they are pushed along make a tangential spring act on m/3 (discs) or m/3.5 (spheres). */
 QUERN_INLINE quern_real turning_of(uint32_t dim) { return dim == 2 ? 3 : 3.5; }
 
-/* `dim`, `rough` and `energy` are constants in every caller, so dead branches vanish and names stay in the debugger. */
-QUERN_INLINE void kernel(
-	const int dim, const bool rough, const int energy, const linear *self, const quern_contact_batch *b) {
+/* `dim`, `rough`, `energy` and `late` are constants in every caller, so dead branches vanish and names stay in the debugger. */
+QUERN_INLINE void springs(const int dim, const bool rough, const int energy, const bool late,
+	const linear *self, const quern_contact_batch *b) {
 	const linear law = *self;
 	const quern_real dt = b->dt, kn = law.stiffness, kt = law.tangential_stiffness * kn, one_over_kt = 1 / kt;
 	const quern_real lag = b->lag, tangential = law.tangential_damping, turning = turning_of((uint32_t)dim);
@@ -63,8 +63,9 @@ QUERN_INLINE void kernel(
 		const bool touching = d > 0;
 		const quern_onset onset = quern_first_touch(d, -mean_n, dt, 0);
 		const quern_real loss = law.loss * __builtin_sqrt(kn * mass[i]) * onset.weight;
-		const quern_real damping = loss * quern_dashpot_share(kn, mass[i], lag),
-						 shear_damping = tangential * loss * quern_dashpot_share(turning * kt, mass[i], lag);
+		const quern_real share = late ? quern_dashpot_share(kn, mass[i], lag) : 1,
+						 shear_share = late ? quern_dashpot_share(turning * kt, mass[i], lag) : 1;
+		const quern_real damping = loss * share, shear_damping = tangential * loss * shear_share;
 		/* f_n = max(0, k_n d - gamma_n v_n) */
 		const quern_real pushed = kn * d - damping * vn, fn = (touching & (pushed > 0)) ? pushed : 0;
 		quern_vec f = quern_vec_scale(fn, n), viscous = quern_vec_scale(fn - (touching ? kn * d : 0), n);
@@ -116,6 +117,12 @@ QUERN_INLINE void kernel(
 	}
 }
 
+/* Where nothing is late both shares are 1, and two divisions less are made. */
+QUERN_INLINE void kernel(
+	const int dim, const bool rough, const int energy, const linear *self, const quern_contact_batch *b) {
+	if (b->lag > 0) springs(dim, rough, energy, true, self, b);
+	else springs(dim, rough, energy, false, self, b);
+}
 QUERN_INLINE void force(const int dim, const void *self, const quern_contact_batch *b) {
 	QUERN_CALL_LAW(kernel, dim, ((const linear *)self)->friction > 0, self, b);
 }
